@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `robot.yaml` says: the contract's keys as frozen dataclasses."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+Vector = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Joint friction [Nm]: `coulomb * tanh(qd / coulomb_width) + viscous * qd`."""
+
+    coulomb: float = 0.0
+    viscous: float = 0.0
+    coulomb_width: float = 0.05
+
+
+@dataclass(frozen=True)
+class JointDescription:
+    """One observed joint. `torque` is "sensor", "motor", "none" or "from" (then `sources` names sensors)."""
+
+    name: str
+    torque: str = "sensor"
+    sources: tuple[str, ...] = ()
+    sign: float = 1.0
+    gain: float = 1.0
+    bias: float = 0.0
+    delay: float = 0.0
+    range: float = float("inf")
+    compensated: str = "none"
+    rotor_inertia: float = 0.0
+    friction: Friction = field(default_factory=Friction)
+
+
+@dataclass(frozen=True)
+class SensorDescription:
+    """One force-torque sensor with 1 to 6 axes."""
+
+    name: str
+    link: str
+    xyz: Vector = (0.0, 0.0, 0.0)
+    rpy: Vector = (0.0, 0.0, 0.0)
+    axes: tuple[str, ...] = ("fx", "fy", "fz", "mx", "my", "mz")
+    polarity: str = "outboard"
+    frame: str = "sensor"
+    compensated: str = "none"
+    bias: Vector = (0.0,) * 6
+    delay: float = 0.0
+    range: Vector = (float("inf"),) * 6
+
+
+@dataclass(frozen=True)
+class Load:
+    """A body fixed to `link` that the model lacks; `com` and `inertia` (about com) in link axes."""
+
+    link: str
+    mass: float
+    com: Vector = (0.0, 0.0, 0.0)
+    inertia: Vector = (0.0,) * 6
+
+
+@dataclass(frozen=True)
+class LinkCorrection:
+    """Replaces what the model says of one link; None keeps the model's value."""
+
+    mass: float | None = None
+    com: Vector | None = None
+    inertia: Vector | None = None
+
+
+@dataclass(frozen=True)
+class Noise:
+    """One sigma per sample. `q`, `qd`, `tau` have one value per joint, `sensors[name]` six."""
+
+    q: Vector
+    qd: Vector
+    tau: Vector
+    sensors: dict[str, Vector]
+
+
+@dataclass(frozen=True)
+class RobotDescription:
+    """A whole `robot.yaml`, checked; per-joint values are expanded to the order of `joints`."""
+
+    name: str
+    model: Path
+    joints: tuple[JointDescription, ...]
+    sensors: tuple[SensorDescription, ...]
+    noise: Noise
+    bandwidth_joints: Vector
+    bandwidth_sensors: dict[str, float]
+    package_dirs: tuple[Path, ...] = ()
+    gravity: Vector | None = None
+    locked: dict[str, float] = field(default_factory=dict)
+    loads: tuple[Load, ...] = ()
+    links: dict[str, LinkCorrection] = field(default_factory=dict)
+    detection: dict[str, Any] = field(default_factory=dict)
+    log: dict[str, Any] = field(default_factory=dict)
+    path: Path | None = None
