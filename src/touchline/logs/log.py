@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Opens a recording of any supported kind and hands out its samples."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from touchline.errors import InputError
+from touchline.estimation.samples import Samples
+from touchline.logs.blocks import windows
+from touchline.logs.columns import signal_shapes
+from touchline.logs.naming import parse_naming
+from touchline.logs.source import Source
+from touchline.model.description import RobotDescription
+
+TABLES = (".parquet", ".csv", ".csv.gz")
+BAGS = (".db3", ".mcap")
+
+
+class Log:
+    """An opened recording.
+
+    Attributes:
+        path: of the log.
+        rows: number of rows, None where it is only known at the end.
+        duration: [s], None where it is only known at the end.
+        columns: columns of the table.
+        topics: topic -> message type of the rosbag2.
+        metadata: what the writer left (Parquet).
+    """
+
+    def __init__(self, path: Path, description: RobotDescription, source: Source):
+        self.path = path
+        self._description = description
+        self._source = source
+        self._warnings: list[str] = []
+        self.rows = source.rows
+        self.duration = source.duration
+        self.columns = source.columns
+        self.topics = source.topics
+        self.metadata: dict[str, Any] = source.metadata
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the user should know; grows while the log is read."""
+        return self._warnings + self._source.warnings
+
+    @property
+    def progress(self) -> float:
+        """Fraction of the log that has been read, 0 to 1."""
+        return min(self._source.progress(), 1.0)
+
+    def chunks(self, rows: int = 65536) -> Iterator[Samples]:
+        """All samples, `rows` at a time (the last may be fewer); the numbers do not depend on it.
+
+        Raises:
+            InputError: the log is damaged or holds something that is no number.
+        """
+        for window in windows(self._source.blocks(), rows, 0):
+            block = window.padded
+            yield Samples(
+                block["time"], block["q"], block["qd"], block["tau"], block["wrench"], window.row
+            )
+
+    def close(self) -> None:
+        """Release the file."""
+        self._source.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def open_log(path: Path | str, description: RobotDescription) -> Log:
+    """Open a table (Parquet, CSV, CSV.gz) or a rosbag2 (sqlite3, MCAP).
+
+    Raises:
+        InputError: the file is missing, of no known kind, empty or unreadable, or lacks columns
+            or topics the robot needs.
+    """
+    path = Path(path)
+    return Log(path, description, _open_source(path, description))
+
+
+def _open_source(path: Path, description: RobotDescription) -> Source:
+    naming = parse_naming(description)
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    name = path.name.lower()
+    if path.is_file() and not path.stat().st_size:
+        raise InputError(f"{path}: the file is empty")
+    if name.endswith(".parquet"):
+        from touchline.logs.parquet import ParquetSource
+
+        return ParquetSource(path, description, naming)
+    if name.endswith((".csv", ".csv.gz")):
+        from touchline.logs.csvfile import CsvSource
+
+        return CsvSource(path, description, naming)
+    raise InputError(
+        f"{path}: not a known kind of log; tables end in {', '.join(TABLES)}, recordings in "
+        f"{', '.join(BAGS)} (a rosbag2 folder holds a metadata.yaml)"
+    )
+
+
+def read_log(path: Path | str, description: RobotDescription) -> Samples:
+    """All samples at once.
+
+    Raises:
+        InputError: as `open_log` and `Log.chunks`.
+    """
+    with open_log(path, description) as log:
+        chunks = list(log.chunks())
+    if not chunks:
+        empty = {n: np.empty((0, *shape)) for n, shape in signal_shapes(description).items()}
+        return Samples(**empty)
+    names = ("time", "q", "qd", "tau", "wrench")
+    return Samples(**{n: np.concatenate([getattr(c, n) for c in chunks]) for n in names})

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads a table from a Parquet file in bounded memory."""
+
+import json
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from touchline.errors import InputError
+from touchline.logs.blocks import Block
+from touchline.logs.columns import select_columns
+from touchline.logs.naming import Naming
+from touchline.logs.source import HEAD_ROWS
+from touchline.model.description import RobotDescription
+
+METADATA_KEY = b"touchline"
+_BATCH_ROWS = 65536
+
+
+class ParquetSource:
+    """A Parquet file as a log."""
+
+    def __init__(self, path: Path, description: RobotDescription, naming: Naming):
+        """Open the file and find its columns.
+
+        Raises:
+            InputError: no Parquet file, one cut off before its footer, or columns are missing.
+        """
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        self.path = path
+        try:
+            # Without pre-buffering a huge row group is read page by page.
+            self._file = pq.ParquetFile(path, pre_buffer=False, buffer_size=1 << 20)
+        except (pa.ArrowException, OSError) as error:
+            raise InputError(
+                f"{path}: not a readable Parquet file; a file cut off before its footer cannot "
+                f"be read ({str(error).splitlines()[0]})"
+            ) from error
+        self.columns = tuple(self._file.schema_arrow.names)
+        self.topics: dict[str, str] = {}
+        self.warnings: list[str] = []
+        self.delayed_wrenches = True
+        try:
+            self._selection = select_columns(description, naming, list(self.columns), str(path))
+            self._check_types()
+        except InputError:
+            self.close()
+            raise
+        self.without_velocity = self._selection.without_velocity
+        self.rows = self._file.metadata.num_rows
+        self.metadata = _metadata(self._file.schema_arrow.metadata or {})
+        self.duration = self._duration(naming)
+        self._read_rows = 0
+
+    def _check_types(self) -> None:
+        import pyarrow.types as types
+
+        problems = []
+        for name in self._selection.names:
+            kind = self._file.schema_arrow.field(name).type
+            if not (types.is_floating(kind) or types.is_integer(kind) or types.is_null(kind)):
+                problems.append(f"{self.path}: column {name!r} holds {kind}, not numbers")
+        if problems:
+            raise InputError(problems)
+
+    def _duration(self, naming: Naming) -> float | None:
+        """From the statistics of the time column, where the writer left them."""
+        at = next(
+            (i for i, column in enumerate(self._file.schema) if column.path == naming.time.name),
+            None,
+        )
+        if at is None:
+            return None
+        meta = self._file.metadata
+        chunks = [meta.row_group(g).column(at).statistics for g in range(meta.num_row_groups)]
+        ranges = [(s.min, s.max) for s in chunks if s is not None and s.has_min_max]
+        if not ranges or len(ranges) < len(chunks):
+            return None
+        span = max(high for _, high in ranges) - min(low for low, _ in ranges)
+        return float(span) * abs(naming.time.factor)
+
+    def head(self) -> Block:
+        """The first rows."""
+        return next(self._blocks(HEAD_ROWS), self._selection.assemble(lambda _: np.empty(0), 0))
+
+    def blocks(self) -> Iterator[Block]:
+        """All rows.
+
+        Raises:
+            InputError: a page of the file is damaged.
+        """
+        self._read_rows = 0
+        for block in self._blocks(_BATCH_ROWS):
+            self._read_rows += len(block["time"])
+            yield block
+
+    def _blocks(self, rows: int) -> Iterator[Block]:
+        import pyarrow as pa
+
+        done = 0
+        try:
+            for batch in self._file.iter_batches(batch_size=rows, columns=self._selection.names):
+                yield self._selection.assemble(
+                    lambda name, batch=batch: numbers(batch.column(name)), batch.num_rows
+                )
+                done += batch.num_rows
+        except (pa.ArrowException, OSError) as error:
+            raise InputError(f"{self.path}: damaged after row {done}: {error}") from error
+
+    def progress(self) -> float:
+        """Fraction of the rows read."""
+        return self._read_rows / self.rows if self.rows else 1.0
+
+    def close(self) -> None:
+        """Release the file."""
+        self._file.close(force=True)
+
+
+def numbers(column: Any) -> np.ndarray:
+    """An Arrow array as (N,) float64 with NaN for null."""
+    return np.asarray(column.to_numpy(zero_copy_only=False), dtype=np.float64)
+
+
+def _metadata(raw: dict[bytes, bytes]) -> dict[str, Any]:
+    """What `write_table` stored, and other programs' entries as text."""
+    found: dict[str, Any] = {}
+    for key, value in raw.items():
+        if key != METADATA_KEY and key != b"ARROW:schema":
+            found[key.decode(errors="replace")] = value.decode(errors="replace")
+    with suppress(ValueError):
+        stored = json.loads(raw.get(METADATA_KEY, b"{}"))
+        found.update(stored if isinstance(stored, dict) else {})
+    return found

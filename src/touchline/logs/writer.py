@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Writes Parquet tables so that a killed run leaves what it had finished readable.
+
+Rows go to closed part files in `NAME.parts/`; at the end these become the one file `NAME.parquet`.
+After a crash `pyarrow.parquet.read_table("NAME.parts")` reads what was finished; the part in
+progress has a name with an underscore in front, which readers of data sets skip.
+"""
+
+import shutil
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from touchline.logs.naming import AXES
+
+PART_ROWS = 1 << 18
+PART_SECONDS = 5.0
+_GROUP_ROWS = 1 << 17
+
+
+class TableWriter:
+    """A Parquet table that grows by blocks of columns. NaN and None become null.
+
+    Used as a context manager it is closed at the end of the block; after an exception the parts
+    stay, so that a table that is not complete never looks like one.
+    """
+
+    def __init__(self, path: Path | str, schema: Mapping[str, Any]):
+        """Remove an old table at `path` and begin a new one.
+
+        Args:
+            path: of the Parquet file; its directory is made.
+            schema: column name -> numpy dtype or "str".
+        """
+        import pyarrow as pa
+
+        self.path = Path(path)
+        self.parts = self.path.with_suffix(".parts")
+        self._schema = pa.schema([(name, _arrow_type(kind)) for name, kind in schema.items()])
+        self._clear()
+        self._count = 0
+        self._rows = 0
+        self._writer: Any = None
+        self._part_rows, self._part_began = 0, 0.0
+
+    def _clear(self) -> None:
+        """Nothing of an old run may stay beside the new one."""
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        self.path.unlink(missing_ok=True)
+        self._merged.unlink(missing_ok=True)
+        shutil.rmtree(self.parts, ignore_errors=True)
+
+    @property
+    def _merged(self) -> Path:
+        return self.path.with_name(f"_{self.path.name}")
+
+    @property
+    def rows(self) -> int:
+        """Rows written so far."""
+        return self._rows
+
+    def _part(self, number: int, done: bool) -> Path:
+        return self.parts / f"{'' if done else '_'}part-{number:05d}.parquet"
+
+    def write(self, columns: Mapping[str, Any]) -> None:
+        """Append rows.
+
+        Args:
+            columns: one array of equal length for every column of the schema.
+
+        Raises:
+            ValueError: columns are missing, unknown or of different lengths.
+        """
+        import pyarrow as pa
+
+        names = self._schema.names
+        if set(columns) != set(names):
+            odd = sorted(set(columns) ^ set(names))
+            raise ValueError(f"{self.path}: missing or unknown columns: {', '.join(odd)}")
+        arrays = [
+            pa.array(columns[field.name], type=field.type, from_pandas=True)
+            for field in self._schema
+        ]
+        batch = pa.RecordBatch.from_arrays(arrays, schema=self._schema)
+        if batch.num_rows:
+            self._append(batch)
+
+    def _append(self, batch: Any) -> None:
+        if self._writer is None:
+            self.parts.mkdir(exist_ok=True)
+            self._writer = _parquet_writer(self._part(self._count, False), self._schema)
+            self._part_rows, self._part_began = 0, time.monotonic()
+        self._writer.write_batch(batch)
+        self._part_rows += batch.num_rows
+        self._rows += batch.num_rows
+        if self._part_rows >= PART_ROWS or time.monotonic() - self._part_began >= PART_SECONDS:
+            self._close_part()
+
+    def _close_part(self) -> None:
+        if self._writer is not None:
+            self._writer.close()
+            self._writer = None
+            self._part(self._count, False).rename(self._part(self._count, True))
+            self._count += 1
+
+    def close(self) -> None:
+        """Turn the parts into the table."""
+        self._close_part()
+        if self._count == 1:
+            self._part(0, True).rename(self.path)
+        else:
+            self._merge()
+        shutil.rmtree(self.parts, ignore_errors=True)
+
+    def _merge(self) -> None:
+        import pyarrow.parquet as pq
+
+        with _parquet_writer(self._merged, self._schema) as writer:
+            for number in range(self._count):
+                with pq.ParquetFile(self._part(number, True), pre_buffer=False) as part:
+                    for group in range(part.num_row_groups):
+                        writer.write_table(part.read_row_group(group), row_group_size=_GROUP_ROWS)
+        self._merged.rename(self.path)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if kind is None:
+            self.close()
+        else:
+            self._close_part()
+
+
+def _arrow_type(kind: Any) -> Any:
+    import pyarrow as pa
+
+    return pa.string() if kind in ("str", str) else pa.from_numpy_dtype(np.dtype(kind))
+
+
+def _parquet_writer(path: Path, schema: Any) -> Any:
+    """Measured signals do not repeat, so dictionaries only cost time; words do."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    words = [field.name for field in schema if pa.types.is_string(field.type)]
+    return pq.ParquetWriter(path, schema, compression="lz4", use_dictionary=words or False)
+
+
+class EstimateWriter:
+    """Writes `estimates.parquet` with the contract's columns into a directory."""
+
+    def __init__(
+        self,
+        directory: Path | str,
+        joints: Sequence[str],
+        sensors: Sequence[str],
+        segments: Sequence[str],
+        extra: Mapping[str, Any] | None = None,
+    ):
+        """Begin a new file; an old one in the directory is removed.
+
+        Args:
+            directory: made if it is not there.
+            joints: names for `tau_ext.JOINT`.
+            sensors: names for `SENSOR.ext.fx` ...
+            segments: names for `SEGMENT.seg.fx` ...
+            extra: further columns, name -> numpy dtype or "str".
+        """
+        self._joints = [f"tau_ext.{name}" for name in joints]
+        self._sensors = [f"{name}.ext.{axis}" for name in sensors for axis in AXES]
+        self._segments = [f"{name}.seg.{axis}" for name in segments for axis in AXES]
+        schema: dict[str, Any] = {"time": "f8", "health": "u4"}
+        schema |= dict.fromkeys((*self._joints, *self._sensors, *self._segments), "f8")
+        self.table = TableWriter(Path(directory) / "estimates.parquet", schema | dict(extra or {}))
+
+    def write(
+        self,
+        time: np.ndarray,
+        health: np.ndarray,
+        tau_ext: np.ndarray,
+        sensor_wrench: np.ndarray,
+        segment_wrench: np.ndarray,
+        **extra: Any,
+    ) -> None:
+        """Append N rows.
+
+        Args:
+            time: (N,) [s].
+            health: (N,) bits.
+            tau_ext: (N, n) [Nm].
+            sensor_wrench: (N, k, 6), sensor frames.
+            segment_wrench: (N, s, 6), world frame and origin.
+            extra: (N,) for each extra column.
+        """
+        columns: dict[str, Any] = {"time": time, "health": health}
+        for names, values in (
+            (self._joints, tau_ext),
+            (self._sensors, sensor_wrench),
+            (self._segments, segment_wrench),
+        ):
+            table = np.asfortranarray(np.reshape(values, (len(time), len(names))))
+            columns |= {name: table[:, j] for j, name in enumerate(names)}
+        self.table.write(columns | extra)
+
+    def close(self) -> None:
+        """Finish the file."""
+        self.table.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.table.__exit__(kind, error, trace)
