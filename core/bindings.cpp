@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: Apache-2.0
+// The native core for Python: thin, no logic of its own.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include "touchline/observer.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+namespace tl = touchline;
+
+using In = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
+using Out = nb::ndarray<nb::numpy, double>;
+
+namespace {
+
+tl::Vec3 vec3(const std::vector<double>& v) {
+  if (v.size() != 3) throw std::invalid_argument("three numbers are needed");
+  return {v[0], v[1], v[2]};
+}
+
+// From nine numbers, row by row.
+tl::Mat3 mat3(const std::vector<double>& m) {
+  if (m.size() != 9) throw std::invalid_argument("nine numbers are needed");
+  return {{m[0], m[3], m[6]}, {m[1], m[4], m[7]}, {m[2], m[5], m[8]}};
+}
+
+// A numpy array that owns `size` numbers.
+struct Buffer {
+  std::unique_ptr<double[]> data;
+  explicit Buffer(std::size_t size) : data(new double[size]) {}
+  Out release(std::initializer_list<std::size_t> shape) {
+    double* raw = data.release();
+    nb::capsule owner(raw, [](void* p) noexcept { delete[] static_cast<double*>(p); });
+    return Out(raw, shape, owner);
+  }
+};
+
+void expect(const In& array, std::size_t size, const char* name) {
+  if (array.size() != size)
+    throw std::invalid_argument(std::string(name) + " has " + std::to_string(array.size()) +
+                                " numbers, expected " + std::to_string(size));
+}
+
+void expect_sample(const tl::Observer& o, std::size_t rows, const In& q, const In& qd,
+                   const In& tau, const In& wrench) {
+  const std::size_t n = o.row_layout().joints, k = o.row_layout().sensors;
+  expect(q, rows * n, "q");
+  expect(qd, rows * n, "qd");
+  expect(tau, rows * n, "tau");
+  expect(wrench, rows * k * 6, "wrench");
+}
+
+void step(tl::Observer& o, double time, const In& q, const In& qd, const In& tau,
+          const In& wrench) {
+  expect_sample(o, 1, q, qd, tau, wrench);
+  o.step(time, q.data(), qd.data(), tau.data(), wrench.data());
+}
+
+Out update(tl::Observer& o, double time, const In& q, const In& qd, const In& tau,
+           const In& wrench) {
+  step(o, time, q, qd, tau, wrench);
+  const std::size_t width = o.output().size();
+  Buffer row(width);
+  std::copy(o.output().begin(), o.output().end(), row.data.get());
+  return row.release({width});
+}
+
+Out run(tl::Observer& o, const In& time, const In& q, const In& qd, const In& tau,
+        const In& wrench) {
+  const std::size_t rows = time.size(), n = o.row_layout().joints, k = o.row_layout().sensors;
+  expect_sample(o, rows, q, qd, tau, wrench);
+  const std::size_t width = o.output().size();
+  Buffer out(rows * width);
+  {
+    nb::gil_scoped_release release;
+    for (std::size_t i = 0; i < rows; ++i) {
+      const double* row = o.step(time.data()[i], q.data() + i * n, qd.data() + i * n,
+                                 tau.data() + i * n, wrench.data() + i * 6 * k);
+      std::copy(row, row + width, out.data.get() + i * width);
+    }
+  }
+  return out.release({rows, width});
+}
+
+// Momentum and n-bar: joint rows, then six rows per sensor in its own frame.
+nb::tuple terms(tl::Observer& o, const In& q, const In& qd) {
+  const tl::RowLayout& layout = o.row_layout();
+  expect(q, layout.joints, "q");
+  expect(qd, layout.joints, "qd");
+  o.tree().update(q.data(), qd.data());
+  const std::size_t size = layout.joints + 6 * layout.sensors;
+  Buffer p(size), n(size);
+  for (int j = 0; j < layout.joints; ++j)
+    o.joint_terms(j, qd.data()[j], p.data[j], n.data[j]);
+  for (int s = 0; s < layout.sensors; ++s) {
+    tl::Spatial momentum, bias;
+    o.sensor_terms(s, momentum, bias);
+    tl::store(momentum, p.data.get() + layout.joints + 6 * s);
+    tl::store(bias, n.data.get() + layout.joints + 6 * s);
+  }
+  return nb::make_tuple(p.release({size}), n.release({size}));
+}
+
+// Poses (n_nodes, 4, 4) of all nodes in world.
+Out poses(tl::Observer& o, const In& q) {
+  const std::size_t n = o.row_layout().joints, count = o.tree().nodes().size();
+  expect(q, n, "q");
+  const std::vector<double> rest(n, 0.0);
+  o.tree().update(q.data(), rest.data());
+  Buffer out(16 * count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const tl::Pose& X = o.tree().state(static_cast<int>(i)).pose;
+    const double rows[16] = {X.R.x.x, X.R.y.x, X.R.z.x, X.p.x, X.R.x.y, X.R.y.y, X.R.z.y, X.p.y,
+                             X.R.x.z, X.R.y.z, X.R.z.z, X.p.z, 0.0,     0.0,     0.0,     1.0};
+    std::copy(rows, rows + 16, out.data.get() + 16 * i);
+  }
+  return out.release({count, 4, 4});
+}
+
+nb::dict row_slices(const tl::Observer& o) {
+  const tl::RowLayout& l = o.row_layout();
+  nb::dict d;
+  const auto add = [&d](const char* name, int start, int size) {
+    d[name] = nb::make_tuple(start, start + size);
+  };
+  add("tau_ext", l.tau_ext(), l.joints);
+  add("segment_torque", l.segment_torque(), l.joints);
+  add("parity", l.parity(), l.joints);
+  add("joint_innovation", l.joint_innovation(), l.joints);
+  add("sensor_wrench", l.sensor_wrench(), 6 * l.sensors);
+  add("segment_wrench", l.segment_wrench(), 6 * l.segments);
+  add("segment_innovation", l.segment_innovation(), 6 * l.segments);
+  add("joint_settled", l.joint_settled(), l.joints);
+  add("segment_settled", l.segment_settled(), l.segments);
+  add("health", l.health(), 1);
+  return d;
+}
+
+tl::Node make_node(int parent, tl::NodeKind kind, const std::vector<double>& R,
+                   const std::vector<double>& p, double mass, const std::vector<double>& com,
+                   const std::vector<double>& inertia, int coordinate, double multiplier,
+                   double offset) {
+  return {parent,    kind,          {mat3(R), vec3(p)}, mass,  vec3(com),
+          mat3(inertia), coordinate, multiplier,        offset};
+}
+
+template <std::size_t N, class T>
+void copy_to(T (&target)[N], const std::vector<T>& source) {
+  if (source.size() != N) throw std::invalid_argument("six values are needed");
+  std::copy(source.begin(), source.end(), target);
+}
+
+void bind_rows(nb::module_& m) {
+  nb::class_<tl::Node>(m, "Node").def_ro("parent", &tl::Node::parent);
+  m.def("node", &make_node, "parent"_a, "kind"_a, "R"_a, "p"_a, "mass"_a, "com"_a, "inertia"_a,
+        "coordinate"_a, "multiplier"_a, "offset"_a);
+  nb::class_<tl::JointRow>(m, "JointRow")
+      .def(nb::init<>())
+      .def_rw("torque", &tl::JointRow::torque)
+      .def_rw("compensated", &tl::JointRow::compensated)
+      .def_rw("sign", &tl::JointRow::sign)
+      .def_rw("gain", &tl::JointRow::gain)
+      .def_rw("bias", &tl::JointRow::bias)
+      .def_rw("range", &tl::JointRow::range)
+      .def_rw("rotor_inertia", &tl::JointRow::rotor_inertia)
+      .def_rw("coulomb", &tl::JointRow::coulomb)
+      .def_rw("viscous", &tl::JointRow::viscous)
+      .def_rw("coulomb_width", &tl::JointRow::coulomb_width)
+      .def_rw("lower", &tl::JointRow::lower)
+      .def_rw("upper", &tl::JointRow::upper)
+      .def_rw("bandwidth", &tl::JointRow::bandwidth)
+      .def_rw("nodes", &tl::JointRow::nodes)
+      .def_rw("sources", &tl::JointRow::sources);
+  nb::class_<tl::SensorRow>(m, "SensorRow")
+      .def(nb::init<>())
+      .def_rw("node", &tl::SensorRow::node)
+      .def_rw("sign", &tl::SensorRow::sign)
+      .def_rw("turned", &tl::SensorRow::turned)
+      .def_rw("log_node", &tl::SensorRow::log_node)
+      .def_rw("gravity_compensated", &tl::SensorRow::gravity_compensated)
+      .def_rw("bandwidth", &tl::SensorRow::bandwidth)
+      .def("set_log_rotation",
+           [](tl::SensorRow& s, const std::vector<double>& R) { s.R_node_log = mat3(R); })
+      .def("set_axes", [](tl::SensorRow& s, const std::vector<bool>& axes) {
+        if (axes.size() != 6) throw std::invalid_argument("six values are needed");
+        std::copy(axes.begin(), axes.end(), s.axes);
+      })
+      .def("set_bias", [](tl::SensorRow& s, const std::vector<double>& v) { copy_to(s.bias, v); })
+      .def("set_range",
+           [](tl::SensorRow& s, const std::vector<double>& v) { copy_to(s.range, v); });
+}
+
+void bind_enums(nb::module_& m) {
+  nb::enum_<tl::NodeKind>(m, "NodeKind")
+      .value("fixed", tl::NodeKind::fixed)
+      .value("revolute", tl::NodeKind::revolute)
+      .value("prismatic", tl::NodeKind::prismatic);
+  nb::enum_<tl::Torque>(m, "Torque")
+      .value("sensor", tl::Torque::sensor)
+      .value("motor", tl::Torque::motor)
+      .value("none", tl::Torque::none)
+      .value("from_sensors", tl::Torque::from);
+  nb::enum_<tl::Compensated>(m, "Compensated")
+      .value("none", tl::Compensated::none)
+      .value("gravity", tl::Compensated::gravity)
+      .value("model", tl::Compensated::model);
+  nb::enum_<tl::Method>(m, "Method")
+      .value("segment", tl::Method::segment)
+      .value("paper", tl::Method::paper);
+  nb::enum_<tl::Discretization>(m, "Discretization")
+      .value("automatic", tl::Discretization::automatic)
+      .value("tustin", tl::Discretization::tustin)
+      .value("exponential", tl::Discretization::exponential);
+}
+
+}  // namespace
+
+NB_MODULE(_core, m) {
+  bind_enums(m);
+  bind_rows(m);
+  nb::class_<tl::Observer>(m, "Observer")
+      .def("__init__",
+           [](tl::Observer* self, std::vector<tl::Node> nodes, const std::vector<double>& gravity,
+              std::vector<tl::JointRow> joints, std::vector<tl::SensorRow> sensors,
+              tl::Method method, tl::Discretization discretization) {
+             new (self) tl::Observer(tl::Tree(std::move(nodes), vec3(gravity)), std::move(joints),
+                                     std::move(sensors), method, discretization);
+           })
+      .def("step", &step, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a)
+      .def("update", &update, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a)
+      .def("run", &run, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a)
+      .def("terms", &terms, "q"_a, "qd"_a)
+      .def("poses", &poses, "q"_a)
+      .def("reset", &tl::Observer::reset)
+      .def_prop_ro("slices", &row_slices)
+      .def_prop_ro("segment_sensors", [](const tl::Observer& o) {
+        std::vector<int> sensors;
+        for (const tl::Segment& s : o.layout().segments) sensors.push_back(s.sensor);
+        return sensors;
+      })
+      .def_prop_ro(
+          "row",
+          [](tl::Observer& o) {
+            return Out(const_cast<double*>(o.output().data()), {o.output().size()}, nb::handle());
+          },
+          nb::rv_policy::reference_internal);
+}

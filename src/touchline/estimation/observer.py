@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The extended momentum observer: external torques and wrenches from one sample or a recording."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from touchline.model.robot import Robot
+
+Array = NDArray[np.float64]
+
+METHODS = ("segment", "paper")
+DISCRETIZATIONS = ("automatic", "tustin", "exponential")
+
+
+class Estimate:
+    """What the observer knows after one sample, or after each of N samples of a recording.
+
+    Shapes are those of one sample; a recording's have N in front. n joints, k sensors, m segments.
+    What cannot be computed is NaN.
+    """
+
+    __slots__ = ("rows", "_slices")
+
+    def __init__(self, rows: Array, slices: dict[str, slice]) -> None:
+        self.rows = rows
+        self._slices = slices
+
+    def _part(self, name: str) -> Array:
+        return self.rows[..., self._slices[name]]
+
+    def _wrenches(self, name: str) -> Array:
+        part = self._part(name)
+        return part.reshape(*part.shape[:-1], -1, 6)
+
+    @property
+    def tau_ext(self) -> Array:
+        """External joint torques (n,) [Nm], low-passed with the observer's bandwidth (eq. 17)."""
+        return self._part("tau_ext")
+
+    @property
+    def sensor_wrench(self) -> Array:
+        """External wrench (k, 6) [N, Nm] on everything outboard of each sensor, sensor frame."""
+        return self._wrenches("sensor_wrench")
+
+    @property
+    def segment_wrench(self) -> Array:
+        """External wrench (m, 6) [N, Nm] on each segment alone, world axes, about the origin."""
+        return self._wrenches("segment_wrench")
+
+    @property
+    def segment_torque(self) -> Array:
+        """The part of `tau_ext` (n,) [Nm] that contacts on the joint's own segment cause."""
+        return self._part("segment_torque")
+
+    @property
+    def parity(self) -> Array:
+        """Joint torque minus what the sensor inboard says of it (n,) [Nm].
+
+        Zero unless something touches between that sensor and the joint, or a sensor errs.
+        """
+        return self._part("parity")
+
+    @property
+    def joint_innovation(self) -> Array:
+        """External joint torque (n,) [Nm], mean over the last interval, not filtered."""
+        return self._part("joint_innovation")
+
+    @property
+    def segment_innovation(self) -> Array:
+        """Segment wrench (m, 6) [N, Nm], mean over the last interval, not filtered, world."""
+        return self._wrenches("segment_innovation")
+
+    @property
+    def joint_settled(self) -> NDArray[np.bool_]:
+        """Has the filter of each joint (n,) run for 5 / bandwidth since its last restart?"""
+        return self._part("joint_settled") > 0.0
+
+    @property
+    def segment_settled(self) -> NDArray[np.bool_]:
+        """Has the filter of each segment (m,) run for 5 / bandwidth since its last restart?"""
+        return self._part("segment_settled") > 0.0
+
+    @property
+    def health(self) -> Any:
+        """Health bits (see `touchline.Health`): an int, or (N,) integers for a recording."""
+        value = self._part("health")[..., 0].astype(np.uint8)
+        return int(value) if value.ndim == 0 else value
+
+
+class Observer:
+    """Extended momentum observer (Iskandar et al., ICRA 2021) for any tree with any sensors.
+
+    Args:
+        robot: the robot, as from `touchline.load_robot`.
+        bandwidth: K [rad/s] of all rows; default: the description's.
+        method: "segment" filters each segment's own momentum in world axes; "paper" filters each
+            residual in its own sensor frame and subtracts afterwards (eq. 18), which leaves a
+            ghost of order |omega| |F| / K on the structure while the arm moves.
+        discretization: "tustin", "exponential", or "automatic": Tustin up to K dt = 0.5.
+
+    Raises:
+        ValueError: for an unknown method or discretization or a bandwidth that is not positive.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        bandwidth: float | None = None,
+        method: str = "segment",
+        discretization: str = "automatic",
+    ) -> None:
+        _require(method, METHODS, "method")
+        _require(discretization, DISCRETIZATIONS, "discretization")
+        if bandwidth is not None and not (np.isfinite(bandwidth) and bandwidth > 0):
+            raise ValueError(f"bandwidth is {bandwidth}, but must be a positive number [rad/s]")
+        self.robot = robot
+        self.kernel = robot.kernel(method, discretization, bandwidth)
+        self._slices = {name: slice(*ends) for name, ends in self.kernel.slices.items()}
+        self._update = self.kernel.update
+
+    def update(
+        self,
+        time: float,
+        q: ArrayLike,
+        qd: ArrayLike,
+        tau: ArrayLike | None = None,
+        wrench: ArrayLike | None = None,
+    ) -> Estimate:
+        """Takes one sample, as the robot reports it; a bad one is reported in `health`.
+
+        Args:
+            time: time stamp [s].
+            q: joint positions (n,) [rad or m].
+            qd: joint velocities (n,) [rad/s or m/s].
+            tau: logged joint torques (n,), NaN where not measured.
+            wrench: logged sensor wrenches (k, 6), NaN where not measured.
+
+        Raises:
+            ValueError: for a wrong shape.
+        """
+        try:
+            row = self._update(time, q, qd, tau, wrench)
+        except TypeError:  # not arrays of float64 yet
+            row = self._update(float(time), *self._arrays((), q, qd, tau, wrench))
+        return Estimate(row, self._slices)
+
+    def run(
+        self,
+        time: ArrayLike,
+        q: ArrayLike,
+        qd: ArrayLike,
+        tau: ArrayLike | None = None,
+        wrench: ArrayLike | None = None,
+    ) -> Estimate:
+        """Takes a recording, or the next part of one: N samples, the same numbers as `update`.
+
+        Raises:
+            ValueError: for a wrong shape.
+        """
+        stamps = np.ascontiguousarray(time, dtype=float)
+        rows = self.kernel.run(stamps, *self._arrays(stamps.shape, q, qd, tau, wrench))
+        return Estimate(rows, self._slices)
+
+    def reset(self) -> None:
+        """Forgets the past: the next sample starts anew."""
+        self.kernel.reset()
+
+    def _arrays(self, lead: tuple[int, ...], *signals: ArrayLike | None) -> list[Array]:
+        n, k = len(self.robot.joint_names), len(self.robot.sensor_names)
+        shapes = {"q": (n,), "qd": (n,), "tau": (n,), "wrench": (k, 6)}
+        arrays = []
+        for (name, shape), signal in zip(shapes.items(), signals, strict=True):
+            full = lead + shape
+            if signal is None and name in ("tau", "wrench"):
+                array = np.full(full, np.nan)
+            else:
+                array = np.ascontiguousarray(signal, dtype=float)
+            if array.shape != full:
+                raise ValueError(f"{name} has shape {array.shape}, expected {full}")
+            arrays.append(array)
+        return arrays
+
+
+def _require(value: str, allowed: tuple[str, ...], what: str) -> None:
+    if value not in allowed:
+        raise ValueError(f"{what} is '{value}', allowed: {', '.join(allowed)}")

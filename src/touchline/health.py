@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The health bits of a sample."""
+
+from enum import IntFlag
+
+
+class Health(IntFlag):
+    """Why the estimates of a sample may be worse than usual; 0 when all is well."""
+
+    SETTLING = 1  # less than 5 / bandwidth since the start, a gap or a reset
+    GAP = 2  # the step in time is too long to integrate over: filters restart
+    BAD_TIME = 4  # the time stamp repeats or goes back: the sample is ignored
+    MISSING = 8  # a signal that should be there is NaN
+    NON_FINITE = 16  # a signal is infinite or absurdly large
+    SATURATED = 32  # a reading is at the end of its range
+    SENSOR_EXCLUDED = 64  # a sensor has been absent for longer than a gap
+    MODEL_LIMIT = 128  # a joint is outside its limits in the model

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Momentum and n-bar of every row against Pinocchio with the sensors as free joints."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from oracle import PinocchioTwin
+from robots import random_robot
+
+STATES = 300
+
+
+def check_against_pinocchio(robot, seed=0):
+    twin = PinocchioTwin(robot.description, robot.mechanism)
+    rng = np.random.default_rng(seed)
+    n = len(robot.joint_names)
+    for _ in range(STATES):
+        q, qd = rng.uniform(-3, 3, n), rng.normal(size=n) * 2
+        p, n_bar = robot.terms(q, qd)
+        p_twin, n_twin = twin.terms(q, qd)
+        np.testing.assert_allclose(p, p_twin, rtol=1e-9, atol=1e-9 * np.abs(p_twin).max())
+        np.testing.assert_allclose(n_bar, n_twin, rtol=1e-9, atol=1e-9 * np.abs(n_twin).max())
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_trees_agree_with_pinocchio(seed):
+    check_against_pinocchio(random_robot(seed, sensors=2 + seed % 3, chain=seed % 2 == 0))
+
+
+def test_the_oracle_factorises_the_inertia_rate():
+    robot = random_robot(3)
+    twin = PinocchioTwin(robot.description, robot.mechanism)
+    rng = np.random.default_rng(1)
+    q, qd = rng.normal(size=7), rng.normal(size=7)
+    position, velocity = twin.state(q, qd)
+    step = 1e-6
+    ahead = twin.mass_matrix(pin.integrate(twin.model, position, velocity * step))
+    behind = twin.mass_matrix(pin.integrate(twin.model, position, -velocity * step))
+    C = pin.computeCoriolisMatrix(twin.model, twin.data, position, velocity)
+    np.testing.assert_allclose((ahead - behind) / (2 * step), C + C.T, atol=1e-7)
+
+
+def test_momentum_is_linear_in_the_velocity():
+    robot = random_robot(5)
+    rng = np.random.default_rng(2)
+    q, a, b = rng.normal(size=(3, 7))
+    momenta = [robot.terms(q, qd)[0] for qd in (a, b, a + 3 * b)]
+    np.testing.assert_allclose(momenta[2], momenta[0] + 3 * momenta[1], atol=1e-12)
