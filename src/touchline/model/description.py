@@ -19,7 +19,10 @@ class Friction:
 
 @dataclass(frozen=True)
 class JointDescription:
-    """One observed joint. `torque` is "sensor", "motor", "none" or "from" (then `sources` names sensors)."""
+    """One observed joint.
+
+    `torque` is "sensor", "motor", "none" or "from"; then `sources` names sensors.
+    """
 
     name: str
     torque: str = "sensor"

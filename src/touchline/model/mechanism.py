@@ -37,6 +37,7 @@ class Geometry:
     `kind` is "mesh" (`path`, `scale`), "box" (`size` = full edges), "cylinder" (`size` = radius,
     length; axis z), "sphere" (`size` = radius), "capsule" (`size` = radius, length of the straight
     part; axis z), "ellipsoid" (`size` = half axes) or "triangles" (`vertices`, `faces`).
+    `problem` says why a mesh cannot be used; its `path` is None if it was not found.
     """
 
     kind: str
@@ -46,11 +47,15 @@ class Geometry:
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
     vertices: Array | None = None
     faces: NDArray[np.int64] | None = None
+    problem: str | None = None
 
 
 @dataclass(frozen=True)
 class Link:
-    """A rigid link with its own frame. `collision` is what carries contacts, `visual` what is drawn."""
+    """A rigid link with its own frame.
+
+    `collision` is what carries contacts, `visual` what is drawn.
+    """
 
     name: str
     inertia: Inertia

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a description changes of its model: link corrections, loads, gravity."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from touchline.model.description import LinkCorrection, Load, RobotDescription
+from touchline.model.mechanism import Inertia, Link, Mechanism
+from touchline.model.plausibility import inertia_warnings
+from touchline.model.transforms import combine_inertias, inertia_matrix
+
+
+def apply_corrections(mechanism: Mechanism, description: RobotDescription) -> Mechanism:
+    """Return the mechanism as the description has it.
+
+    Corrections replace what the model says of a link; then loads are added to their links by the
+    parallel-axis theorem; a gravity given replaces the model's.
+
+    Args:
+        mechanism: as its model file has it.
+        description: all its links exist in the mechanism.
+    """
+    links = {
+        name: _changed(link, description.links.get(name), description.loads)
+        for name, link in mechanism.links.items()
+    }
+    gravity = mechanism.gravity
+    if description.gravity is not None:
+        gravity = np.array(description.gravity)
+    changed = replace(mechanism, links=links, gravity=gravity)
+    return replace(changed, warnings=_warnings(mechanism, changed, description.path))
+
+
+def _changed(link: Link, correction: LinkCorrection | None, loads: tuple[Load, ...]) -> Link:
+    inertia = corrected_inertia(link.inertia, correction) if correction else link.inertia
+    carried = [load_inertia(load) for load in loads if load.link == link.name]
+    if carried:
+        inertia = combine_inertias([inertia, *carried])
+    return replace(link, inertia=inertia)
+
+
+def corrected_inertia(body: Inertia, correction: LinkCorrection) -> Inertia:
+    """Return the inertia with the values that the correction gives.
+
+    A correction to no mass takes the model's moments of inertia away too.
+    """
+    mass = body.mass if correction.mass is None else correction.mass
+    com = body.com if correction.com is None else np.array(correction.com)
+    if correction.inertia is not None:
+        return Inertia(mass, com, inertia_matrix(correction.inertia))
+    emptied = correction.mass == 0.0
+    return Inertia(mass, com, np.zeros((3, 3)) if emptied else body.inertia)
+
+
+def load_inertia(load: Load) -> Inertia:
+    """Return the load's mass properties in the axes of its link."""
+    return Inertia(load.mass, np.array(load.com), inertia_matrix(load.inertia))
+
+
+def _warnings(before: Mechanism, after: Mechanism, path: Path | None) -> tuple[str, ...]:
+    """Drop the model's warnings about masses that are mended, add those about new ones."""
+    old, new = set(inertia_warnings(before)), list(inertia_warnings(after))
+    mended = old - set(new)
+    kept = [line for line in before.warnings if not line.endswith(tuple(mended) or ("\0",))]
+    return (*kept, *(f"{path}: {line}" for line in new if line not in old))

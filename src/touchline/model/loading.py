@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From files to a checked description and its mechanism."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from touchline.errors import InputError
+from touchline.model.corrections import apply_corrections
+from touchline.model.description import JointDescription, RobotDescription, SensorDescription
+from touchline.model.expand import Expander
+from touchline.model.mechanism import Mechanism
+from touchline.model.names import Names, check_names, joint_entries, names_in, sensor_entries
+from touchline.model.packages import resolve, resolve_robot
+from touchline.model.schema import JointEntry, RobotFile, SensorEntry, structure
+from touchline.model.topology import independent_joints
+from touchline.model.urdf import load_urdf, parse_xml
+from touchline.model.yaml_file import read_yaml
+
+
+def read_robot_file(path: Path | str) -> tuple[RobotDescription, Mechanism]:
+    """Read a `robot.yaml` and the model it names, with the file's corrections applied.
+
+    Returns:
+        The description, its per-joint values in the order of its joints; and the mechanism with
+        corrected links, loads merged into theirs, and the file's gravity.
+
+    Raises:
+        InputError: everything that is wrong with both files, one line each.
+    """
+    path = Path(path)
+    data = read_yaml(path)
+    file, problems = structure(data)
+    problems += _missing_keys(file, problems)
+    folders, folder_problems = _package_folders(file, path.parent)
+    problems += folder_problems
+    model, mechanism, model_problems = _read_model(file, path, folders)
+    names = names_in(data)
+    draft = _Draft(path, model, folders, file, names, mechanism)
+    problems += [f"{where}: {what}" for where, what in draft.problems]
+    lines = [f"{path}: {problem}" for problem in dict.fromkeys(problems)] + model_problems
+    if lines or mechanism is None:
+        raise InputError(lines)
+    description = draft.description()
+    return description, apply_corrections(mechanism, description)
+
+
+def load_description(path: Path | str) -> RobotDescription:
+    """Read a `robot.yaml`, checked against its model (see `read_robot_file`)."""
+    return read_robot_file(path)[0]
+
+
+def load_mechanism(path: Path | str, package_dirs: Sequence[Path] = ()) -> Mechanism:
+    """Read a model file: URDF or MJCF, told apart by the root element.
+
+    Raises:
+        InputError: the file is neither, or what is wrong with it.
+    """
+    path = Path(path)
+    tag = parse_xml(path).tag
+    if tag == "mujoco":
+        from touchline.model.mjcf import load_mjcf
+
+        return load_mjcf(path)
+    if tag == "robot":
+        return load_urdf(path, package_dirs)
+    raise InputError(f"{path}: the root element is <{tag}>; a URDF has <robot>, an MJCF <mujoco>")
+
+
+def _missing_keys(file: RobotFile, problems: list[str]) -> list[str]:
+    missing = [key for key in ("name", "model") if getattr(file, key) is None]
+    wrong = tuple(f"{key}: " for key in missing)
+    noted = {problem.split(":")[0] for problem in problems if problem.startswith(wrong)}
+    return [f"{key}: is missing" for key in missing if key not in noted]
+
+
+def _package_folders(file: RobotFile, base: Path) -> tuple[tuple[Path, ...], list[str]]:
+    found = [base / Path(entry) for entry in file.package_dirs if entry is not None]
+    problems = [
+        f"package_dirs: no such folder: {folder}" for folder in found if not folder.is_dir()
+    ]
+    return tuple(found), problems
+
+
+def _read_model(
+    file: RobotFile, path: Path, folders: tuple[Path, ...]
+) -> tuple[Path | None, Mechanism | None, list[str]]:
+    """Return the model's path, the mechanism and the errors, each as a whole line."""
+    if file.model is None:
+        return None, None, []
+    try:
+        if file.model.startswith("robot:"):
+            model = resolve_robot(file.model.removeprefix("robot:"))
+        else:
+            model = resolve(file.model, path.parent, folders)
+    except FileNotFoundError as error:
+        return None, None, [f"{path}: model: '{file.model}': {error}"]
+    try:
+        return model, load_mechanism(model, folders), []
+    except InputError as error:
+        return model, None, error.problems
+
+
+class _Draft:
+    """A description in the making: the readable part of the file, checked and expanded."""
+
+    def __init__(
+        self,
+        path: Path,
+        model: Path | None,
+        folders: tuple[Path, ...],
+        file: RobotFile,
+        names: Names,
+        mechanism: Mechanism | None,
+    ):
+        self.path, self.model, self.folders, self.file = path, model, folders, file
+        self.joints = self._joint_entries(names, mechanism)
+        sensors = [sensor for _, sensor in sensor_entries(file)]
+        # A list with an unreadable item still tells how many joints there are.
+        count = len(file.joints) if file.joints is not None else None
+        count = len(self.joints) if count is None and mechanism else count
+        self.expander = Expander(count, sensors, names.sensors)
+        self.noise = self.expander.noise(file.noise)
+        self.bandwidth = self.expander.bandwidth(file.observer.bandwidth)
+        self.sensors = [self._sensor(place, sensor) for place, sensor in sensor_entries(file)]
+        self.problems = [*check_names(file, names, mechanism), *self.expander.problems]
+
+    def _joint_entries(self, names: Names, mechanism: Mechanism | None) -> list[JointEntry]:
+        if names.joints is not None or mechanism is None:
+            return [joint for _, joint in joint_entries(self.file)]
+        free = independent_joints(mechanism)
+        return [JointEntry(name) for name in free if name not in self.file.locked]
+
+    def _sensor(self, place: str, entry: SensorEntry) -> SensorDescription:
+        bias = self.expander.per_axis(f"{place}.bias", entry.bias, entry, (0.0,) * 6)
+        limits = (float("inf"),) * 6
+        return SensorDescription(
+            name=entry.name,
+            link=entry.link,
+            xyz=entry.pose.xyz,
+            rpy=entry.pose.rpy,
+            axes=entry.axes,
+            polarity=entry.polarity,
+            frame=entry.frame,
+            compensated=entry.compensated,
+            bias=bias,
+            delay=entry.delay,
+            range=self.expander.per_axis(f"{place}.range", entry.range, entry, limits),
+        )
+
+    def description(self) -> RobotDescription:
+        """Return the description; only without problems."""
+        file = self.file
+        joints, sensors = self.bandwidth
+        return RobotDescription(
+            name=str(file.name),
+            model=Path(str(self.model)),
+            joints=tuple(map(_joint, self.joints)),
+            sensors=tuple(self.sensors),
+            noise=self.noise,
+            bandwidth_joints=joints,
+            bandwidth_sensors=sensors,
+            package_dirs=self.folders,
+            gravity=file.gravity,
+            locked=file.locked,
+            loads=tuple(file.loads),
+            links=file.links,
+            detection=file.detection,
+            log=file.log,
+            path=self.path,
+        )
+
+
+def _joint(entry: JointEntry) -> JointDescription:
+    return JointDescription(
+        name=entry.name,
+        torque=entry.torque.kind,
+        sources=entry.torque.sources,
+        sign=entry.sign,
+        gain=entry.gain,
+        bias=entry.bias,
+        delay=entry.delay,
+        range=entry.range,
+        compensated=entry.compensated,
+        rotor_inertia=entry.rotor_inertia,
+        friction=entry.friction,
+    )

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is suspicious about a mechanism but no reason to refuse it."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from touchline.model.mechanism import Inertia, Link, Mechanism
+from touchline.model.topology import outboard_links
+
+
+def mechanism_warnings(mechanism: Mechanism, path: Path) -> Mechanism:
+    """Return the mechanism with its warnings appended: meshes, inertias, massless bodies."""
+    found = (*mesh_warnings(mechanism), *inertia_warnings(mechanism))
+    return replace(
+        mechanism, warnings=(*mechanism.warnings, *(f"{path}: {line}" for line in found))
+    )
+
+
+def inertia_warnings(mechanism: Mechanism) -> Iterator[str]:
+    """Yield a line for each link with an impossible inertia, each moving body without mass."""
+    for link in mechanism.links.values():
+        problem = inertia_problem(link.inertia)
+        if problem:
+            yield f"link '{link.name}': {problem}"
+    for joint in mechanism.joints.values():
+        if joint.kind == "fixed":
+            continue
+        body = outboard_links(mechanism, joint.child, lambda inner: inner.kind == "fixed")
+        if not any(mechanism.links[name].inertia.mass > 0 for name in body):
+            what = "has no mass (with all that is fixed to it)"
+            yield f"link '{joint.child}': moves with joint '{joint.name}' but {what}"
+
+
+def inertia_problem(body: Inertia) -> str | None:
+    """Say why no rigid body has this inertia about its centre of mass; None if one can.
+
+    The principal moments are not negative, and none exceeds the sum of the two others.
+    """
+    moments = np.linalg.eigvalsh(body.inertia)
+    # Published figures are rounded: 1 % of the largest moment is no finding.
+    slack = 0.01 * max(abs(moments))
+    listed = ", ".join(f"{value:.3g}" for value in moments)
+    if moments[0] < -slack:
+        return f"the inertia has a negative principal moment: {listed} kg m2"
+    if moments[2] > moments[0] + moments[1] + slack:
+        return f"no body has these principal moments (the largest exceeds the sum): {listed} kg m2"
+    return None
+
+
+def mesh_warnings(mechanism: Mechanism) -> Iterator[str]:
+    """Yield a line for each reason why surfaces are missing, naming the links that lack theirs."""
+    reasons: dict[str, list[str]] = {}
+    for link in mechanism.links.values():
+        for shape in surface_shapes(link):
+            if shape.problem and link.name not in reasons.setdefault(shape.problem, []):
+                reasons[shape.problem].append(link.name)
+    for reason, links in reasons.items():
+        names = ", ".join(f"'{name}'" for name in links)
+        yield f"{reason}; no contact is located on link {names}"
+
+
+def surface_shapes(link: Link) -> tuple:
+    """Return the shapes that make the link's surface: the collision ones, else the visual ones."""
+    return link.collision or link.visual

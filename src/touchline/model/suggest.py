@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Help with names that do not exist."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import Any
+
+
+def did_you_mean(word: Any, allowed: Iterable[str]) -> str:
+    """Return ` (did you mean 'X'?)` for the closest allowed word, or nothing."""
+    close = get_close_matches(str(word), list(allowed), n=1)
+    return f" (did you mean '{close[0]}'?)" if close else ""
+
+
+def not_allowed(word: Any, allowed: Iterable[str]) -> str:
+    """Return `'word' is not allowed; allowed: a, b, c (did you mean 'a'?)`."""
+    allowed = list(allowed)
+    return f"'{word}' is not allowed; allowed: {', '.join(allowed)}{did_you_mean(word, allowed)}"
+
+
+def unknown(word: Any, kind: str, known: Iterable[str]) -> str:
+    """Return `unknown KIND 'word'; known: a, b, c (did you mean 'a'?)`, of many names only some."""
+    known = list(known)
+    shown = ", ".join(known[:20]) + (", ..." if len(known) > 20 else "")
+    return f"unknown {kind} '{word}'; known: {shown or 'none'}{did_you_mean(word, known)}"

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Poses and inertias as matrices.
+
+`T_ab` (4, 4) takes coordinates in b to coordinates in a; `R_ab` (3, 3) is its rotation.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from touchline.model.mechanism import Array, Inertia
+
+
+def rotation_rpy(rpy: Sequence[float]) -> Array:
+    """Return the rotation (3, 3) by roll, pitch, yaw [rad] about the fixed x, y, z axes (URDF)."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def rotation_quaternion(wxyz: Sequence[float] | Array) -> Array:
+    """Return the rotation (3, 3) of a quaternion w, x, y, z of any length but zero."""
+    w, x, y, z = np.asarray(wxyz, float) / np.linalg.norm(wxyz)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def rotation_about(axis: Array, angle: float) -> Array:
+    """Return the rotation (3, 3) by `angle` [rad] about the unit vector `axis` (Rodrigues)."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def pose(R: Array | None = None, p: Sequence[float] | Array | None = None) -> Array:
+    """Return the pose (4, 4) with rotation `R` (3, 3) and origin `p` (3,) [m]."""
+    T = np.eye(4)
+    if R is not None:
+        T[:3, :3] = R
+    if p is not None:
+        T[:3, 3] = p
+    return T
+
+
+def pose_rpy(xyz: Sequence[float], rpy: Sequence[float]) -> Array:
+    """Return the pose (4, 4) of a URDF `origin`: `xyz` [m] and `rpy` [rad]."""
+    return pose(rotation_rpy(rpy), xyz)
+
+
+def joint_motion(kind: str, axis: Array, position: float) -> Array:
+    """Return the pose (4, 4) by which a joint at `position` [rad or m] moves its child."""
+    if kind == "revolute":
+        return pose(rotation_about(axis, position))
+    return pose(p=axis * position) if kind == "prismatic" else np.eye(4)
+
+
+def inertia_matrix(six: Sequence[float]) -> Array:
+    """Return the matrix (3, 3) of ixx, ixy, ixz, iyy, iyz, izz [kg m2]."""
+    ixx, ixy, ixz, iyy, iyz, izz = six
+    return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]], float)
+
+
+def combine_inertias(bodies: Sequence[Inertia]) -> Inertia:
+    """Return the mass properties of rigidly joined bodies, all in the same axes.
+
+    The moments add about the common centre of mass by the parallel-axis theorem. Without any mass
+    the centre is the origin.
+    """
+    mass = sum(body.mass for body in bodies)
+    if mass == 0.0:
+        return Inertia(0.0, np.zeros(3), np.sum([body.inertia for body in bodies], axis=0))
+    com = np.sum([body.mass * body.com for body in bodies], axis=0) / mass
+    inertia = np.sum(
+        [body.inertia + _steiner(body.mass, body.com - com) for body in bodies], axis=0
+    )
+    return Inertia(mass, com, inertia)
+
+
+def move_inertia(body: Inertia, T: Array) -> Inertia:
+    """Return `body`, given in the axes of b, in the axes of a, with `T` = T_ab (4, 4)."""
+    R = T[:3, :3]
+    return Inertia(body.mass, R @ body.com + T[:3, 3], R @ body.inertia @ R.T)
+
+
+def _steiner(mass: float, r: Array) -> Array:
+    return mass * (r @ r * np.eye(3) - np.outer(r, r))

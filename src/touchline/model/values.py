@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The values of `robot.yaml`: each function takes what YAML holds and returns it checked.
+
+Every one raises ValueError with the value and what is allowed. The second argument is the type,
+which cattrs passes to its hooks.
+"""
+
+import math
+import reprlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from touchline.model.description import Vector
+from touchline.model.mechanism import Inertia
+from touchline.model.plausibility import inertia_problem
+from touchline.model.suggest import not_allowed
+from touchline.model.transforms import inertia_matrix
+from touchline.model.yaml_file import kind_of
+
+AXES = ("fx", "fy", "fz", "mx", "my", "mz")
+TORQUES = ("sensor", "motor", "none")
+
+Hook = Callable[..., Any]
+
+
+@dataclass(frozen=True)
+class Torque:
+    """Where a joint's torque comes from; `sources` are the sensors of kind "from"."""
+
+    kind: str = "sensor"
+    sources: tuple[str, ...] = ()
+
+
+def number(value: Any, _: Any = None) -> float:
+    """Return a finite number."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"{show(value)} is not a number")
+    if not abs(value) < math.inf:
+        raise ValueError(f"{value} is not a finite number")
+    return float(value)
+
+
+def non_negative(value: Any, _: Any = None) -> float:
+    """Return a finite number that is not negative."""
+    if number(value) < 0:
+        raise ValueError(f"{value} is negative; allowed: 0 or more")
+    return float(value)
+
+
+def positive(value: Any, _: Any = None) -> float:
+    """Return a finite number above 0."""
+    if number(value) <= 0:
+        raise ValueError(f"{value} is not allowed; allowed: more than 0")
+    return float(value)
+
+
+def positive_or_inf(value: Any, _: Any = None) -> float:
+    """Return a number above 0; `.inf` means no limit."""
+    return math.inf if value == math.inf else positive(value)
+
+
+def sign(value: Any, _: Any = None) -> float:
+    """Return 1 or -1."""
+    if isinstance(value, bool) or value not in (1, -1):
+        raise ValueError(f"{show(value)} is not allowed; allowed: 1, -1")
+    return float(value)
+
+
+def text(value: Any, _: Any = None) -> str:
+    """Return text that is not empty."""
+    if not isinstance(value, str):
+        raise ValueError(f"{show(value)} is {kind_of(value)}, not text")
+    if not value.strip():
+        raise ValueError("the text is empty")
+    return value
+
+
+def one_of(*allowed: str) -> Hook:
+    """Return a hook that accepts one of a few words."""
+
+    def choose(value: Any, _: Any = None) -> str:
+        if not isinstance(value, str) or value not in allowed:
+            raise ValueError(not_allowed(_word(value), allowed))
+        return value
+
+    return choose
+
+
+def list_of(item: Hook, *counts: int) -> Hook:
+    """Return a hook for a list of checked items; `counts` are the lengths allowed, () any."""
+
+    def check(value: Any, _: Any = None) -> tuple[Any, ...]:
+        if not isinstance(value, list):
+            raise ValueError(f"{show(value)} is {kind_of(value)}, not a list")
+        if counts and len(value) not in counts:
+            wanted = " or ".join(map(str, counts))
+            raise ValueError(f"{show(value)} has {len(value)} values; allowed: {wanted}")
+        return tuple(item(entry) for entry in value)
+
+    return check
+
+
+def number_or_list(item: Hook) -> Hook:
+    """Return a hook for one number (a float) or a list of them (a tuple)."""
+    many = list_of(item)
+
+    def check(value: Any, _: Any = None) -> float | Vector:
+        return many(value) if isinstance(value, list) else item(value)
+
+    return check
+
+
+def inertia(value: Any, _: Any = None) -> Vector:
+    """Return ixx, ixy, ixz, iyy, iyz, izz [kg m2] with no negative principal moment."""
+    six = list_of(number, 6)(value)
+    problem = inertia_problem(Inertia(1.0, np.zeros(3), inertia_matrix(six)))
+    if problem and "negative" in problem:
+        raise ValueError(problem)
+    return six
+
+
+def axes(value: Any, _: Any = None) -> tuple[str, ...]:
+    """Return the measured axes, which stand in the order of AXES."""
+    names = list_of(one_of(*AXES))(value)
+    if not names or list(names) != sorted(set(names), key=AXES.index):
+        raise ValueError(f"{show(value)}: name each axis once, in the order {', '.join(AXES)}")
+    return names
+
+
+def torque(value: Any, _: Any = None) -> Torque:
+    """Return what `torque:` says: a word, or {from: [SENSOR, ...]}."""
+    if isinstance(value, dict) and set(value) == {"from"}:
+        sources = list_of(text)(value["from"])
+        if not sources or len(set(sources)) < len(sources):
+            raise ValueError(f"from: {show(value['from'])}: name at least one sensor, each once")
+        return Torque("from", sources)
+    if not isinstance(value, str) or value not in TORQUES:
+        allowed = [*TORQUES, "{from: [SENSOR, ...]}"]
+        raise ValueError(not_allowed(_word(value), allowed))
+    return Torque(value)
+
+
+def show(value: Any) -> str:
+    """Return the value as short text."""
+    return reprlib.repr(value)
+
+
+def _word(value: Any) -> str:
+    return value if isinstance(value, str) else show(value)
