@@ -4,7 +4,7 @@
 import numpy as np
 import pinocchio as pin
 
-from touchline.model.tree import rotation_from_rpy, transform
+from touchline.model.transforms import pose_rpy
 
 
 class PinocchioTwin:
@@ -28,7 +28,7 @@ class PinocchioTwin:
     def _add_link(self, name, parent, placement):
         for sensor in self.description.sensors:
             if sensor.link == name:
-                T = pin.SE3(transform(rotation_from_rpy(sensor.rpy), sensor.xyz))
+                T = pin.SE3(pose_rpy(sensor.xyz, sensor.rpy))
                 parent = self.model.addJoint(
                     parent, pin.JointModelFreeFlyer(), placement * T, sensor.name
                 )

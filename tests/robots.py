@@ -13,16 +13,16 @@ from touchline.model.description import (
 )
 from touchline.model.mechanism import Inertia, Joint, Link, Mechanism
 from touchline.model.robot import Robot
-from touchline.model.tree import rotation_from_rpy, transform
+from touchline.model.transforms import pose, rotation_rpy
 
 
 def random_pose(rng, scale=0.3):
-    return transform(rotation_from_rpy(tuple(rng.uniform(-3, 3, 3))), rng.normal(size=3) * scale)
+    return pose(rotation_rpy(rng.uniform(-3, 3, 3)), rng.normal(size=3) * scale)
 
 
 def random_inertia(rng):
     moments = rng.uniform(0.002, 0.02, 3)
-    R = rotation_from_rpy(tuple(rng.uniform(-3, 3, 3)))
+    R = rotation_rpy(rng.uniform(-3, 3, 3))
     spread = np.diag(moments.sum() - moments)  # second moments: the triangle inequality holds
     return Inertia(rng.uniform(0.3, 4.0), rng.normal(size=3) * 0.1, R @ spread @ R.T)
 
@@ -79,7 +79,7 @@ def describe(mechanism, sensors, bandwidth=50.0, joints=None, **options):
 
 
 def random_robot(seed, sensors=3, chain=False, bandwidth=50.0, movable=7):
-    """A random robot whose `sensors` six-axis sensors sit at random links; the first at the root."""
+    """A random robot with `sensors` six-axis sensors at random links; the first at the root."""
     rng = np.random.default_rng(seed)
     mechanism = random_mechanism(rng, movable=movable, chain=chain)
     links = list(mechanism.links)

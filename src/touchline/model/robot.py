@@ -207,6 +207,6 @@ def load_robot(path: str | Path) -> Robot:
     Raises:
         InputError: with every problem of the file at once.
     """
-    from touchline.model.description_file import read_robot_file
+    from touchline.model.loading import read_robot_file
 
     return Robot(*read_robot_file(path))

@@ -13,6 +13,13 @@ from numpy.typing import NDArray
 
 from touchline.model.description import SensorDescription
 from touchline.model.mechanism import Inertia, Joint, Mechanism
+from touchline.model.transforms import (
+    combine_inertias,
+    joint_motion,
+    move_inertia,
+    pose,
+    pose_rpy,
+)
 
 Array = NDArray[np.float64]
 
@@ -41,36 +48,9 @@ class Place:
     T_node_link: Array
 
 
-def rotation_from_rpy(rpy: tuple[float, ...]) -> Array:
-    """Rotation (3, 3) of fixed-axis roll, pitch, yaw [rad], as in URDF."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
-
-
-def transform(rotation: Array, translation: Array | tuple[float, ...]) -> Array:
-    """Homogeneous transform (4, 4)."""
-    T = np.eye(4)
-    T[:3, :3] = rotation
-    T[:3, 3] = translation
-    return T
-
-
 def invert(T: Array) -> Array:
     """Inverse of a rigid transform (4, 4)."""
-    return transform(T[:3, :3].T, -T[:3, :3].T @ T[:3, 3])
-
-
-def rotation_about(axis: Array, angle: float) -> Array:
-    """Rotation (3, 3) by `angle` [rad] about the unit vector `axis` (3,) (Rodrigues)."""
-    x, y, z = axis
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+    return pose(T[:3, :3].T, -T[:3, :3].T @ T[:3, 3])
 
 
 def rotation_to_axis(axis: Array) -> Array:
@@ -79,32 +59,6 @@ def rotation_to_axis(axis: Array) -> Array:
     x = np.cross(helper, axis)
     x /= np.linalg.norm(x)
     return np.column_stack([x, np.cross(axis, x), axis])
-
-
-def shift_inertia(inertia: Inertia, T: Array) -> Inertia:
-    """The same body in another frame, of which `T` (4, 4) gives the pose of its own."""
-    R = T[:3, :3]
-    return Inertia(inertia.mass, R @ inertia.com + T[:3, 3], R @ inertia.inertia @ R.T)
-
-
-def combine(a: Inertia, b: Inertia) -> Inertia:
-    """Two bodies of one frame as one (parallel axes)."""
-    mass = a.mass + b.mass
-    if mass == 0.0:
-        return Inertia(0.0, np.zeros(3), a.inertia + b.inertia)
-    com = (a.mass * a.com + b.mass * b.com) / mass
-    total = np.zeros((3, 3))
-    for part in (a, b):
-        d = part.com - com
-        total += part.inertia + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
-    return Inertia(mass, com, total)
-
-
-def joint_motion(joint: Joint, position: float) -> Array:
-    """Motion (4, 4) of the child's frame by a joint position [rad or m]."""
-    if joint.kind == "revolute":
-        return transform(rotation_about(joint.axis, position), np.zeros(3))
-    return transform(np.eye(3), position * joint.axis)
 
 
 class TreeBuilder:
@@ -149,7 +103,7 @@ class TreeBuilder:
     def _add_link(self, name: str, place: Place) -> None:
         for sensor in self._sensors:
             if sensor.link == name:
-                T_link_sensor = transform(rotation_from_rpy(sensor.rpy), sensor.xyz)
+                T_link_sensor = pose_rpy(sensor.xyz, sensor.rpy)
                 node = Node(
                     place.node, "fixed", place.T_node_link @ T_link_sensor, sensor=sensor.name
                 )
@@ -157,8 +111,8 @@ class TreeBuilder:
         self.places[name] = place
         node = self.nodes[place.node]
         node.links.append(name)
-        inertia = shift_inertia(self._mechanism.links[name].inertia, place.T_node_link)
-        node.inertia = combine(node.inertia, inertia)
+        inertia = move_inertia(self._mechanism.links[name].inertia, place.T_node_link)
+        node.inertia = combine_inertias([node.inertia, inertia])
 
     def _across(self, joint: Joint, inner: Place) -> Place:
         """The place of the joint's child link, given that of its parent."""
@@ -168,8 +122,8 @@ class TreeBuilder:
         master, multiplier, offset = self._follow(joint)
         if master.name in self._locked:
             position = multiplier * self._locked[master.name] + offset
-            return Place(inner.node, T_node_child @ joint_motion(joint, position))
-        T_child_axis = transform(rotation_to_axis(joint.axis), np.zeros(3))
+            return Place(inner.node, T_node_child @ joint_motion(joint.kind, joint.axis, position))
+        T_child_axis = pose(rotation_to_axis(joint.axis))
         node = Node(
             inner.node,
             joint.kind,
