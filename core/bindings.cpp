@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "touchline/detector.hpp"
 #include "touchline/observer.hpp"
 
 namespace nb = nanobind;
@@ -87,6 +88,40 @@ Out run(tl::Observer& o, const In& time, const In& q, const In& qd, const In& ta
     }
   }
   return out.release({rows, width});
+}
+
+// One sample through observer and detector: the observer's row, the level of each segment, the
+// normalized rows.
+nb::tuple detect(tl::Observer& o, tl::Detector& d, double time, const In& q, const In& qd,
+                 const In& tau, const In& wrench) {
+  Out row = update(o, time, q, qd, tau, wrench);
+  d.step();
+  const std::size_t m = d.levels().size(), r = d.rows().size();
+  Buffer levels(m), normalized(r);
+  std::copy(d.levels().begin(), d.levels().end(), levels.data.get());
+  std::copy(d.normalized().begin(), d.normalized().end(), normalized.data.get());
+  return nb::make_tuple(row, levels.release({m}), normalized.release({r}));
+}
+
+nb::tuple detect_run(tl::Observer& o, tl::Detector& d, const In& time, const In& q, const In& qd,
+                     const In& tau, const In& wrench) {
+  const std::size_t rows = time.size(), n = o.row_layout().joints, k = o.row_layout().sensors;
+  expect_sample(o, rows, q, qd, tau, wrench);
+  const std::size_t width = o.output().size(), m = d.levels().size(), r = d.rows().size();
+  Buffer out(rows * width), levels(rows * m), normalized(rows * r);
+  {
+    nb::gil_scoped_release release;
+    for (std::size_t i = 0; i < rows; ++i) {
+      const double* row = o.step(time.data()[i], q.data() + i * n, qd.data() + i * n,
+                                 tau.data() + i * n, wrench.data() + i * 6 * k);
+      d.step();
+      std::copy(row, row + width, out.data.get() + i * width);
+      std::copy(d.levels().begin(), d.levels().end(), levels.data.get() + i * m);
+      std::copy(d.normalized().begin(), d.normalized().end(), normalized.data.get() + i * r);
+    }
+  }
+  return nb::make_tuple(out.release({rows, width}), levels.release({rows, m}),
+                        normalized.release({rows, r}));
 }
 
 // Momentum and n-bar: joint rows, then six rows per sensor in its own frame.
@@ -222,9 +257,37 @@ void bind_enums(nb::module_& m) {
 
 }  // namespace
 
+void bind_detector(nb::module_& m) {
+  nb::class_<tl::DetectionRow>(m, "DetectionRow")
+      .def(
+          "__init__",
+          [](tl::DetectionRow* self, int segment, int component, int joint, double contact,
+             double collision, double baseline_limit) {
+            new (self)
+                tl::DetectionRow{segment, component, joint, contact, collision, baseline_limit};
+          },
+          "segment"_a, "component"_a, "joint"_a, "contact"_a, "collision"_a, "baseline_limit"_a);
+  nb::class_<tl::DetectionTimes>(m, "DetectionTimes")
+      .def(
+          "__init__",
+          [](tl::DetectionTimes* self, double min_duration, double hold, double baseline,
+             double release) {
+            new (self) tl::DetectionTimes{min_duration, hold, baseline, release};
+          },
+          "min_duration"_a, "hold"_a, "baseline"_a, "release"_a);
+  nb::class_<tl::Detector>(m, "Detector")
+      .def(nb::init<const tl::Observer&, std::vector<tl::DetectionRow>, std::vector<double>,
+                    const tl::DetectionTimes&>(),
+           "observer"_a, "rows"_a, "sum_limit"_a, "times"_a, nb::keep_alive<1, 2>())
+      .def("baseline", &tl::Detector::baseline, "row"_a);
+  m.def("detect", &detect);
+  m.def("detect_run", &detect_run);
+}
+
 NB_MODULE(_core, m) {
   bind_enums(m);
   bind_rows(m);
+  bind_detector(m);
   nb::class_<tl::Observer>(m, "Observer")
       .def("__init__",
            [](tl::Observer* self, std::vector<tl::Node> nodes, const std::vector<double>& gravity,

@@ -17,19 +17,18 @@ enum class Level { none = 0, contact = 1, collision = 2 };
 // One residual of a segment: a component of its wrench in the frame of its own sensor, or the
 // torque that contacts on the segment put on one of its joints.
 struct DetectionRow {
-  int segment = 0;
-  int component = -1;      // 0 to 5 of the segment wrench; -1: a joint
-  int joint = -1;
-  double contact = 1.0;    // thresholds [N or Nm]
-  double collision = 3.0;
-  double baseline_limit = 1.0;  // the largest offset that is taken for one
+  int segment;
+  int component;  // 0 to 5 of the segment wrench; -1: a joint
+  int joint;
+  double contact, collision;  // thresholds [N or Nm]
+  double baseline_limit;      // the largest residual that is taken for an offset [N or Nm]
 };
 
 struct DetectionTimes {
-  double min_duration = 0.005;  // a test must hold this long to fire [s]
-  double hold = 0.1;            // and be quiet this long to clear [s]
-  double baseline = 5.0;        // time constant of the baseline [s]
-  double release = 0.6;         // cleared below this fraction of the thresholds
+  double min_duration;  // a test must hold this long to fire [s]
+  double hold;          // and be quiet this long to clear [s]
+  double baseline;      // time constant of the baseline [s]
+  double release;       // cleared below this fraction of the thresholds
 };
 
 class Detector {

@@ -143,7 +143,7 @@ class Observer:
         try:
             row = self._update(time, q, qd, tau, wrench)
         except TypeError:  # not arrays of float64 yet
-            row = self._update(float(time), *self._arrays((), q, qd, tau, wrench))
+            row = self._update(float(time), *self.arrays((), q, qd, tau, wrench))
         return Estimate(row, self._slices)
 
     def run(
@@ -160,14 +160,23 @@ class Observer:
             ValueError: for a wrong shape.
         """
         stamps = np.ascontiguousarray(time, dtype=float)
-        rows = self.kernel.run(stamps, *self._arrays(stamps.shape, q, qd, tau, wrench))
+        rows = self.kernel.run(stamps, *self.arrays(stamps.shape, q, qd, tau, wrench))
         return Estimate(rows, self._slices)
 
     def reset(self) -> None:
         """Forgets the past: the next sample starts anew."""
         self.kernel.reset()
 
-    def _arrays(self, lead: tuple[int, ...], *signals: ArrayLike | None) -> list[Array]:
+    def estimate(self, rows: Array) -> Estimate:
+        """Names the parts of the kernel's rows."""
+        return Estimate(rows, self._slices)
+
+    def arrays(self, lead: tuple[int, ...], *signals: ArrayLike | None) -> list[Array]:
+        """Signals q, qd, tau, wrench as the kernel wants them, `lead` being () or (N,).
+
+        Raises:
+            ValueError: for a wrong shape.
+        """
         n, k = len(self.robot.joint_names), len(self.robot.sensor_names)
         shapes = {"q": (n,), "qd": (n,), "tau": (n,), "wrench": (k, 6)}
         arrays = []

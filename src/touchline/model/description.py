@@ -84,6 +84,42 @@ class Noise:
 
 
 @dataclass(frozen=True)
+class LevelDescription:
+    """Thresholds of one level; None follows from the noise.
+
+    `torque` [Nm]: a number or one per joint; `force` [N] and `moment` [Nm]: a number or by sensor.
+    """
+
+    torque: float | Vector | None = None
+    force: float | dict[str, float] | None = None
+    moment: float | dict[str, float] | None = None
+
+
+@dataclass(frozen=True)
+class BaselineDescription:
+    """The slow baseline: its time constant [s], and its limit in multiples of the thresholds."""
+
+    time: float = 5.0
+    limit: float = 2.0
+
+
+@dataclass(frozen=True)
+class DetectionDescription:
+    """When residuals count as contacts.
+
+    A test fires after `min_duration` [s]; an event ends when all rows have been below `release`
+    times their thresholds for `hold` [s].
+    """
+
+    contact: LevelDescription = field(default_factory=LevelDescription)
+    collision: LevelDescription = field(default_factory=LevelDescription)
+    min_duration: float = 0.005
+    hold: float = 0.1
+    release: float = 0.6
+    baseline: BaselineDescription = field(default_factory=BaselineDescription)
+
+
+@dataclass(frozen=True)
 class RobotDescription:
     """A whole `robot.yaml`, checked; per-joint values are expanded to the order of `joints`."""
 
@@ -99,6 +135,6 @@ class RobotDescription:
     locked: dict[str, float] = field(default_factory=dict)
     loads: tuple[Load, ...] = ()
     links: dict[str, LinkCorrection] = field(default_factory=dict)
-    detection: dict[str, Any] = field(default_factory=dict)
+    detection: DetectionDescription = field(default_factory=DetectionDescription)
     log: dict[str, Any] = field(default_factory=dict)
     path: Path | None = None

@@ -82,6 +82,28 @@ class Robot:
         """The body that a link belongs to."""
         return next(body for body in self.bodies if link in body.links)
 
+    @cached_property
+    def joint_segments(self) -> tuple[str, ...]:
+        """The segment that each joint (n,) moves, inboard end first where it moves several."""
+        return tuple(
+            self._segment_of(next(i for i, node in enumerate(self.nodes) if node.joint == name))
+            for name in self.joint_names
+        )
+
+    def successors(self, segment: str) -> tuple[str, ...]:
+        """The segments that begin where this one ends."""
+        begins = [(i, n.sensor) for i, n in enumerate(self.nodes) if n.sensor in self.segment_names]
+        return tuple(
+            str(name)
+            for i, name in begins
+            if name != segment and self._segment_of(self.nodes[i].parent) == segment
+        )
+
+    def sensor_poses(self, q: Sequence[float] | Array) -> Array:
+        """Poses (k, 4, 4) of the sensor frames in world, for joint positions `q` (n,) [rad]."""
+        index = {node.sensor: i for i, node in enumerate(self.nodes)}
+        return self.poses(q)[[index[name] for name in self.sensor_names]]
+
     def joints_inboard_of(self, body: Body) -> tuple[str, ...]:
         """The moving joints between the world and a body, mimicking ones included."""
         names = []

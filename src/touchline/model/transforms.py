@@ -94,3 +94,15 @@ def move_inertia(body: Inertia, T: Array) -> Inertia:
 
 def _steiner(mass: float, r: Array) -> Array:
     return mass * (r @ r * np.eye(3) - np.outer(r, r))
+
+
+def move_wrench(T: Array) -> Array:
+    """Return the matrix (6, 6) that moves wrenches from b to a, with `T` = T_ab (4, 4).
+
+    Force by R, moment by R plus the lever p x (R f); momenta move alike.
+    """
+    R, (x, y, z) = T[:3, :3], T[:3, 3]
+    X = np.zeros((6, 6))
+    X[:3, :3] = X[3:, 3:] = R
+    X[3:, :3] = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]) @ R
+    return X

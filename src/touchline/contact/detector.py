@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Detection of contacts and collisions on the residuals, one sample or a recording at a time."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline import _core
+from touchline.contact.thresholds import Thresholds, make_thresholds
+from touchline.estimation.observer import Estimate, Observer
+
+Array = NDArray[np.float64]
+
+
+class Level(IntEnum):
+    """What a segment feels."""
+
+    NONE = 0
+    CONTACT = 1
+    COLLISION = 2
+
+
+@dataclass(frozen=True)
+class Detection:
+    """The detector's view of one sample, or of N samples (N in front).
+
+    Attributes:
+        levels: (m,) the `Level` of each segment.
+        normalized: (r,) each test's (residual - baseline) / contact threshold.
+    """
+
+    levels: Array
+    normalized: Array
+
+
+class Detector:
+    """Runs an observer and tests its residuals (see `core/include/touchline/detector.hpp`).
+
+    Args:
+        observer: the observer; feed samples to the detector, not to both.
+        thresholds: default: those of the robot's description.
+        period: time between samples [s], for thresholds that follow from the noise.
+    """
+
+    def __init__(
+        self, observer: Observer, thresholds: Thresholds | None = None, period: float = 1e-3
+    ) -> None:
+        self.observer = observer
+        self.thresholds = thresholds or make_thresholds(observer.robot, period)
+        settings = observer.robot.description.detection
+        self._core = _core.Detector(
+            observer.kernel,
+            [_core.DetectionRow(**vars(row)) for row in self.thresholds.rows],
+            self.thresholds.sum_limit.tolist(),
+            _core.DetectionTimes(
+                settings.min_duration, settings.hold, settings.baseline.time, settings.release
+            ),
+        )
+
+    def update(self, time, q, qd, tau=None, wrench=None) -> tuple[Estimate, Detection]:
+        """One sample, arguments as for `Observer.update`."""
+        signals = self.observer.arrays((), q, qd, tau, wrench)
+        row, levels, normalized = _core.detect(
+            self.observer.kernel, self._core, float(time), *signals
+        )
+        return self.observer.estimate(row), Detection(levels, normalized)
+
+    def run(self, time, q, qd, tau=None, wrench=None) -> tuple[Estimate, Detection]:
+        """N samples, arguments as for `Observer.run`."""
+        stamps = np.ascontiguousarray(time, dtype=float)
+        signals = self.observer.arrays(stamps.shape, q, qd, tau, wrench)
+        rows, levels, normalized = _core.detect_run(
+            self.observer.kernel, self._core, stamps, *signals
+        )
+        return self.observer.estimate(rows), Detection(levels, normalized)
