@@ -54,13 +54,15 @@ class Geometry:
 class Link:
     """A rigid link with its own frame.
 
-    `collision` is what carries contacts, `visual` what is drawn.
+    `collision` is what carries contacts, `visual` what is drawn. `virtual` marks a link that is not
+    in the model file but stands between two joints of one body.
     """
 
     name: str
     inertia: Inertia
     collision: tuple[Geometry, ...] = ()
     visual: tuple[Geometry, ...] = ()
+    virtual: bool = False
 
 
 @dataclass(frozen=True)

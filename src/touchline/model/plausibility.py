@@ -26,7 +26,7 @@ def inertia_warnings(mechanism: Mechanism) -> Iterator[str]:
         if problem:
             yield f"link '{link.name}': {problem}"
     for joint in mechanism.joints.values():
-        if joint.kind == "fixed":
+        if joint.kind == "fixed" or mechanism.links[joint.child].virtual:
             continue
         body = outboard_links(mechanism, joint.child, lambda inner: inner.kind == "fixed")
         if not any(mechanism.links[name].inertia.mass > 0 for name in body):

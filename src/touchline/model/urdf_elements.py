@@ -10,6 +10,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from touchline.model.mechanism import Array, Geometry, Inertia
+from touchline.model.mesh_file import mesh_problem
 from touchline.model.packages import PackageMissingError, resolve
 from touchline.model.transforms import inertia_matrix, move_inertia, pose_rpy
 
@@ -124,13 +125,19 @@ class Reader:
             return None
         scale = self.numbers(shape, "scale", 3, where) if "scale" in shape.attrib else None
         x, y, z = scale or (1.0, 1.0, 1.0)
-        try:
-            path, problem = str(resolve(uri, self.path.parent, self.package_dirs)), None
-        except PackageMissingError as error:  # one reason for many meshes
-            path, problem = None, str(error)
-        except FileNotFoundError as error:
-            path, problem = None, f"mesh '{uri}': {error}"
+        path, problem = self._mesh_path(uri)
         return Geometry("mesh", T, path=path, scale=(x, y, z), problem=problem)
+
+    def _mesh_path(self, uri: str) -> tuple[str | None, str | None]:
+        """Return the mesh file, if there is one, and why it cannot be used, if so."""
+        try:
+            path = resolve(uri, self.path.parent, self.package_dirs)
+        except PackageMissingError as error:  # one reason for many meshes
+            return None, str(error)
+        except FileNotFoundError as error:
+            return None, f"mesh '{uri}': {error}"
+        problem = mesh_problem(path)
+        return str(path), f"mesh '{uri}': {problem}" if problem else None
 
 
 def named(elements: list[Element], kind: str, fault: Callable[[str, str], None]) -> Iterator:

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compiling an MJCF that may name meshes which are not there."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from touchline.errors import InputError
+from touchline.model.mesh_file import mesh_problem
+
+
+@dataclass(frozen=True)
+class LostMesh:
+    """A geom left out because its mesh cannot be read; `body` is the name of its body."""
+
+    body: str
+    collides: bool
+    problem: str
+
+
+def compile_mjcf(path: Path) -> tuple[Any, list[LostMesh]]:
+    """Return MuJoCo's model of the file without the geoms whose meshes cannot be read.
+
+    Raises:
+        InputError: MuJoCo's own message; or the mass of a body comes from a lost mesh.
+    """
+    import mujoco
+
+    try:
+        return mujoco.MjModel.from_xml_path(str(path)), []
+    except ValueError as error:
+        message = " ".join(str(error).split())
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+        lost = _leave_out_meshes(spec, path)
+        if lost:
+            return spec.compile(), lost
+    except ValueError as error:
+        message = " ".join(str(error).split())
+    raise InputError(f"{path}: MuJoCo cannot read it: {message}") from None
+
+
+def _leave_out_meshes(spec: Any, path: Path) -> list[LostMesh]:
+    """Delete each mesh that cannot be read, and the geoms made of it."""
+    lost, problems = [], []
+    for mesh in [mesh for mesh in spec.meshes if mesh.file]:
+        problem = _problem(spec, mesh.file, path)
+        if problem is None:
+            continue
+        for geom in [geom for geom in spec.geoms if geom.meshname == mesh.name]:
+            body = geom.parent
+            if not body.explicitinertial and geom.mass != 0 and geom.density != 0:
+                what = f"its mass comes from a mesh that cannot be read: {problem}"
+                problems.append(f"{path}: body '{body.name}': {what}")
+            lost.append(LostMesh(body.name, bool(geom.contype or geom.conaffinity), problem))
+            spec.delete(geom)
+        spec.delete(mesh)
+    if problems:
+        raise InputError(problems)
+    return lost
+
+
+def _problem(spec: Any, file: str, path: Path) -> str | None:
+    found = path.parent / (spec.modelfiledir or "") / (spec.meshdir or "") / file
+    problem = mesh_problem(found) if found.is_file() else f"no such file: {found}"
+    return f"mesh '{file}': {problem}" if problem else None

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The surface of a link as triangles with outward normals: where contacts can be."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.model.mechanism import Array, Geometry, Link, Mechanism
+from touchline.model.mesh_file import MeshError, Triangles, read_mesh
+from touchline.model.tessellation import tessellate
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Triangles of one link, in its frame [m].
+
+    Attributes:
+        vertices: (V, 3).
+        faces: (F, 3) indices into `vertices`, counter-clockwise seen from outside.
+        normals: (F, 3) outward unit normals.
+        areas: (F,) [m2]; the weights for sampling points.
+        closed: whether every shape of it is watertight, so that inside and outside are certain.
+        warnings: what is doubtful about it.
+    """
+
+    vertices: Array
+    faces: NDArray[np.int64]
+    normals: Array
+    areas: Array
+    closed: bool
+    warnings: tuple[str, ...] = ()
+
+
+def link_surface(link: Link, kind: str = "collision") -> Surface | None:
+    """Return the surface of a link from its `collision` or `visual` shapes.
+
+    Where there are none of that kind it is made of the other kind.
+
+    Returns:
+        None if the link has no shapes or one of its meshes cannot be read.
+    """
+    try:
+        return _surface(link, kind)
+    except MeshError:
+        return None
+
+
+def mechanism_surfaces(
+    mechanism: Mechanism, kind: str = "collision"
+) -> tuple[dict[str, Surface], tuple[str, ...]]:
+    """Return the surface of each link that has one, and a warning for each doubtful or lost one."""
+    surfaces: dict[str, Surface] = {}
+    warnings: list[str] = []
+    for link in mechanism.links.values():
+        try:
+            surface = _surface(link, kind)
+        except MeshError as error:
+            warnings.append(f"link '{link.name}': {error}; no contact is located on it")
+            continue
+        if surface is not None:
+            surfaces[link.name] = surface
+            warnings += [f"link '{link.name}': {line}" for line in surface.warnings]
+    return surfaces, tuple(warnings)
+
+
+def _surface(link: Link, kind: str) -> Surface | None:
+    if kind not in ("collision", "visual"):
+        raise ValueError(f"kind '{kind}' is not allowed; allowed: collision, visual")
+    shapes = getattr(link, kind) or link.collision or link.visual
+    parts, warnings, offset = [], [], 0
+    for shape in shapes:
+        vertices, faces, doubts = _shape_triangles(shape)
+        parts.append((vertices, faces + offset))
+        warnings += doubts
+        offset += len(vertices)
+    if not parts:
+        return None
+    vertices, faces = (np.vstack(part) for part in zip(*parts, strict=True))
+    normals, areas = _normals(vertices, faces)
+    return Surface(vertices, faces, normals, areas, not warnings, tuple(warnings))
+
+
+def _shape_triangles(shape: Geometry) -> tuple[Array, NDArray[np.int64], list[str]]:
+    """Return a shape's triangles in the link frame with outward faces, and what is doubtful."""
+    vertices, faces = _own_triangles(shape)
+    vertices, faces = _clean(vertices, faces)
+    if len(faces) == 0:
+        raise MeshError(f"{_name(shape)}: holds no triangle with an area")
+    doubts = _doubts(faces)
+    if _signed_volume(vertices, faces) < 0:  # mirrored by its scale, or exported inside out
+        faces = faces[:, ::-1]
+    T = shape.T_link_shape
+    return vertices @ T[:3, :3].T + T[:3, 3], faces, [f"{_name(shape)}: {line}" for line in doubts]
+
+
+def _own_triangles(shape: Geometry) -> Triangles:
+    if shape.kind == "triangles" and shape.vertices is not None and shape.faces is not None:
+        return shape.vertices, shape.faces
+    if shape.kind != "mesh":
+        return tessellate(shape)
+    if shape.problem or shape.path is None:
+        raise MeshError(shape.problem or "its mesh was not found")
+    try:
+        vertices, faces = read_mesh(Path(shape.path))
+    except MeshError as error:
+        raise MeshError(f"mesh '{shape.path}': {error}") from None
+    return vertices * np.array(shape.scale), faces
+
+
+def _name(shape: Geometry) -> str:
+    return f"mesh '{shape.path}'" if shape.path else shape.kind
+
+
+def _clean(vertices: Array, faces: NDArray[np.int64]) -> Triangles:
+    """Merge equal vertices (an STL repeats them in each facet); drop faces without an area."""
+    step = max(1e-7 * float(np.ptp(vertices, axis=0).max(initial=0.0)), 1e-12)
+    _, first, merged = np.unique(
+        np.round(vertices / step).astype(np.int64), axis=0, return_index=True, return_inverse=True
+    )
+    faces = merged.reshape(-1)[faces]
+    a, b, c = faces.T
+    return vertices[first], faces[(a != b) & (b != c) & (c != a)]
+
+
+def _doubts(faces: NDArray[np.int64]) -> list[str]:
+    """Say what keeps the faces from being one closed, consistently turned surface.
+
+    Closed: each edge belongs to two faces. Consistent: they run along it in opposite directions.
+    """
+    edges = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    _, used = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+    if (used % 2 == 1).any():
+        open_edges = int((used % 2 == 1).sum())
+        return [f"is not closed ({open_edges} open edges); a line may pass through it unnoticed"]
+    forward, there = np.unique(edges, axis=0, return_counts=True)
+    backward, back = np.unique(edges[:, ::-1], axis=0, return_counts=True)
+    if len(forward) != len(backward) or (forward != backward).any() or (there != back).any():
+        return ["its faces are not turned the same way; some normals point inwards"]
+    return []
+
+
+def _signed_volume(vertices: Array, faces: NDArray[np.int64]) -> float:
+    """Return the volume by the divergence theorem; negative if the faces look inwards.
+
+    About the middle of the vertices, so that it also tells the side of a surface with holes.
+    """
+    a, b, c = (vertices - vertices.mean(axis=0))[faces].transpose(1, 0, 2)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+
+def _normals(vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, Array]:
+    a, b, c = vertices[faces].transpose(1, 0, 2)
+    cross = np.cross(b - a, c - a)
+    length = np.linalg.norm(cross, axis=1)
+    # A sliver's normal is uncertain but must stay finite; its area gives it no weight.
+    return cross / np.maximum(length, 1e-300)[:, None], length / 2
