@@ -98,12 +98,12 @@ def _configurations(robot: Robot) -> Array:
     joints = [robot.mechanism.joints[name] for name in robot.joint_names]
     lower = np.array([max(joint.lower, -np.pi) for joint in joints])
     upper = np.array([min(joint.upper, np.pi) for joint in joints])
-    return rng.uniform(np.minimum(lower, upper), np.maximum(lower, upper), (CONFIGURATIONS, len(joints)))
+    return rng.uniform(
+        np.minimum(lower, upper), np.maximum(lower, upper), (CONFIGURATIONS, len(joints))
+    )
 
 
-def _segment_variance(
-    robot: Robot, segment: str, q: Array, momenta: Array, period: float
-) -> Array:
+def _segment_variance(robot: Robot, segment: str, q: Array, momenta: Array, period: float) -> Array:
     """Variance (6,) of a segment's wrench in its sensor's frame, at one configuration."""
     noise = robot.description.noise
     bandwidth = robot.description.bandwidth_sensors[segment]

@@ -4,7 +4,7 @@
 from typing import Any
 
 from touchline.model import values
-from touchline.model.description import Noise, Vector
+from touchline.model.description import DetectionDescription, Noise, Vector
 from touchline.model.names import RESERVED_SENSORS
 from touchline.model.schema import SensorEntry
 from touchline.model.suggest import unknown
@@ -65,6 +65,20 @@ class Expander:
             for name in self.sensor_names
         }
         return self._per_joint(f"{where}.joints", joints, values.positive), sensors
+
+    def detection(self, given: DetectionDescription) -> DetectionDescription:
+        """Return the detection settings, names and counts of their thresholds checked."""
+        for name in ("contact", "collision"):
+            level, where = getattr(given, name), f"detection.{name}"
+            if isinstance(level.torque, tuple):
+                self._per_joint(f"{where}.torque", list(level.torque), values.positive)
+            for kind in ("force", "moment"):
+                by_sensor = getattr(level, kind)
+                for key in by_sensor if isinstance(by_sensor, dict) else ():
+                    if key not in self.sensor_names:
+                        what = unknown(key, "sensor", self.sensor_names)
+                        self.problems.append((f"{where}.{kind}.{key}", what))
+        return given
 
     def per_axis(self, where: str, given: Any, sensor: SensorEntry, default: Vector) -> Vector:
         """Return six values; `given` has six, one per measured axis, or is None (the default)."""

@@ -121,6 +121,7 @@ class _Draft:
         self.expander = Expander(count, sensors, names.sensors)
         self.noise = self.expander.noise(file.noise)
         self.bandwidth = self.expander.bandwidth(file.observer.bandwidth)
+        self.detection = self.expander.detection(file.detection)
         self.sensors = [self._sensor(place, sensor) for place, sensor in sensor_entries(file)]
         self.problems = [*check_names(file, names, mechanism), *self.expander.problems]
 
@@ -164,7 +165,7 @@ class _Draft:
             locked=file.locked,
             loads=tuple(file.loads),
             links=file.links,
-            detection=file.detection,
+            detection=self.detection,
             log=file.log,
             path=self.path,
         )

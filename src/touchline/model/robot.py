@@ -104,15 +104,48 @@ class Robot:
         index = {node.sensor: i for i, node in enumerate(self.nodes)}
         return self.poses(q)[[index[name] for name in self.sensor_names]]
 
+    def joint_depth(self, joint: int) -> int:
+        """How many nodes lie between the world and a joint: larger is more distal."""
+        node = next(i for i, n in enumerate(self.nodes) if n.joint == self.joint_names[joint])
+        return len(self._path(node))
+
+    def torques_of_wrench(self, segment: str, q: Array, wrench: Array) -> list[tuple[int, float]]:
+        """What a segment's wrench does to the joints inboard of it.
+
+        Args:
+            segment: that begins at a six-axis sensor.
+            q: joint positions (n,) [rad or m].
+            wrench: (6,) [N, Nm], world axes, about the world origin.
+
+        Returns:
+            (joint, torque [Nm]) for the observed joints inboard, from the base outwards.
+        """
+        poses = self.poses(q)
+        start = next(i for i, node in enumerate(self.nodes) if node.sensor == segment)
+        torques = []
+        for i in self._path(start):
+            node = self.nodes[i]
+            if node.coordinate < 0:
+                continue
+            axis, origin = poses[i][:3, 2], poses[i][:3, 3]
+            load = wrench[3:] - np.cross(origin, wrench[:3])
+            if node.kind == "prismatic":
+                load = wrench[:3]
+            torques.append((node.coordinate, float(node.multiplier * (axis @ load))))
+        return torques
+
+    def _path(self, node: int) -> list[int]:
+        """The nodes from the world out to `node`, itself included."""
+        path = []
+        while node >= 0:
+            path.append(node)
+            node = self.nodes[node].parent
+        return path[::-1]
+
     def joints_inboard_of(self, body: Body) -> tuple[str, ...]:
         """The moving joints between the world and a body, mimicking ones included."""
-        names = []
-        node = body.node
-        while node >= 0:
-            if (joint := self.nodes[node].joint) is not None:
-                names.append(joint)
-            node = self.nodes[node].parent
-        return tuple(reversed(names))
+        joints = (self.nodes[i].joint for i in self._path(body.node))
+        return tuple(joint for joint in joints if joint is not None)
 
     def poses(self, q: Sequence[float] | Array) -> Array:
         """Poses (n_nodes, 4, 4) of the nodes in world, for joint positions `q` (n,) [rad]."""
@@ -159,12 +192,8 @@ class Robot:
 
     def _segment_of(self, node: int) -> str:
         six_axis = {s.name for s in self.description.sensors if len(s.axes) == 6}
-        while node >= 0:
-            name = self.nodes[node].sensor
-            if name in six_axis:
-                return str(name)
-            node = self.nodes[node].parent
-        return "root"
+        names = [self.nodes[i].sensor for i in self._path(node)]
+        return next((str(name) for name in reversed(names) if name in six_axis), "root")
 
     def _joint_row(self, index: int, bandwidth: float | None) -> _core.JointRow:
         joint: JointDescription = self.description.joints[index]

@@ -21,7 +21,15 @@ from cattrs.errors import (
 from cattrs.gen import make_dict_structure_fn, override
 
 from touchline.model import values
-from touchline.model.description import Friction, LinkCorrection, Load, Vector
+from touchline.model.description import (
+    BaselineDescription,
+    DetectionDescription,
+    Friction,
+    LevelDescription,
+    LinkCorrection,
+    Load,
+    Vector,
+)
 from touchline.model.suggest import did_you_mean
 from touchline.model.values import Hook, Torque, kind_of, show
 
@@ -95,7 +103,7 @@ class RobotFile:
     links: dict[str, LinkCorrection] = field(default_factory=dict)
     noise: dict[str, Any] = field(default_factory=dict)
     observer: ObserverEntry = ObserverEntry()
-    detection: dict[str, Any] = field(default_factory=dict)
+    detection: DetectionDescription = field(default_factory=DetectionDescription)
     log: dict[str, Any] = field(default_factory=dict)
 
 
@@ -103,6 +111,12 @@ def _bandwidth(value: Any, _: Any = None) -> Any:
     if not isinstance(value, dict):
         return values.positive(value)
     return {values.text(key): item for key, item in value.items()}
+
+
+def _by_sensor(value: Any, _: Any = None) -> Any:
+    if not isinstance(value, dict):
+        return values.positive(value)
+    return {values.text(key): values.positive(item) for key, item in value.items()}
 
 
 _VECTOR3 = values.list_of(values.number, 3)
@@ -140,6 +154,17 @@ HOOKS: dict[type, dict[str, Hook]] = {
         "range": values.list_of(values.positive_or_inf, *_AXIS_COUNTS),
     },
     ObserverEntry: {"bandwidth": _bandwidth},
+    LevelDescription: {
+        "torque": values.number_or_list(values.positive),
+        "force": _by_sensor,
+        "moment": _by_sensor,
+    },
+    BaselineDescription: {"time": values.positive, "limit": values.non_negative},
+    DetectionDescription: {
+        "min_duration": values.non_negative,
+        "hold": values.non_negative,
+        "release": values.fraction,
+    },
     RobotFile: {"name": values.text, "model": values.text, "gravity": _VECTOR3},
 }
 

@@ -57,6 +57,13 @@ def positive(value: Any, _: Any = None) -> float:
     return float(value)
 
 
+def fraction(value: Any, _: Any = None) -> float:
+    """Return a number above 0 and at most 1."""
+    if not 0 < number(value) <= 1:
+        raise ValueError(f"{value} is not allowed; allowed: above 0, at most 1")
+    return float(value)
+
+
 def positive_or_inf(value: Any, _: Any = None) -> float:
     """Return a number above 0; `.inf` means no limit."""
     return math.inf if value == math.inf else positive(value)

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What Touchline says of one contact."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+STATUSES = ("located", "ambiguous", "not_separable", "wrench_only")
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One explanation of a contact: `position` (3,) [m] in world on `link`, of rigid `body`."""
+
+    link: str
+    body: str
+    probability: float
+    position: Array
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A contact on one segment at one instant; what is not known is None.
+
+    Attributes:
+        segment: name of the segment.
+        event: number of the event that it belongs to.
+        level: "contact" or "collision".
+        status: "located", "ambiguous", "not_separable" or "wrench_only".
+        wrench: (6,) [N, Nm] on the segment, world axes, about the world origin; None on `root`.
+        link: the link that carries the point, and `body` the rigid body it belongs to.
+        body_probability: of that body, 0 to 1.
+        position: (3,) [m] in world.
+        force: (3,) [N] on the robot, world axes.
+        covariance: (3, 3) [m2] of the position.
+        candidates: other explanations, best first.
+    """
+
+    segment: str
+    event: int
+    level: str
+    status: str = "wrench_only"
+    wrench: Array | None = None
+    link: str | None = None
+    body: str | None = None
+    body_probability: float | None = None
+    position: Array | None = None
+    force: Array | None = None
+    covariance: Array | None = None
+    candidates: tuple[Candidate, ...] = field(default=())
+
+    @property
+    def position_std(self) -> float | None:
+        """Square root of the covariance's trace [m]."""
+        return None if self.covariance is None else float(np.sqrt(np.trace(self.covariance)))

@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Events: from the sample at which a test fires to the one at which the contact is gone."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.contact.detector import Detection, Detector, Level
+from touchline.estimation.observer import Estimate
+
+Array = NDArray[np.float64]
+
+STRONG = 0.5  # samples above this fraction of the event's peak speak for the event
+
+
+@dataclass
+class Event:
+    """One contact from beginning to end; grows while it lasts.
+
+    Attributes:
+        id: number, from 0 in the order of detection.
+        segment: name of the segment.
+        level: "contact" or "collision", the highest reached.
+        detected: time at which the test fired [s], not the onset.
+        cleared: time at which it ended [s]; None while it lasts.
+        joint: the most distal loaded joint; None where no torque tells.
+        force: (3,) [N] in world, mean over the strong samples; None on `root`.
+        force_peak: largest force [N]; None on `root`.
+        torque_peak: largest external torque [Nm] on `joint`.
+    """
+
+    id: int
+    segment: str
+    level: str
+    detected: float
+    cleared: float | None = None
+    joint: str | None = None
+    force: Array | None = None
+    force_peak: float | None = None
+    torque_peak: float | None = None
+    status: str = "wrench_only"
+
+    def as_json(self) -> dict[str, Any]:
+        """The event as in `events.json`."""
+        force = None if self.force is None else [float(x) for x in self.force]
+        unknown = dict.fromkeys(
+            ("link", "body", "body_probability", "position", "position_link"), None
+        )
+        return {
+            "id": self.id,
+            "segment": self.segment,
+            "level": self.level,
+            "detected": self.detected,
+            "cleared": self.cleared,
+            **unknown,
+            "time_of_position": None,
+            "position_std": None,
+            "force": force,
+            "force_peak": self.force_peak,
+            "torque_peak": self.torque_peak,
+            "status": self.status,
+            "joint": self.joint,
+            "candidates": [],
+        }
+
+
+class _Strongest:
+    """Mean of rows over the samples that come near the peak, gathered part by part."""
+
+    def __init__(self, width: int) -> None:
+        self.peak = 0.0
+        self._sum = np.zeros(width)
+        self._count = 0
+
+    def add(self, strength: Array, rows: Array) -> None:
+        peak = float(np.max(strength, initial=0.0))
+        if peak * STRONG > self.peak:  # all that came before was weak
+            self._sum[:] = 0.0
+            self._count = 0
+        self.peak = max(self.peak, peak)
+        strong = strength >= STRONG * self.peak
+        self._sum += rows[strong].sum(axis=0)
+        self._count += int(strong.sum())
+
+    @property
+    def mean(self) -> Array:
+        return self._sum / max(self._count, 1)
+
+
+class EventRecorder:
+    """Turns levels into events, for a live stream or for a recording read in parts.
+
+    `events` are all events so far; those of `open_events()` still last.
+    """
+
+    def __init__(self, detector: Detector) -> None:
+        self.events: list[Event] = []
+        self._robot = detector.observer.robot
+        self._rows = detector.thresholds.rows
+        self._open: dict[int, tuple[Event, _Strongest]] = {}
+
+    def open_events(self) -> dict[int, Event]:
+        """Events that last, by number of their segment."""
+        return {segment: event for segment, (event, _) in self._open.items()}
+
+    def add(self, time: Array, q: Array, estimate: Estimate, detection: Detection) -> None:
+        """Takes N samples: `time` (N,) [s], `q` (N, n), and what was made of them."""
+        for g in range(len(self._robot.segment_names)):
+            levels = detection.levels[:, g]
+            if g in self._open or levels.any():
+                self._add_segment(g, levels, time, q, estimate, detection)
+
+    def _add_segment(
+        self, g: int, levels: Array, time: Array, q: Array, estimate: Estimate, detection: Detection
+    ) -> None:
+        active = levels > 0
+        edges = np.flatnonzero(np.diff(active.astype(int), prepend=int(g in self._open)))
+        bounds = [0, *edges.tolist(), len(time)]
+        for start, stop in zip(bounds[:-1], bounds[1:], strict=True):
+            if start in edges and not active[start]:
+                self._close(g, float(time[start]))
+            if start == stop or not active[start]:
+                continue
+            if g not in self._open:
+                self._begin(g, float(time[start]))
+            self._extend(g, slice(start, stop), levels, q, estimate, detection)
+
+    def _begin(self, g: int, time: float) -> None:
+        event = Event(len(self.events), self._robot.segment_names[g], "contact", time)
+        self.events.append(event)
+        self._open[g] = (event, _Strongest(len(self._rows) + 3))
+
+    def _close(self, g: int, time: float) -> None:
+        event, _ = self._open.pop(g)
+        event.cleared = time
+
+    def _extend(
+        self, g: int, part: slice, levels: Array, q: Array, estimate: Estimate, detection: Detection
+    ) -> None:
+        event, strongest = self._open[g]
+        own = np.array([row.segment == g for row in self._rows])
+        normalized = detection.normalized[part]
+        strength = np.abs(normalized[:, own]).max(axis=1)
+        forces = np.nan_to_num(estimate.segment_wrench[part, g, :3])
+        strongest.add(strength, np.hstack([normalized, forces]))
+        if levels[part].max() >= Level.COLLISION:
+            event.level = "collision"
+        if event.segment != "root":
+            event.force = strongest.mean[-3:]
+            norms = np.linalg.norm(forces, axis=1)
+            event.force_peak = max(event.force_peak or 0.0, float(norms.max()))
+        self._name_joint(event, g, strongest.mean, q[part][-1], estimate.segment_wrench[part, g])
+        self._measure_torque(event, estimate.tau_ext[part])
+
+    def _name_joint(self, event: Event, g: int, mean: Array, q: Array, wrenches: Array) -> None:
+        loaded = [
+            (row.joint, abs(mean[i]))
+            for i, row in enumerate(self._rows)
+            if row.segment == g and row.joint >= 0
+        ]
+        beyond = [joint for joint, x in loaded if x > 1.0]
+        if beyond:
+            event.joint = self._robot.joint_names[max(beyond, key=self._robot.joint_depth)]
+        elif event.segment != "root":
+            event.joint = self._inboard_joint(event.segment, q, wrenches)
+        elif loaded:
+            event.joint = self._robot.joint_names[max(loaded, key=lambda pair: pair[1])[0]]
+
+    def _inboard_joint(self, segment: str, q: Array, wrenches: Array) -> str | None:
+        """The most distal joint inboard of a segment that its wrench loads beyond its threshold."""
+        limits = {row.joint: row.contact for row in self._rows if row.joint >= 0}
+        peak = wrenches[np.nanargmax(np.linalg.norm(np.nan_to_num(wrenches[:, :3]), axis=1))]
+        for joint, torque in reversed(self._robot.torques_of_wrench(segment, q, peak)):
+            if joint in limits and abs(torque) > limits[joint]:
+                return self._robot.joint_names[joint]
+        return None
+
+    def _measure_torque(self, event: Event, tau_ext: Array) -> None:
+        if event.joint is None:
+            return
+        torque = np.abs(tau_ext[:, self._robot.joint_names.index(event.joint)])
+        if np.isfinite(torque).any():
+            event.torque_peak = max(event.torque_peak or 0.0, float(np.nanmax(torque)))
