@@ -109,6 +109,10 @@ def _open_source(path: Path, description: RobotDescription) -> Source:
         from touchline.logs.csvfile import CsvSource
 
         return CsvSource(path, description, naming)
+    if path.is_dir() or name.endswith(BAGS):
+        from touchline.logs.rosbag import RosbagSource
+
+        return RosbagSource(path, description, naming)
     raise InputError(
         f"{path}: not a known kind of log; tables end in {', '.join(TABLES)}, recordings in "
         f"{', '.join(BAGS)} (a rosbag2 folder holds a metadata.yaml)"
