@@ -13,6 +13,7 @@ from touchline.estimation.samples import Samples
 from touchline.logs.blocks import windows
 from touchline.logs.columns import signal_shapes
 from touchline.logs.naming import parse_naming
+from touchline.logs.prepare import Preparation
 from touchline.logs.source import Source
 from touchline.model.description import RobotDescription
 
@@ -34,9 +35,8 @@ class Log:
 
     def __init__(self, path: Path, description: RobotDescription, source: Source):
         self.path = path
-        self._description = description
         self._source = source
-        self._warnings: list[str] = []
+        self._preparation = Preparation(path, description, source)
         self.rows = source.rows
         self.duration = source.duration
         self.columns = source.columns
@@ -46,7 +46,7 @@ class Log:
     @property
     def warnings(self) -> list[str]:
         """What the user should know; grows while the log is read."""
-        return self._warnings + self._source.warnings
+        return self._preparation.warnings + self._source.warnings
 
     @property
     def progress(self) -> float:
@@ -59,11 +59,8 @@ class Log:
         Raises:
             InputError: the log is damaged or holds something that is no number.
         """
-        for window in windows(self._source.blocks(), rows, 0):
-            block = window.padded
-            yield Samples(
-                block["time"], block["q"], block["qd"], block["tau"], block["wrench"], window.row
-            )
+        for window in windows(self._source.blocks(), rows, self._preparation.halo):
+            yield self._preparation.samples(window)
 
     def close(self) -> None:
         """Release the file."""
@@ -89,7 +86,12 @@ def open_log(path: Path | str, description: RobotDescription) -> Log:
             or topics the robot needs.
     """
     path = Path(path)
-    return Log(path, description, _open_source(path, description))
+    source = _open_source(path, description)
+    try:
+        return Log(path, description, source)
+    except BaseException:
+        source.close()
+        raise
 
 
 def _open_source(path: Path, description: RobotDescription) -> Source:
@@ -107,6 +109,10 @@ def _open_source(path: Path, description: RobotDescription) -> Source:
         from touchline.logs.csvfile import CsvSource
 
         return CsvSource(path, description, naming)
+    if path.is_dir() or name.endswith(BAGS):
+        from touchline.logs.rosbag import RosbagSource
+
+        return RosbagSource(path, description, naming)
     raise InputError(
         f"{path}: not a known kind of log; tables end in {', '.join(TABLES)}, recordings in "
         f"{', '.join(BAGS)} (a rosbag2 folder holds a metadata.yaml)"

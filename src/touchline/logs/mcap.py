@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Makes an MCAP file readable that was cut off before its index and footer."""
+
+import io
+from pathlib import Path
+
+MAGIC = b"\x89MCAP0\r\n"
+# A footer record that points at no summary: readers then scan the records.
+_FOOTER = b"\x02" + (20).to_bytes(8, "little") + bytes(20) + MAGIC
+_DATA_END, _FOOTER_CODE = 0x0F, 0x02
+
+
+def whole_records(path: Path) -> int:
+    """Length of the part of the file that consists of whole records [bytes]."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        if file.read(len(MAGIC)) != MAGIC:
+            return 0
+        at = len(MAGIC)
+        while len(head := file.read(9)) == 9:
+            end = at + 9 + int.from_bytes(head[1:], "little")
+            if end > size or head[0] in (0, _DATA_END, _FOOTER_CODE):
+                break
+            at = end
+            file.seek(at)
+    return at
+
+
+class MendedMcap:
+    """Stands in for the path of a cut-off file: its whole records and a footer."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.length = whole_records(path)
+
+    def open(self, mode: str = "rb") -> io.BufferedReader:
+        """A readable file; the one on disk is not touched."""
+        return io.BufferedReader(_Mended(self.path, self.length))
+
+    def __str__(self) -> str:
+        return str(self.path)
+
+
+class _Mended(io.RawIOBase):
+    """The first `length` bytes of a file, followed by a footer."""
+
+    def __init__(self, path: Path, length: int):
+        super().__init__()
+        self._file = path.open("rb")
+        self._length = length
+        self._at = 0
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def tell(self) -> int:
+        return self._at
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET, /) -> int:
+        base = (0, self._at, self._length + len(_FOOTER))[whence]
+        self._at = max(base + offset, 0)
+        return self._at
+
+    def readinto(self, buffer, /) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
+        if self._at < self._length:
+            self._file.seek(self._at)
+            piece = self._file.read(min(len(buffer), self._length - self._at))
+        else:
+            start = self._at - self._length
+            piece = _FOOTER[start : start + len(buffer)]
+        buffer[: len(piece)] = piece
+        self._at += len(piece)
+        return len(piece)
+
+    def close(self) -> None:
+        self._file.close()
+        super().close()

@@ -1,0 +1,366 @@
+# SPDX-License-Identifier: Apache-2.0
+"""rosbag2 recordings: topics, clocks, rates, decoding and damage."""
+
+import shutil
+
+import numpy as np
+import pytest
+from bag_support import JOINTS, WRENCH, joint_state, raw, storage_file, wrench, write_bag
+from logs_support import assert_same, describe
+
+from touchline.errors import InputError
+from touchline.estimation.samples import Samples
+from touchline.logs import open_log, read_log
+from touchline.logs.cdr import JOINT_STATE, WRENCH_STAMPED, Decoder
+from touchline.model.description import JointDescription, SensorDescription
+
+NAMES = ("j1", "j2")
+KINDS = ("db3", "mcap")
+START = 1.7e9
+
+
+def q_of(t):
+    return np.stack([np.sin(3.0 * t), np.cos(2.0 * t)], axis=-1)
+
+
+def wrench_of(t):
+    """Straight lines, so that linear interpolation is exact."""
+    return np.stack([t, -t, 2.0 * t, 0.1 * t, 0.0 * t, 1.0 - t], axis=-1)
+
+
+def recording(seconds=4.0, rate=100.0, wrench_rate=77.0, start=START, seed=0):
+    """Joint states and one wrench topic of another rate, both with jittering clocks."""
+    rng = np.random.default_rng(seed)
+    messages = []
+    for t in np.arange(0.0, seconds, 1.0 / rate):
+        t += rng.uniform(-1e-3, 1e-3) + 2e-3
+        state = joint_state(start + t, NAMES, q_of(t), 0.1 * q_of(t), 10.0 * q_of(t))
+        messages.append(("/joint_states", start + t + rng.uniform(0.0, 0.02), JOINTS, state))
+    for t in np.arange(0.0, seconds, 1.0 / wrench_rate):
+        t += rng.uniform(-1e-3, 1e-3) + 2e-3
+        message = wrench(start + t, wrench_of(t))
+        messages.append(("/ft/wrench", start + t + rng.uniform(0.0, 0.05), WRENCH, message))
+    return sorted(messages, key=lambda item: item[1])
+
+
+def check_recording(samples):
+    t = samples.time - START
+    tight = {"rtol": 0.0, "atol": 1e-6}  # stamps since 1970 resolve 0.24 us
+    np.testing.assert_allclose(samples.q, q_of(t), **tight)
+    np.testing.assert_allclose(samples.qd, 0.1 * q_of(t), **tight)
+    np.testing.assert_allclose(samples.tau, 10.0 * q_of(t), atol=1e-5)
+    known = np.isfinite(samples.wrench[:, 0, 0])
+    assert known[10:-10].all()
+    np.testing.assert_allclose(samples.wrench[known, 0], wrench_of(t)[known], atol=3e-6)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_round_trip_of_folder_and_file(tmp_path, kind):
+    folder = write_bag(tmp_path / "bag", recording(), kind)
+    robot = describe()
+    from_folder = read_log(folder, robot)
+    assert len(from_folder.time) == 400
+    check_recording(from_folder)
+    assert_same(read_log(storage_file(folder, kind), robot), from_folder)
+    with open_log(folder, robot) as log:
+        assert log.topics == {"/joint_states": JOINTS, "/ft/wrench": WRENCH}
+        assert log.duration == pytest.approx(4.0, abs=0.1)
+        list(log.chunks())
+        assert log.progress == 1.0 and log.warnings == []
+
+
+@pytest.mark.parametrize("rows", [17, 1000])
+def test_numbers_do_not_depend_on_chunks(tmp_path, rows, monkeypatch):
+    messages = recording(seconds=12.0)
+    sensor = SensorDescription("base", "link", delay=0.013)
+    robot = describe([JointDescription("j1", delay=0.021), JointDescription("j2")], [sensor])
+    # Wrong stamps of a wrench and of a joint state, and a pause of the sensor.
+    messages[300] = (*messages[300][:3], wrench(START + 1e6, np.zeros(6)))
+    messages[300] = ("/ft/wrench", *messages[300][1:2], WRENCH, messages[300][3])
+    pause = START + 6.0, START + 7.0
+    messages = [m for m in messages if m[0] != "/ft/wrench" or not pause[0] < m[1] < pause[1]]
+    folder = write_bag(tmp_path / "bag", messages)
+    whole = read_log(folder, robot)
+    monkeypatch.setattr("touchline.logs.rosbag._BATCH", 50)
+    with open_log(folder, robot) as log:
+        chunks = list(log.chunks(rows))
+    names = ("time", "q", "qd", "tau", "wrench")
+    joined = {n: np.concatenate([getattr(c, n) for c in chunks]) for n in names}
+    assert_same(Samples(**joined), whole)
+    inner = np.abs(whole.time - START - 6.5) < 0.3
+    assert np.isnan(whole.wrench[inner]).all()
+    # A delayed wrench is that of a later message: the straight lines are read 13 ms on.
+    t = whole.time - START
+    late = (t > 8.0) & (t < 11.9)
+    np.testing.assert_allclose(whole.wrench[late, 0], wrench_of(t[late] + 0.013), atol=3e-6)
+
+
+def test_fast_and_general_decoding_agree():
+    rng = np.random.default_rng(0)
+    states = []
+    for i in range(60):
+        names = [("j1", "j2"), ("j2", "x", "j1"), ("gripper",), ("j1", "j2x")][i % 4]
+        n = len(names)
+        values = [rng.normal(size=n) if (i >> b) % 3 else () for b in range(3)]
+        frame = "base" if i % 7 else "another frame"
+        states.append(raw(joint_state(rng.uniform(0, 2e9), names, *values, frame=frame), JOINTS))
+    states.insert(30, b"\x00\x01broken")
+    states.insert(10, states[0][:-20])
+    fast, general = (Decoder(JOINT_STATE, NAMES, fast=flag) for flag in (True, False))
+    compare(fast.decode(states), general.decode(states))
+    assert fast.seen.keys() == general.seen.keys() == {"j1", "j2", "x", "gripper", "j2x"}
+    assert fast.undecodable == general.undecodable == 2
+    wrenches = [raw(wrench(i, rng.normal(size=6), "f" * (i % 9)), WRENCH) for i in range(50)]
+    fast, general = (Decoder(WRENCH_STAMPED, fast=flag) for flag in (True, False))
+    compare(fast.decode(wrenches), general.decode(wrenches))
+    assert general.undecodable == 0
+
+
+def compare(fast, general):
+    np.testing.assert_array_equal(fast.stamps, general.stamps)
+    np.testing.assert_array_equal(fast.complete, general.complete)
+    assert fast.complete.any() and np.isfinite(fast.stamps).any()
+    for name, values in general.fields.items():
+        np.testing.assert_array_equal(fast.fields[name], values, err_msg=name)
+        assert np.isfinite(values).any()
+
+
+def test_fast_decoding_is_used():
+    messages = [raw(joint_state(i, NAMES, (i, 0), (1, 2), (3, 4)), JOINTS) for i in range(20)]
+    decoder = Decoder(JOINT_STATE, NAMES)
+    decoder._deserialize = None  # would fail and count
+    assert np.isfinite(decoder.decode(messages).fields["effort"]).all()
+    assert decoder.undecodable == 0
+
+
+def test_big_endian_messages_are_read():
+    from bag_support import STORE
+
+    message = joint_state(12.5, NAMES, (1, 2), (3, 4), (5, 6))
+    data = bytes(STORE.serialize_cdr(message, JOINTS, little_endian=False))
+    decoded = Decoder(JOINT_STATE, NAMES).decode([data])
+    assert decoded.stamps[0] == 12.5
+    assert decoded.fields["effort"].tolist() == [[5.0, 6.0]]
+
+
+def test_names_factors_and_several_publishers(tmp_path):
+    messages = []
+    for i in range(50):
+        t = 0.01 * i
+        swapped = joint_state(t, ("arm_b", "arm_a"), (2, 1), (20, 10), (200, 100))
+        messages.append(("/joint_states", t, JOINTS, swapped))
+        gripper = joint_state(t, ("finger",), (0.04,))
+        messages.append(("/joint_states", t + 0.001, JOINTS, gripper))
+    names = {"j1": "arm_a", "j2": "arm_b"}
+    log = {"joint_names": names, "tau": {"factor": -0.5}}
+    robot = describe([JointDescription("j1"), JointDescription("j2", torque="none")], (), log)
+    samples = read_log(write_bag(tmp_path / "bag", messages), robot)
+    assert len(samples.time) == 50
+    np.testing.assert_array_equal(samples.q, [[1.0, 2.0]] * 50)
+    np.testing.assert_array_equal(samples.qd, [[10.0, 20.0]] * 50)
+    np.testing.assert_array_equal(samples.tau[:, 0], -50.0)
+    assert np.isnan(samples.tau[:, 1]).all()
+
+
+def test_two_sensors_and_axes(tmp_path):
+    messages = recording(2.0)
+    messages += [("/wrist/ft", *m[1:]) for m in messages if m[0] == "/ft/wrench"]
+    messages.sort(key=lambda item: item[1])
+    wrist = SensorDescription("wrist", "link", axes=("fz", "mx"))
+    log = {"topics": {"wrench": {"base": "/ft/wrench"}}, "sensors": {"wrist": {"factor": 2.0}}}
+    samples = read_log(write_bag(tmp_path / "bag", messages), describe(2, ["base", wrist], log))
+    lacking = np.isnan(samples.wrench[20:-20, 1]).all(axis=0)
+    assert lacking.tolist() == [True, True, False, False, True, True]
+    np.testing.assert_array_equal(samples.wrench[:, 1, 2], 2.0 * samples.wrench[:, 0, 2])
+
+
+def test_missing_velocities_are_estimated(tmp_path):
+    messages = [
+        ("/joint_states", t, JOINTS, joint_state(t, NAMES, (t**2, 5 * t), (), (1, 2)))
+        for t in np.arange(1, 200) * 0.01
+    ]
+    robot = describe(2, ())
+    with open_log(write_bag(tmp_path / "bag", messages), robot) as log:
+        (samples,) = log.chunks()
+        assert "no velocities of j1, j2" in log.warnings[0]
+    np.testing.assert_allclose(samples.qd[:, 0], 2.0 * samples.time, atol=1e-6)
+    np.testing.assert_allclose(samples.qd[:, 1], 5.0, atol=1e-6)
+
+
+def test_unstamped_headers_use_the_receive_time(tmp_path):
+    messages = [
+        ("/joint_states", 5.0 + t, JOINTS, joint_state(0.0, NAMES, (t, t), (1, 1), (1, 2)))
+        for t in np.arange(20) * 0.01
+    ]
+    with open_log(write_bag(tmp_path / "bag", messages), describe(2, ())) as log:
+        (samples,) = log.chunks()
+        np.testing.assert_allclose(samples.time, 5.0 + np.arange(20) * 0.01)
+        assert "receive time" in log.warnings[0]
+
+
+def test_one_zero_stamp_is_left_alone(tmp_path):
+    messages = [
+        ("/joint_states", 5.0 + t, JOINTS, joint_state(t, NAMES, (t, t), (1, 1), (1, 2)))
+        for t in np.arange(20) * 0.01
+    ]
+    with open_log(write_bag(tmp_path / "bag", messages), describe(2, ())) as log:
+        (samples,) = log.chunks()
+        np.testing.assert_allclose(samples.time, np.arange(20) * 0.01, atol=1e-12)
+        assert log.warnings == []
+
+
+def test_foreign_clock_and_silent_sensor_are_told(tmp_path):
+    messages = [
+        (m[0], m[1], m[2], wrench(5.0, np.ones(6)) if m[0] == "/ft/wrench" else m[3])
+        for m in recording(1.0)
+    ]
+    robot = describe(2, ["base", "wrist"], {"topics": {"wrench": {"base": "/ft/wrench"}}})
+    folder = write_bag(tmp_path / "bag", messages, silent=[("/wrist/wrench", WRENCH)])
+    with open_log(folder, robot) as log:
+        (samples,) = log.chunks()
+        text = "\n".join(log.warnings)
+    assert "/ft/wrench: its clock is" in text
+    assert "/wrist/wrench: no messages" in text
+    assert np.isnan(samples.wrench).all() and np.isfinite(samples.tau).all()
+
+
+@pytest.mark.parametrize(
+    ("topics", "log", "words"),
+    [
+        (["/a", "/b"], {}, ["several topics carry sensor_msgs/msg/JointState (/a, /b)", "choose"]),
+        ([], {}, ["no topic carries sensor_msgs/msg/JointState"]),
+        (["/a"], {"topics": {"joint_states": "/A"}}, ["no topic '/A'", "/a (sensor_msgs"]),
+        (["/a"], {"topics": {"joint_states": "/ft"}}, ["/ft carries geometry_msgs"]),
+    ],
+)
+def test_topics_that_cannot_be_chosen(tmp_path, topics, log, words):
+    messages = [(t, 1.0, JOINTS, joint_state(1.0, NAMES, (1, 2))) for t in topics]
+    messages.append(("/ft", 2.0, WRENCH, wrench(2.0, np.ones(6))))
+    with pytest.raises(InputError) as caught:
+        open_log(write_bag(tmp_path / "bag", messages), describe(log=log))
+    for word in [*words, "/ft (geometry_msgs/msg/WrenchStamped)"]:
+        assert word in str(caught.value)
+
+
+def test_several_wrench_topics_need_a_choice(tmp_path):
+    messages = [("/js", 1.0, JOINTS, joint_state(1.0, NAMES, (1, 2), (1, 2), (1, 2)))]
+    messages += [(t, 2.0, WRENCH, wrench(2.0, np.ones(6))) for t in ("/x", "/y")]
+    folder = write_bag(tmp_path / "bag", messages)
+    with pytest.raises(InputError, match=r"wrench: \{wrist: /TOPIC\}"):
+        open_log(folder, describe(2, ("base", "wrist")))
+    both = {"topics": {"wrench": {"base": "/x", "wrist": "/x"}}}
+    with pytest.raises(InputError, match="/x serves several sensors: base, wrist"):
+        open_log(folder, describe(2, ("base", "wrist"), both))
+
+
+@pytest.mark.parametrize(
+    ("names", "values", "words"),
+    [
+        (
+            ("j1", "jj2"),
+            [(1, 2)] * 3,
+            ["no joint 'j2'; did you mean 'jj2'?", "joints of", "j1, jj2"],
+        ),
+        (NAMES, [(1, 2), (1, 2), ()], ["no joint torques", "no efforts"]),
+        (NAMES, [(), (1, 2), (1, 2)], ["no positions"]),
+    ],
+)
+def test_joint_states_that_cannot_be_used(tmp_path, names, values, words):
+    messages = [("/js", 0.1 * i, JOINTS, joint_state(0.1 * i, names, *values)) for i in range(9)]
+    with pytest.raises(InputError) as caught:
+        open_log(write_bag(tmp_path / "bag", messages), describe(2, ()))
+    for word in words:
+        assert word in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_files_that_are_no_recordings(tmp_path, kind):
+    path = tmp_path / f"log.{kind}"
+    path.write_bytes(b"something else" * 500)
+    with pytest.raises(InputError, match="not a readable recording"):
+        open_log(path, describe())
+    path.write_bytes(b"")
+    with pytest.raises(InputError, match="empty"):
+        open_log(path, describe())
+    folder = write_bag(tmp_path / "bag", [], kind, silent=[("/js", JOINTS)])
+    with pytest.raises(InputError, match="no messages"):
+        open_log(folder, describe())
+
+
+def test_folder_without_recording(tmp_path):
+    with pytest.raises(InputError, match="holds no rosbag2"):
+        open_log(tmp_path, describe())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("keep", [0.7, 0.9, 0.999])
+def test_cut_off_file_is_read_as_far_as_it_goes(tmp_path, kind, keep):
+    folder = write_bag(tmp_path / "bag", recording(100.0), kind)
+    file = storage_file(folder, kind)
+    robot = describe()
+    whole = read_log(file, robot)
+    file.write_bytes(file.read_bytes()[: int(keep * file.stat().st_size)])
+    with open_log(file, robot) as log:
+        (part,) = log.chunks()
+        assert "damaged after" in log.warnings[0]
+    rows = len(part.time)
+    assert 0.3 * len(whole.time) < rows <= len(whole.time)
+    np.testing.assert_array_equal(part.q, whole.q[:rows])
+    np.testing.assert_array_equal(part.wrench[: rows - 50], whole.wrench[: rows - 50])
+    with open_log(folder, robot) as log:  # metadata.yaml promises more than there is
+        assert sum(len(c.time) for c in log.chunks()) == rows
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_beginning_of_a_file_is_an_error(tmp_path, kind):
+    file = storage_file(write_bag(tmp_path / "bag", recording(100.0), kind), kind)
+    file.write_bytes(file.read_bytes()[:6000])
+    with pytest.raises(InputError, match="not a readable recording, or damaged"):
+        open_log(file, describe())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_damaged_bytes_in_the_middle_of_a_file(tmp_path, kind):
+    folder = write_bag(tmp_path / "bag", recording(100.0), kind)
+    file = storage_file(folder, kind)
+    data = bytearray(file.read_bytes())
+    at = int(0.8 * len(data))
+    data[at : at + 20000] = b"\xff" * 20000
+    file.write_bytes(bytes(data))
+    with open_log(file, describe()) as log:
+        rows = sum(len(c.time) for c in log.chunks())
+        assert "damaged after" in log.warnings[0]
+    assert 2000 < rows < 10000
+    data[4096:] = b"\xff" * (len(data) - 4096)
+    file.write_bytes(bytes(data))
+    with pytest.raises(InputError, match="damaged"):
+        open_log(file, describe())
+
+
+def test_recording_whose_recorder_was_killed(tmp_path):
+    folder = write_bag(tmp_path / "bag", recording(2.0), "db3")
+    (folder / "metadata.yaml").unlink()
+    file = storage_file(folder, "db3")
+    shutil.copy(file, folder / "bag_10.db3")
+    file.rename(folder / "bag_9.db3")
+    (folder / "bag_10.db3-wal").write_bytes(b"some pages")
+    with open_log(folder, describe()) as log:
+        assert sum(len(c.time) for c in log.chunks()) == 400
+        assert "bag_10.db3-wal" in log.warnings[0]
+
+
+def test_real_recordings(data):
+    folder = data / "panda_ur10_rosbag2"
+    panda = describe([f"fer_joint{i}" for i in range(1, 8)], ())
+    samples = read_log(folder / "panda_exciting_trajectory.db3", panda)
+    assert samples.q.shape == (727, 7)
+    assert np.median(np.diff(samples.time)) == pytest.approx(1 / 30, rel=0.01)
+    # The velocities are those of the positions.
+    steps = np.diff(samples.q, axis=0) / np.diff(samples.time)[:, None]
+    assert np.corrcoef(steps[:, 3], samples.qd[1:, 3])[0, 1] > 0.99
+    links = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
+    ur10 = describe([f"{name}_joint" for name in links], ())
+    samples = read_log(folder / "ur10_exciting_trajectory.db3", ur10)
+    assert samples.tau.shape == (3441, 6) and np.isfinite(samples.tau).all()
+    with pytest.raises(InputError, match="no topic carries"):
+        open_log(folder / "validation_trajectory.db3", ur10)
