@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Parts that are only drawn: end caps of the pitch joints, rings of the roll joints, mounting plate.
+
+They stand at most a millimetre proud of the shells, which alone carry contacts.
+"""
+
+import numpy as np
+import trimesh
+
+from arms import kinematics as k
+from arms.sdf import Array
+
+SEGMENTS = 72
+PROUD = 0.0008
+
+
+def lathe(profile: list[tuple[float, float]], T_link_part: Array) -> trimesh.Trimesh:
+    """A closed (radius, z) `profile`, counter-clockwise, turned about z and placed.
+
+    A profile that touches the axis starts and ends there with radius 0.
+    """
+    angles = 2 * np.pi * np.arange(SEGMENTS) / SEGMENTS
+    rings = np.array(
+        [[(r * np.cos(a), r * np.sin(a), z) for a in angles] for r, z in profile]
+    ).reshape(-1, 3)
+    faces = []
+    rows = len(profile)
+    for i in range(rows):
+        j = (i + 1) % rows
+        for s in range(SEGMENTS):
+            t = (s + 1) % SEGMENTS
+            a, b = i * SEGMENTS + s, i * SEGMENTS + t
+            c, d = j * SEGMENTS + s, j * SEGMENTS + t
+            faces += [(a, b, d), (a, d, c)]
+    mesh = trimesh.Trimesh(rings, faces, process=False)
+    mesh.merge_vertices(digits_vertex=9)
+    mesh.update_faces(mesh.nondegenerate_faces(height=1e-9))
+    mesh.apply_transform(T_link_part)
+    return mesh
+
+
+def cap(radius: float, height: float, side: int) -> trimesh.Trimesh:
+    """A cover on the pitch housing whose face is at `side` * y, `height` above the link's origin."""
+    knots = [(0.0, -0.002), (radius, -0.002), (radius, 0.0002), (radius - 0.0012, PROUD)]
+    inner = 0.30 * radius
+    knots += [(inner + 0.002, PROUD), (inner, 0.0001), (inner - 0.002, PROUD), (0.0, PROUD)]
+    width = {k.P2: k.W2, k.P4: k.W4, k.P6: k.W6}[round(radius + 0.025, 6)]
+    T = np.eye(4)
+    T[:3, :3] = [[1, 0, 0], [0, 0, side], [0, -side, 0]]
+    T[:3, 3] = 0.0, side * width, height
+    return lathe(knots, T)
+
+
+def ring(radius: float, low: float, high: float) -> trimesh.Trimesh:
+    """A band around a round joint face, from `low` to `high`."""
+    outer, inner = radius + PROUD, radius - 0.003
+    bevel = 0.0006
+    knots = [(inner, low), (outer - bevel, low), (outer, low + bevel)]
+    knots += [(outer, high - bevel), (outer - bevel, high), (inner, high)]
+    return lathe(knots, np.eye(4))
+
+
+def plate() -> trimesh.Trimesh:
+    """The plate under the base sensor, fixed to the ground."""
+    top = k.MOUNT - 0.0012
+    knots = [(0.0, 0.0), (0.134, 0.0), (0.134, 0.012), (0.131, 0.015), (0.118, 0.0155)]
+    knots += [(0.117, 0.017), (0.117, top - 0.001), (0.116, top), (0.0, top)]
+    return lathe(knots, np.eye(4))
+
+
+def trims() -> dict[str, trimesh.Trimesh]:
+    """The drawn parts by link."""
+    e = 0.025
+    upper = (k.SHOULDER_TO_ROLL_3, k.ELBOW_TO_ROLL_5)
+    parts = {
+        "base_mount": [plate()],
+        "link0": [ring(k.R1, k.BASE_TO_ROLL_1 - 0.017, k.BASE_TO_ROLL_1 - 0.009)],
+        "link1": [cap(k.P2 - e, k.ROLL_1_TO_SHOULDER, -1)],
+        "link2": [cap(k.P2 - e, 0.0, 1), ring(k.R3, upper[0] - 0.015, upper[0] - 0.008)],
+        "link3": [cap(k.P4 - e, k.ROLL_3_TO_ELBOW, -1)],
+        "link4": [cap(k.P4 - e, 0.0, 1), ring(k.R5, upper[1] - 0.014, upper[1] - 0.008)],
+        "link6": [cap(k.P6 - e, 0.0, 1)],
+    }
+    return {name: trimesh.util.concatenate(meshes) for name, meshes in parts.items()}
