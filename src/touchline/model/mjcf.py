@@ -67,14 +67,14 @@ class MjcfReader:
 
         self.lost = lost
 
-        self.mujoco = mujoco
+        self.mujoco: Any = mujoco  # its stubs lack most names
         self.model = model
         self.name = model.names[: model.names.index(b"\0")].decode() or "mjcf"
         self.kinds = {
-            int(mujoco.mjtJoint.mjJNT_HINGE): "revolute",
-            int(mujoco.mjtJoint.mjJNT_SLIDE): "prismatic",
-            int(mujoco.mjtJoint.mjJNT_FREE): "free",
-            int(mujoco.mjtJoint.mjJNT_BALL): "ball",
+            int(self.mujoco.mjtJoint.mjJNT_HINGE): "revolute",
+            int(self.mujoco.mjtJoint.mjJNT_SLIDE): "prismatic",
+            int(self.mujoco.mjtJoint.mjJNT_FREE): "free",
+            int(self.mujoco.mjtJoint.mjJNT_BALL): "ball",
         }
 
     def gravity(self) -> Array:
@@ -103,7 +103,7 @@ class MjcfReader:
         """Return the joints with the equalities in them, and a note for each that is left out."""
         model, notes = self.model, []
         joint_kind = int(self.mujoco.mjtEq.mjEQ_JOINT)
-        for index in np.flatnonzero(model.eq_active0):
+        for index in map(int, np.flatnonzero(model.eq_active0)):
             name = model.equality(index).name or f"number {index + 1}"
             if int(model.eq_type[index]) != joint_kind:
                 kind = (

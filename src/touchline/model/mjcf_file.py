@@ -2,6 +2,7 @@
 """Compiling an MJCF that may name meshes which are not there."""
 
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +25,7 @@ def compile_mjcf(path: Path) -> tuple[Any, list[LostMesh]]:
     Raises:
         InputError: MuJoCo's own message; or the mass of a body comes from a lost mesh.
     """
-    import mujoco
-
+    mujoco: Any = import_module("mujoco")  # its stubs lack most names
     try:
         return mujoco.MjModel.from_xml_path(str(path)), []
     except ValueError as error:
@@ -41,8 +41,10 @@ def compile_mjcf(path: Path) -> tuple[Any, list[LostMesh]]:
 
 
 def _leave_out_meshes(spec: Any, path: Path) -> list[LostMesh]:
-    """Delete each mesh that cannot be read, and the geoms made of it."""
+    """Delete each mesh that cannot be read, and the geoms made of it; name nameless bodies."""
     lost, problems = [], []
+    for index, body in enumerate(spec.bodies):
+        body.name = body.name or f"body_{index}"
     for mesh in [mesh for mesh in spec.meshes if mesh.file]:
         problem = _problem(spec, mesh.file, path)
         if problem is None:
