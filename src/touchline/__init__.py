@@ -1,2 +1,35 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sense of touch for a robot arm without a skin."""
+"""The sense of touch for a robot arm without a skin.
+
+import touchline as tl
+
+robot = tl.load_robot("sara")
+pipeline = tl.Pipeline(robot)
+result = pipeline.update(time, q, qd, tau, wrench)
+"""
+
+from touchline.contact.contact import Candidate, Contact
+from touchline.contact.detector import Level
+from touchline.contact.event import Event
+from touchline.contact.pipeline import Pipeline, Result
+from touchline.errors import InputError
+from touchline.estimation.observer import Estimate, Observer
+from touchline.health import Health
+from touchline.model.robot import Robot, load_robot
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Candidate",
+    "Contact",
+    "Estimate",
+    "Event",
+    "Health",
+    "InputError",
+    "Level",
+    "Observer",
+    "Pipeline",
+    "Result",
+    "Robot",
+    "load_robot",
+]

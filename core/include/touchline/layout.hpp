@@ -83,9 +83,11 @@ class Layout {
       segment_of_sensor[s] = static_cast<int>(segments.size());
       segments.push_back({static_cast<int>(s), {}});
     }
+    // What is bolted to the world inboard of the first sensor cannot be felt: no segment.
     bool root = false;
     for (std::size_t n = 0; n < tree_.nodes().size(); ++n) {
-      root = root || inboard(static_cast<int>(n), true) < 0;
+      const bool moves = tree_.nodes()[n].kind != NodeKind::fixed;
+      root = root || (moves && inboard(static_cast<int>(n), true) < 0);
     }
     if (root) segments.push_back({-1, {}});
     for (Segment& segment : segments) {

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, norm
+from scipy.special import chdtri, erfc
 
 from touchline.model.description import DetectionDescription, LevelDescription
 from touchline.model.robot import Robot
@@ -64,8 +64,8 @@ def make_thresholds(robot: Robot, period: float = 1e-3) -> Thresholds:
             rows += _wrench_rows(g, segment, segment_sigma[segment], detection)
         rows += _joint_rows(robot, g, segment, joint_sigma, detection)
     counts = np.bincount([row.segment for row in rows], minlength=len(robot.segment_names))
-    alarm = 2 * norm.sf(SIGMAS)
-    return Thresholds(tuple(rows), chi2.isf(alarm, np.maximum(counts, 1)) / SIGMAS**2)
+    alarm = erfc(SIGMAS / np.sqrt(2))  # of one row: a normal variable beyond +-SIGMAS
+    return Thresholds(tuple(rows), chdtri(np.maximum(counts, 1), alarm) / SIGMAS**2)
 
 
 def residual_noise(robot: Robot, period: float) -> tuple[Array, dict[str, Array]]:
@@ -87,9 +87,9 @@ def residual_noise(robot: Robot, period: float) -> tuple[Array, dict[str, Array]
         momenta = [robot.terms(q, speed)[0] for speed in np.diag(noise.qd)]
         columns = np.stack(momenta, axis=-1).reshape(n + 6 * k, n)
         momentum_var = np.maximum(momentum_var, np.square(K[:, None] * columns[:n]).sum(axis=1))
-        for name in segments:
+        for name, so_far in segments.items():
             variance = _segment_variance(robot, name, q, columns[n:].reshape(k, 6, n), period)
-            segments[name] = np.maximum(segments[name], variance)
+            segments[name] = np.maximum(so_far, variance)
     return np.sqrt(joint_var + momentum_var), {s: np.sqrt(v) for s, v in segments.items()}
 
 

@@ -66,6 +66,12 @@ def shipped_robots() -> dict[str, Path]:
     return found
 
 
+def shipped_descriptions() -> dict[str, Path]:
+    """Return the `robot.yaml` of each robot that ships with Touchline, by name."""
+    root = Path(str(files("touchline"))) / "robots"
+    return {file.parent.name: file for file in sorted(root.glob("*/robot.yaml"))}
+
+
 def installed_shares(package: str) -> Iterator[Path]:
     """Yield the folders where an installed package of this name may keep its files.
 

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline import _core
+from touchline.errors import InputError
 from touchline.model.description import JointDescription, RobotDescription, SensorDescription
 from touchline.model.mechanism import Mechanism
+from touchline.model.suggest import did_you_mean
 from touchline.model.tree import Node, Place, TreeBuilder
 
 Array = NDArray[np.float64]
@@ -252,12 +254,25 @@ def _native_node(node: Node) -> _core.Node:
     )
 
 
-def load_robot(path: str | Path) -> Robot:
-    """Reads a `robot.yaml`, or a robot that ships with Touchline by its name.
+def load_robot(robot: str | Path) -> Robot:
+    """Reads a robot.
+
+    Args:
+        robot: path of a `robot.yaml`, or the name of a robot that ships with Touchline ("sara").
 
     Raises:
         InputError: with every problem of the file at once.
     """
     from touchline.model.loading import read_robot_file
+    from touchline.model.packages import shipped_descriptions
 
-    return Robot(*read_robot_file(path))
+    shipped = shipped_descriptions()
+    if not Path(robot).suffix and not Path(robot).exists():
+        if str(robot) not in shipped:
+            known = ", ".join(shipped)
+            raise InputError(
+                f"{robot}: no such file, and no robot of this name ships with Touchline; "
+                f"there are: {known}{did_you_mean(str(robot), shipped)}"
+            )
+        robot = shipped[str(robot)]
+    return Robot(*read_robot_file(robot))
