@@ -50,9 +50,8 @@ class Expander:
         """Return K [rad/s] per joint and per sensor."""
         where = "observer.bandwidth"
         if not isinstance(given, dict):
-            return self._per_joint(where, given, values.positive), dict.fromkeys(
-                self.sensor_names, given
-            )
+            sensors = {name: float(given) for name in self.sensor_names}
+            return self._per_joint(where, given, values.positive), sensors
         for key in given:
             if key not in ("joints", *self.sensor_names):
                 known = ("joints", *self.sensor_names)
