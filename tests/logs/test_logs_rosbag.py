@@ -295,7 +295,8 @@ def test_folder_without_recording(tmp_path):
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("keep", [0.7, 0.9, 0.999])
 def test_cut_off_file_is_read_as_far_as_it_goes(tmp_path, kind, keep):
-    folder = write_bag(tmp_path / "bag", recording(100.0), kind)
+    # A sqlite table whose upper pages lie behind the cut cannot be read; this one has none there.
+    folder = write_bag(tmp_path / "bag", recording({"db3": 60.0, "mcap": 100.0}[kind]), kind)
     file = storage_file(folder, kind)
     robot = describe()
     whole = read_log(file, robot)
@@ -313,7 +314,7 @@ def test_cut_off_file_is_read_as_far_as_it_goes(tmp_path, kind, keep):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_beginning_of_a_file_is_an_error(tmp_path, kind):
-    file = storage_file(write_bag(tmp_path / "bag", recording(100.0), kind), kind)
+    file = storage_file(write_bag(tmp_path / "bag", recording(3.0), kind), kind)
     file.write_bytes(file.read_bytes()[:6000])
     with pytest.raises(InputError, match="not a readable recording, or damaged"):
         open_log(file, describe())

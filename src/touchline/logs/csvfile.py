@@ -103,6 +103,9 @@ class CsvSource:
                 yield block
         except pa.ArrowInvalid as error:
             raise InputError(self._diagnose() or f"{self.path}: {error}") from error
+        if not rows:
+            damage = f" ({stream.damage})" if stream.damage else ""
+            raise InputError(f"{self.path}: no rows below the header{damage}")
         if not quiet:
             self._report_cut(stream, rows)
 

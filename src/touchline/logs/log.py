@@ -129,6 +129,6 @@ def read_log(path: Path | str, description: RobotDescription) -> Samples:
         chunks = list(log.chunks())
     if not chunks:
         empty = {n: np.empty((0, *shape)) for n, shape in signal_shapes(description).items()}
-        return Samples(**empty)
+        return Samples(**empty, row=0)
     names = ("time", "q", "qd", "tau", "wrench")
-    return Samples(**{n: np.concatenate([getattr(c, n) for c in chunks]) for n in names})
+    return Samples(**{n: np.concatenate([getattr(c, n) for c in chunks]) for n in names}, row=0)
