@@ -254,4 +254,4 @@ def test_an_mjcf_in_a_robot_file(tmp_path, nasty):
     )
     robot, mechanism = read_robot_file(tmp_path / "robot.yaml")
     names = [joint.name for joint in robot.joints]
-    assert names == ["offset", "first", "second", "third", "joint_6"]
+    assert names == ["offset", "first", "second", "third", "joint_7"]

@@ -37,6 +37,7 @@ def read(tmp_path, text):
         ("'1'", "1"),
         ("1e", "1e"),
         (".", "."),
+        ("9" * 5000, math.inf),
     ],
 )
 def test_scalars_are_yaml_1_2(tmp_path, text, value):

@@ -38,22 +38,26 @@ def number(value: Any, _: Any = None) -> float:
     """Return a finite number."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"{show(value)} is not a number")
-    if not abs(value) < math.inf:
-        raise ValueError(f"{value} is not a finite number")
-    return float(value)
+    try:
+        read = float(value)
+    except OverflowError:  # an integer of more than 308 digits
+        read = math.inf
+    if not abs(read) < math.inf:
+        raise ValueError(f"{show(value)} is not a finite number")
+    return read
 
 
 def non_negative(value: Any, _: Any = None) -> float:
     """Return a finite number that is not negative."""
     if number(value) < 0:
-        raise ValueError(f"{value} is negative; allowed: 0 or more")
+        raise ValueError(f"{show(value)} is negative; allowed: 0 or more")
     return float(value)
 
 
 def positive(value: Any, _: Any = None) -> float:
     """Return a finite number above 0."""
     if number(value) <= 0:
-        raise ValueError(f"{value} is not allowed; allowed: more than 0")
+        raise ValueError(f"{show(value)} is not allowed; allowed: more than 0")
     return float(value)
 
 
