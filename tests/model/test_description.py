@@ -60,7 +60,7 @@ def test_all_keys_of_the_contract(folder):
         ),
         ("name: arm", "name: arm\npackage_dirs: [.]\ngravity: [0, 0, 9.81]"),
         more="loads: [{link: hand, mass: 0.3, com: [0, 0, 0.1], inertia: [1, 0, 0, 1, 0, 1]}]\n"
-        "links: {base: {mass: 3}}\ndetection: {level: 2}\nlog: {time: t}\n"
+        "links: {base: {mass: 3}}\ndetection: {release: 0.5}\nlog: {time: t}\n"
         "noise: {q: 1e-5, qd: [1e-3, 2e-3], base_ft: 0.1, wrist: [1, 2, 3]}\n"
         "observer: {bandwidth: {joints: [10, 20], wrist: 50}}\n",
     )
@@ -85,7 +85,7 @@ def test_all_keys_of_the_contract(folder):
     assert robot.links["base"].com is None
     assert robot.loads[0].inertia == (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
     assert (robot.gravity, robot.package_dirs) == ((0.0, 0.0, 9.81), (folder / ".",))
-    assert (robot.detection, robot.log) == ({"level": 2}, {"time": "t"})
+    assert (robot.detection.release, robot.log) == (0.5, {"time": "t"})
 
 
 def test_without_joints_all_that_move_are_observed(folder):
