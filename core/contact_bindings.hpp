@@ -95,12 +95,15 @@ inline void write(const tl::Localizer& l, const tl::Answer& a, double* out) {
   out[0] = static_cast<double>(a.status);
   out[22] = a.count;
   out[1] = out[2] = -1.0;
+  const double force[3] = {a.force.x, a.force.y, a.force.z};
+  std::copy(force, force + 3, out + 7);
   if (a.count == 0) return;
-  out[1] = a.candidates[0].surface;
-  out[2] = l.surfaces()[a.candidates[0].surface].node;
+  const tl::Candidate& best = a.candidates[0];
+  out[1] = best.surface;
+  out[2] = l.surfaces()[best.surface].node;
   out[3] = a.body_probability;
-  const double numbers[6] = {a.point.x, a.point.y, a.point.z, a.force.x, a.force.y, a.force.z};
-  std::copy(numbers, numbers + 6, out + 4);
+  const double point[3] = {best.point.x, best.point.y, best.point.z};
+  std::copy(point, point + 3, out + 4);
   std::copy(a.covariance, a.covariance + 9, out + 10);
   out[19] = a.pitch;
   out[20] = a.chi2;
@@ -129,33 +132,70 @@ inline Out locate(tl::Localizer& l, int segment, const In& row, const std::optio
   return array(out, 1, kWidth);
 }
 
-// For each sample and each segment whose level is not 0: its sample, its segment, its answer.
-inline Out locate_run(tl::Localizer& l, const In& rows, const In& normalized, const In& levels,
-                      const In& q, const In& qd) {
+// An event as numbers: status, time of the position, variance of the position, number of places,
+// the joint positions at that time, then per place surface, node, probability, point in the
+// frame of the node; the most probable body's best first.
+inline void push_event(tl::Localizer& l, int g, std::vector<double>& out) {
+  tl::EventPlace& event = l.conclude_event(g);
+  const std::size_t end = out.size() + 4 + l.joints() + kPerCandidate * tl::EventPlace::kPlaces;
+  out.insert(out.end(), {static_cast<double>(l.event_status(g)), event.time(), event.variance(),
+                         static_cast<double>(event.count())});
+  out.insert(out.end(), l.event_q(g).begin(), l.event_q(g).end());
+  for (int i = 0; i < event.count(); ++i) {
+    const tl::Place& p = event.place(i);
+    const tl::LinkSurface& surface = l.surfaces()[p.surface];
+    const tl::Vec3 point = surface.mesh.nearest_to_point(p.point).point;
+    out.insert(out.end(), {static_cast<double>(p.surface), static_cast<double>(surface.node),
+                           p.share, point.x, point.y, point.z});
+  }
+  out.resize(end, std::nan(""));
+}
+
+inline Out event(tl::Localizer& l, int segment) {
+  if (segment < 0 || static_cast<std::size_t>(segment) >= l.segments())
+    throw std::invalid_argument("there is no such segment");
+  std::vector<double> out;
+  push_event(l, segment, out);
+  return array(out, 1, out.size());
+}
+
+// N samples: for each sample and each segment that is touched, its sample, its segment, its answer;
+// and for each event that ends, sample, segment, event.
+inline nb::tuple follow(tl::Localizer& l, const In& time, const In& rows, const In& normalized,
+                        const In& levels, const In& q, const In& qd) {
   const std::size_t n = l.joints(), m = l.segments(), r = l.tests(), width = l.width();
-  const std::size_t count = rows.size() / width;
+  const std::size_t count = time.size();
   if (rows.size() != count * width || normalized.size() != count * r ||
       levels.size() != count * m || q.size() != count * n || qd.size() != count * n)
     throw std::invalid_argument("the arrays do not belong to the same samples");
-  std::vector<double> out;
+  std::vector<double> answers, ended;
   {
     nb::gil_scoped_release release;
     for (std::size_t i = 0; i < count; ++i) {
-      const double* level = levels.data() + i * m;
-      if (std::none_of(level, level + m, [](double x) { return x > 0.0; })) continue;
-      l.set_state(q.data() + i * n, qd.data() + i * n);
+      bool ready = false;
       for (std::size_t g = 0; g < m; ++g) {
-        if (!(level[g] > 0.0)) continue;
-        const std::size_t at = out.size();
-        out.resize(at + 2 + kWidth);
-        out[at] = static_cast<double>(i);
-        out[at + 1] = static_cast<double>(g);
-        write(l, l.locate(static_cast<int>(g), rows.data() + i * width, normalized.data() + i * r),
-              out.data() + at + 2);
+        const bool touched = levels.data()[i * m + g] > 0.0;
+        const int segment = static_cast<int>(g);
+        if (l.enter(segment, touched)) {
+          ended.insert(ended.end(), {static_cast<double>(i), static_cast<double>(g)});
+          push_event(l, segment, ended);
+        }
+        if (!touched) continue;
+        if (!ready) l.set_state(q.data() + i * n, qd.data() + i * n);
+        ready = true;
+        const std::size_t at = answers.size();
+        answers.resize(at + 2 + kWidth);
+        answers[at] = static_cast<double>(i);
+        answers[at + 1] = static_cast<double>(g);
+        const double* tests = normalized.data() + i * r;
+        write(l, l.locate(segment, rows.data() + i * width, tests), answers.data() + at + 2);
+        l.remember(segment, tests, time.data()[i], q.data() + i * n);
       }
     }
   }
-  return array(out, out.size() / (2 + kWidth), 2 + kWidth);
+  const std::size_t event_width = 6 + n + kPerCandidate * tl::EventPlace::kPlaces;
+  return nb::make_tuple(array(answers, answers.size() / (2 + kWidth), 2 + kWidth),
+                        array(ended, ended.size() / event_width, event_width));
 }
 
 inline tl::NoiseFigures noise(std::vector<double> qd, std::vector<double> tau,
@@ -220,7 +260,8 @@ inline void bind(nb::module_& m) {
         return array(out, 6, 6);
       })
       .def("locate", &locate, "segment"_a, "row"_a, "normalized"_a.none(), "q"_a, "qd"_a.none())
-      .def("run", &locate_run, "rows"_a, "normalized"_a, "levels"_a, "q"_a, "qd"_a);
+      .def("event", &event, "segment"_a)
+      .def("follow", &follow, "time"_a, "rows"_a, "normalized"_a, "levels"_a, "q"_a, "qd"_a);
 }
 
 }  // namespace contact

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a segment is touched: all entries of the line of force action into all its links, the
-// nearest surface where the line misses, sampled points where there is no line; each weighed by
-// its posterior given the wrench, the joint rows and their covariance. No allocation per sample.
+// Where a segment is touched: each explanation weighed by its posterior given the wrench, the joint
+// rows and their covariance; and where an event is, from all its samples. No allocation per sample.
 #pragma once
 
 #include <algorithm>
@@ -10,39 +9,25 @@
 #include <stdexcept>
 #include <vector>
 
-#include "touchline/hypothesis.hpp"
-#include "touchline/measurement.hpp"
-#include "touchline/mesh.hpp"
+#include "touchline/event_place.hpp"
+#include "touchline/explanations.hpp"
 
 namespace touchline {
 
 enum class Status { none = 0, located = 1, ambiguous = 2, not_separable = 3, wrench_only = 4 };
 
-// The surface of one link, in the frame of the node that carries it.
-struct LinkSurface {
-  int node;
-  Mesh mesh;
-};
-
-struct Candidate {
-  int surface = -1;  // index of the link's surface
-  Vec3 point, normal;
-  Fit fit;
-  int view = 0;         // of the localizer's bodies
-  double weight = 0.0;  // log of the posterior, then the probability
-};
-
 struct Answer {
+  static constexpr int kCandidates = 8;
   Status status = Status::none;
-  int count = 0;            // of candidates, best first
+  int count = 0;                      // of candidates
+  Candidate candidates[kCandidates];  // the most probable body's best first
   double body_probability = 0.0;
-  Vec3 point, force;
-  double covariance[9] = {};  // of the point
+  Vec3 force;
+  double covariance[9] = {};  // of the first candidate's point
+  double spread = 0.0;        // root of its trace
   double pitch = 0.0;         // in standard deviations
   double chi2 = 0.0;
-  int degrees = 0;            // of freedom of chi2
-  static constexpr int kCandidates = 8;
-  Candidate candidates[kCandidates];
+  int degrees = 0;  // of freedom of chi2
 };
 
 class Localizer {
@@ -51,22 +36,18 @@ class Localizer {
             std::vector<LinkSurface> surfaces, LocalizerSettings settings)
       : observer_(observer),
         settings_(settings),
-        fitter_(settings_),
+        period_(noise.period),
         measurement_(observer, std::move(tests), std::move(noise)),
-        surfaces_(std::move(surfaces)) {
-    for (int g = 0; g < observer.row_layout().segments; ++g) bodies_.push_back(bodies_of(g));
-    std::size_t most = 0;
-    for (const auto& bodies : bodies_) most = std::max(most, bodies.size());
-    views_.resize(most);
-    candidates_.resize(kMost);
-    for (std::size_t i = 0; i < surfaces_.size(); ++i) sample(surfaces_[i]);
+        found_(observer, measurement_, settings_, std::move(surfaces)),
+        following_(observer.row_layout().segments) {
+    for (Following& f : following_) f.q.resize(observer.row_layout().joints, kNaN);
   }
 
   Localizer(const Localizer&) = delete;
   Localizer& operator=(const Localizer&) = delete;
 
-  const std::vector<LinkSurface>& surfaces() const { return surfaces_; }
-  const Tree& tree() const { return measurement_.tree(); }
+  const std::vector<LinkSurface>& surfaces() const { return found_.surfaces(); }
+  const Measurement& measurement() const { return measurement_; }
 
   // Sizes of what the methods below take.
   std::size_t joints() const { return observer_.row_layout().joints; }
@@ -83,6 +64,9 @@ class Localizer {
       throw std::invalid_argument("an array has a size that does not belong to this robot");
   }
 
+  // The configuration of the sample; `qd` may be null.
+  void set_state(const double* q, const double* qd) { measurement_.set_state(q, qd); }
+
   // Covariance (6, 6) of a segment's wrench; false where it has none.
   bool wrench_covariance(int g, const double* row, double* out) {
     if (!measurement_.read(g, row, nullptr) || !measurement_.has_wrench()) return false;
@@ -90,341 +74,138 @@ class Localizer {
     return true;
   }
 
-  // The configuration of the sample; `qd` may be null.
-  void set_state(const double* q, const double* qd) { measurement_.set_state(q, qd); }
-
   // The contact on segment g, from the observer's row and the detector's normalized rows (or null).
   const Answer& locate(int g, const double* row, const double* normalized) {
     answer_.status = Status::none;
     answer_.count = 0;
-    count_ = 0;
+    answer_.force = {kNaN, kNaN, kNaN};
     if (!measurement_.read(g, row, normalized)) return answer_;
-    if (settings_.first_entry) return first_entry(g);
-    if (measurement_.has_wrench() && weak()) {
-      answer_.status = Status::wrench_only;
-      return answer_;
+    if (measurement_.has_wrench()) {
+      const double* w = measurement_.wrench();
+      answer_.force = {w[0], w[1], w[2]};
     }
-    view_bodies(g);
-    gather();
-    weigh();
-    conclude(g);
+    if (settings_.first_entry) {
+      first_entry(g);
+    } else if (measurement_.has_wrench() && weak()) {
+      answer_.status = Status::wrench_only;
+    } else {
+      found_.find(g, measurement_);
+      weigh();
+      conclude(g);
+    }
     return answer_;
   }
 
+  // Notes whether segment g is touched; true when its event has just ended.
+  bool enter(int g, bool touched) {
+    Following& f = following_[g];
+    if (touched && !f.touched) f.event.restart();
+    const bool ended = f.touched && !touched;
+    f.touched = touched;
+    return ended;
+  }
+
+  // Adds the answer at hand to the event on segment g, at `time` [s] and joint positions `q`.
+  void remember(int g, const double* normalized, double time, const double* q) {
+    Following& f = following_[g];
+    const double strength = measurement_.strength(g, normalized);
+    if (!f.event.begin_sample(strength, time, 0.5 * period_ * bandwidth(g))) return;
+    std::copy(q, q + f.q.size(), f.q.begin());
+    f.event.add_status(static_cast<int>(answer_.status));
+    if (answer_.status != Status::located && answer_.status != Status::ambiguous) return;
+    f.event.open();
+    for (int i = 0; i < answer_.count; ++i) {
+      const Candidate& k = answer_.candidates[i];
+      f.event.add(k.surface, found_.to_node(k.point, node_of(k)), k.weight,
+                  k.along[0] + k.along[2], settings_.place_radius);
+    }
+    f.event.close(answer_.spread * answer_.spread);
+  }
+
+  // The event on segment g with its places weighed, those of the most probable body first.
+  EventPlace& conclude_event(int g) {
+    following_[g].event.conclude([this](int surface) { return surfaces()[surface].node; });
+    return following_[g].event;
+  }
+  // Joint positions at the time of the event's position.
+  const std::vector<double>& event_q(int g) const { return following_[g].q; }
+
+  Status event_status(int g) const {
+    const EventPlace& event = following_[g].event;
+    if (event.count() == 0 || event.mostly_unexplained())
+      return static_cast<Status>(event.frequent(3, 4));
+    double here = 0.0;
+    for (int i = 0; i < event.count(); ++i) {
+      const Place &a = event.place(0), &b = event.place(i);
+      if (a.surface == b.surface && norm(a.point - b.point) < settings_.place_radius)
+        here += b.share;
+    }
+    const bool sharp = event.variance() < spread_limit() * spread_limit();
+    return here >= settings_.certain && sharp ? Status::located : Status::ambiguous;
+  }
+
  private:
-  static constexpr int kMost = 192, kSamples = 128, kStarts = 3;
-  static constexpr double kWindow = 50.0;  // of chi2: beyond it an explanation weighs nothing
+  static constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  static constexpr double kNegligible = 10.0;  // of the log posterior, below the best
 
-  struct Body {
-    int node;
-    std::vector<int> surfaces;
-  };
-  // What the measurements say if the contact is on this body.
-  struct View {
-    const Body* body = nullptr;
-    Quadratic q;
-    bool line = false;        // is there a line of force action?
-    double floor = 0.0;       // chi2 that no point of the body goes below
-    double pitch = 0.0;
-    Spatial wrench;           // the pure force that explains best
-    bool hit = false;
-  };
-  struct Sample {
-    Vec3 point, normal;
+  struct Following {
+    EventPlace event;
+    bool touched = false;
+    std::vector<double> q;
   };
 
-  std::vector<Body> bodies_of(int g) const {
-    std::vector<Body> bodies;
-    for (std::size_t i = 0; i < surfaces_.size(); ++i) {
-      const int node = surfaces_[i].node;
-      if (segment_of(node) != g) continue;
-      auto found = std::find_if(bodies.begin(), bodies.end(),
-                                [node](const Body& b) { return b.node == node; });
-      if (found == bodies.end()) {
-        bodies.push_back({node, {}});
-        found = bodies.end() - 1;
-      }
-      found->surfaces.push_back(static_cast<int>(i));
-    }
-    return bodies;
+  double bandwidth(int g) const {
+    const int sensor = observer_.layout().segments[g].sensor;
+    if (sensor >= 0) return observer_.sensors()[sensor].bandwidth;
+    double least = std::numeric_limits<double>::infinity();
+    for (const JointRow& joint : observer_.joints()) least = std::min(least, joint.bandwidth);
+    return least;
   }
 
-  // Segment of a node; -1 for what cannot be felt.
-  int segment_of(int node) const {
-    const auto& segments = observer_.layout().segments;
-    bool moves = false;
-    for (int n = node; n >= 0; n = tree().nodes()[n].parent) {
-      for (std::size_t g = 0; g < segments.size(); ++g) {
-        if (segments[g].sensor >= 0 && observer_.sensors()[segments[g].sensor].node == n)
-          return static_cast<int>(g);
-      }
-      moves = moves || tree().nodes()[n].kind != NodeKind::fixed;
-    }
-    if (!moves || segments.back().sensor >= 0) return -1;
-    return static_cast<int>(segments.size()) - 1;
-  }
-
-  // Points spread evenly over a surface.
-  void sample(const LinkSurface& surface) {
-    samples_.emplace_back();
-    const auto& triangles = surface.mesh.triangles();
-    double total = 0.0;
-    for (const Triangle& t : triangles) total += norm(cross(t.ab, t.ac));
-    double passed = 0.0, next = 0.5 * total / kSamples, u = 0.0, v = 0.0;
-    for (const Triangle& t : triangles) {
-      for (passed += norm(cross(t.ab, t.ac)); next < passed; next += total / kSamples) {
-        u = std::fmod(u + 0.7548776662466927, 1.0);
-        v = std::fmod(v + 0.5698402909980532, 1.0);
-        const bool inside = u + v <= 1.0;
-        samples_.back().push_back(
-            {t.a + (inside ? u : 1.0 - u) * t.ab + (inside ? v : 1.0 - v) * t.ac, t.normal});
-      }
-    }
-  }
-
-  bool weak() {
+  // Too small a force to draw a line.
+  bool weak() const {
     double C[36];
     measurement_.wrench_covariance(C);
-    const double* w = measurement_.wrench();
-    const double variance = C[0] + C[7] + C[14];
-    const double size2 = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
-    return size2 < settings_.least_force * settings_.least_force || size2 < 16.0 * variance;
+    const double size2 = dot(answer_.force, answer_.force);
+    return size2 < settings_.least_force * settings_.least_force ||
+           size2 < 16.0 * (C[0] + C[7] + C[14]);
   }
 
-  void view_bodies(int g) {
-    used_ = 0;
-    for (const Body& body : bodies_[g]) {
-      View& view = views_[used_++];
-      view = View{};
-      view.body = &body;
-      view.q = measurement_.quadratic(body.node);
-      find_line(view);
-    }
-    std::sort(views_.begin(), views_.begin() + used_,
-              [](const View& a, const View& b) { return a.floor < b.floor; });
-  }
-
-  // The most likely wrench among those of one pure force: f . m = 0.
-  void find_line(View& view) {
-    double L[36], w[6];
-    std::copy(view.q.information, view.q.information + 36, L);
-    view.line = cholesky(L, 6, 1e-9);
-    if (!view.line) return;
-    std::copy(view.q.vector, view.q.vector + 6, w);
-    solve_cholesky(L, 6, w);
-    for (int pass = 0; pass < 3; ++pass) {
-      const double g[6] = {w[3], w[4], w[5], w[0], w[1], w[2]};
-      double step[6];
-      std::copy(g, g + 6, step);
-      solve_cholesky(L, 6, step);
-      double power = 0.0, variance = 0.0;
-      for (int i = 0; i < 3; ++i) power += w[i] * w[3 + i];
-      for (int i = 0; i < 6; ++i) variance += g[i] * step[i];
-      if (!(variance > 0.0)) break;
-      if (pass == 0) view.pitch = power / std::sqrt(variance);
-      for (int i = 0; i < 6; ++i) w[i] -= power / variance * step[i];
-    }
-    view.floor = std::max(0.0, view.q(w));
-    view.wrench = {{w[0], w[1], w[2]}, {w[3], w[4], w[5]}};
-    view.line = dot(view.wrench.linear, view.wrench.linear) > 1e-12;
-  }
-
-  static Line line_of(const Spatial& w) {
-    const double size2 = dot(w.linear, w.linear);
-    return {(1.0 / size2) * cross(w.linear, w.angular), (1.0 / std::sqrt(size2)) * w.linear};  // (19)
-  }
-
-  Line to_node(const Line& line, int node) const {
-    const Pose& X = tree().state(node).pose;
-    return {transposed_times(X.R, line.origin - X.p), transposed_times(X.R, line.direction)};
-  }
-  Vec3 to_world(const Vec3& p, int node) const {
-    const Pose& X = tree().state(node).pose;
-    return X.R * p + X.p;
-  }
-
-  void gather() {
-    best_ = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < used_; ++i) {
-      if (views_[i].line && views_[i].floor < best_ + kWindow) enter(views_[i]);
-    }
-    for (int i = 0; i < used_; ++i) {
-      View& view = views_[i];
-      if (view.hit || view.floor >= best_ + kWindow) continue;
-      if (view.line) miss(view);
-      if (!measurement_.has_wrench()) search(view);
-    }
-  }
-
-  // All entries of the line into the body.
-  void enter(View& view) {
-    const Line line = line_of(view.wrench);
-    for (int s : view.body->surfaces) {
-      const int node = view.body->node, before = count_;
-      const Pose& X = tree().state(node).pose;
-      surfaces_[s].mesh.crossings(to_node(line, node), [&](const Crossing& c) {
-        const Vec3 normal = X.R * c.normal;
-        if (dot(normal, line.direction) >= 0.0 || count_ == kMost) return;
-        Candidate& k = candidates_[count_];
-        k.surface = s;
-        k.point = line.at(c.t);
-        for (int i = before; i < count_; ++i) {  // an edge is met twice
-          if (norm(candidates_[i].point - k.point) < 1e-7) return;
-        }
-        k.normal = normal;
-        k.fit.force = view.wrench.linear;
-        fitter_.judge(view.q, k.point, normal, k.fit);
-        k.view = static_cast<int>(&view - views_.data());
-        if (k.fit.cone < 4.0) view.hit = true;
-        if (std::isfinite(k.fit.cone)) keep();
-      });
-    }
-  }
-
-  void keep() {
-    best_ = std::min(best_, candidates_[count_].fit.cost());
-    if (count_ < kMost) ++count_;
-  }
-
-  // The surface nearest to the line, and from there the best explanation nearby.
-  void miss(View& view) {
-    const Line line = line_of(view.wrench);
-    for (int s : view.body->surfaces) {
-      const SurfacePoint p = surfaces_[s].mesh.nearest_to_line(to_node(line, view.body->node));
-      if (p.face < 0 || count_ == kMost) continue;
-      place(view, s, p);
-      Candidate& k = candidates_[count_];
-      if (k.fit.chi2 > best_ + kWindow) continue;
-      refine(view, k);
-      if (k.fit.cost() < best_ + kWindow) keep();
-    }
-  }
-
-  void place(const View& view, int surface, const SurfacePoint& p) {
-    Candidate& k = candidates_[count_];
-    k.surface = surface;
-    k.point = to_world(p.point, view.body->node);
-    k.normal = tree().state(view.body->node).pose.R * p.normal;
-    k.fit = fitter_.fit(view.q, k.point, k.normal);
-    k.view = static_cast<int>(&view - views_.data());
-  }
-
-  // Without a line: the best of the points spread over each link, each improved.
-  void search(View& view) {
-    for (int s : view.body->surfaces) {
-      Candidate starts[kStarts];
-      int found = 0;
-      for (const Sample& sample : samples_[s]) {
-        if (count_ == kMost) return;
-        place(view, s, {0.0, 0, sample.point, sample.normal});
-        found = insert(starts, found, candidates_[count_]);
-      }
-      for (int i = 0; i < found && count_ < kMost; ++i) {
-        candidates_[count_] = starts[i];
-        refine(view, candidates_[count_]);
-        if (candidates_[count_].fit.cost() < best_ + kWindow && !known(s)) keep();
-      }
-    }
-  }
-
-  // Keeps the best few, apart from each other.
-  static int insert(Candidate* starts, int found, const Candidate& k) {
-    constexpr double apart = 0.04;
-    for (int i = 0; i < found; ++i) {
-      if (norm(starts[i].point - k.point) < apart) {
-        if (k.fit.cost() < starts[i].fit.cost()) starts[i] = k;
-        return found;
-      }
-    }
-    if (found < kStarts) {
-      starts[found] = k;
-      return found + 1;
-    }
-    auto worst = std::max_element(starts, starts + found, [](const Candidate& a, const Candidate& b) {
-      return a.fit.cost() < b.fit.cost();
-    });
-    if (k.fit.cost() < worst->fit.cost()) *worst = k;
-    return found;
-  }
-
-  bool known(int surface) const {
-    for (int i = 0; i < count_; ++i) {
-      if (candidates_[i].surface == surface &&
-          norm(candidates_[i].point - candidates_[count_].point) < 5e-3)
-        return true;
-    }
-    return false;
-  }
-
-  // Moves over the surface downhill: Gauss-Newton steps, then smaller and smaller trials around.
-  void refine(const View& view, Candidate& k) {
-    for (int i = 0; i < 6; ++i) {
-      double H[25], g[5];
-      fitter_.information(view.q, k.point, k.normal, k.fit.force, H, g);
-      if (!cholesky(H, 5)) break;
-      solve_cholesky(H, 5, g);
-      Vec3 s, t;
-      tangents(k.normal, s, t);
-      Vec3 step = g[3] * s + g[4] * t;
-      const double length = norm(step);
-      if (length < 1e-5) break;
-      if (length > 0.03) step = (0.03 / length) * step;
-      if (!try_point(view, k, k.point + step)) break;
-    }
-    for (double radius = 0.016; radius > 1e-3; radius *= 0.5) {
-      for (int round = 0; round < 4 && better_around(view, k, radius); ++round) {
-      }
-    }
-  }
-
-  bool better_around(const View& view, Candidate& k, double radius) {
-    Vec3 s, t;
-    tangents(k.normal, s, t);
-    const Vec3 centre = k.point;
-    bool better = false;
-    for (int i = 0; i < 6; ++i) {
-      const double a = 1.0471975511965976 * i;
-      better |= try_point(view, k, centre + radius * (std::cos(a) * s + std::sin(a) * t));
-    }
-    return better;
-  }
-
-  bool try_point(const View& view, Candidate& k, const Vec3& target) {
-    const Pose& X = tree().state(view.body->node).pose;
-    const SurfacePoint p =
-        surfaces_[k.surface].mesh.nearest_to_point(transposed_times(X.R, target - X.p), 0.05);
-    if (p.face < 0) return false;
-    const Vec3 point = to_world(p.point, view.body->node), normal = X.R * p.normal;
-    const Fit fit = fitter_.fit(view.q, point, normal);
-    if (!(fit.cost() < k.fit.cost() - 1e-6)) return false;
-    k.point = point;
-    k.normal = normal;
-    k.fit = fit;
-    return true;
-  }
-
-  // Log posterior of each candidate: likelihood, the volume of force and surface that explains as
-  // well (Laplace), and how a push comes there.
+  // Posterior of each candidate: likelihood, the volume of force and surface that explains as well
+  // (Laplace), and how a push comes there.
   void weigh() {
     double most = -std::numeric_limits<double>::infinity();
-    for (int i = 0; i < count_; ++i) {
-      Candidate& k = candidates_[i];
-      const View& view = views_[k.view];
+    for (Candidate& k : found_) {
       k.weight = -std::numeric_limits<double>::infinity();
-      if (k.fit.cost() > best_ + kWindow) continue;
+      if (!(k.fit.cost() < found_.best() + Explanations::kWindow)) continue;
       double H[25], g[5];
-      fitter_.information(view.q, k.point, k.normal, k.fit.force, H, g);
+      found_.fitter().information(found_.view(k).q, k.point, k.normal, k.fit.force, H, g);
       if (!cholesky(H, 5)) continue;
-      k.weight = -0.5 * k.fit.cost() - 0.5 * log_determinant(H, 5) +
-                 std::log(std::max(k.fit.cosine, 0.02)) + reachable(k);
+      k.weight = -0.5 * (k.fit.cost() + log_determinant(H, 5)) +
+                 std::log(std::max(k.fit.cosine, 0.02));
       most = std::max(most, k.weight);
+      covariance_along(H, k.along);
+    }
+    double reached = -std::numeric_limits<double>::infinity();
+    for (Candidate& k : found_) {
+      if (k.weight < most - kNegligible) {
+        k.weight = -std::numeric_limits<double>::infinity();
+      } else {
+        k.weight += reachable(k);
+      }
+      reached = std::max(reached, k.weight);
     }
     double sum = 0.0;
-    for (int i = 0; i < count_; ++i) {
-      candidates_[i].weight = std::exp(candidates_[i].weight - most);
-      sum += candidates_[i].weight;
-    }
-    for (int i = 0; i < count_; ++i) candidates_[i].weight /= sum;
+    for (Candidate& k : found_) sum += k.weight = std::exp(k.weight - reached);
+    for (Candidate& k : found_) k.weight /= sum;
+  }
+
+  // The last two by two of (L L^T)^-1.
+  static void covariance_along(const double* L, double* out) {
+    const double a = 1.0 / L[18], b = 1.0 / L[24], c = -L[23] * a * b;
+    out[0] = a * a + c * c;
+    out[1] = c * b;
+    out[2] = b * b;
   }
 
   // Log of the plausibility that a push arrives at a point along its force: not from inside
@@ -435,11 +216,12 @@ class Localizer {
     const Line line{k.point, (1.0 / size) * k.fit.force};
     double nearest = -std::numeric_limits<double>::infinity();
     bool inside = false;
-    for (const LinkSurface& surface : surfaces_) {
-      surface.mesh.crossings(to_node(line, surface.node), [&](const Crossing& c) {
+    for (const LinkSurface& surface : surfaces()) {
+      const Line local = found_.to_node(line, surface.node);
+      surface.mesh.crossings(local, [&](const Crossing& c) {
         if (c.t > -1e-6 || c.t <= nearest) return;
         nearest = c.t;
-        inside = dot(tree().state(surface.node).pose.R * c.normal, line.direction) < 0.0;
+        inside = dot(c.normal, local.direction) < 0.0;
       });
     }
     if (inside) return std::max(-6.0, nearest / 3e-3);
@@ -447,29 +229,35 @@ class Localizer {
   }
 
   void conclude(int g) {
-    std::sort(candidates_.begin(), candidates_.begin() + count_,
+    std::sort(found_.begin(), found_.end(),
               [](const Candidate& a, const Candidate& b) { return a.weight > b.weight; });
-    if (count_ == 0 || !(candidates_[0].weight > 0.0)) {
+    if (found_.count() == 0 || !(found_.begin()->weight > 0.0)) {
       answer_.status = unexplained(g);
       return;
     }
     lead_with_best_body();
-    const Candidate& best = candidates_[0];
-    answer_.count = std::min<int>(count_, Answer::kCandidates);
-    std::copy(candidates_.begin(), candidates_.begin() + answer_.count, answer_.candidates);
-    answer_.point = best.point;
-    answer_.force = best.fit.force;
-    const View& view = views_[best.view];
+    const Candidate& best = *found_.begin();
+    const View& view = found_.view(best);
     answer_.pitch = view.pitch;
     answer_.chi2 = best.fit.chi2;
     answer_.degrees = std::max(1, measurement_.size() - 5);
-    const double spread = spread_of(view, best);
-    const double cone = fitter_.cone_cost(best.fit.cosine);
-    if (std::fabs(view.pitch) > settings_.pitch_limit || cone > 16.0 ||
+    spread_over_surface(best);
+    copy_candidates();
+    if (std::fabs(view.pitch) > settings_.pitch_limit ||
+        found_.fitter().cone_cost(best.fit.cosine) > 16.0 ||
         best.fit.chi2 > chi2_limit(answer_.degrees, settings_.pitch_limit)) {
       answer_.status = unexplained(g);
     } else {
-      answer_.status = certain(spread) ? Status::located : Status::ambiguous;
+      answer_.force = best.fit.force;
+      answer_.status = certain() ? Status::located : Status::ambiguous;
+    }
+  }
+
+  void copy_candidates() {
+    answer_.count = 0;
+    for (const Candidate& k : found_) {
+      if (answer_.count < Answer::kCandidates && (answer_.count == 0 || k.weight > 1e-3))
+        answer_.candidates[answer_.count++] = k;
     }
   }
 
@@ -482,57 +270,48 @@ class Localizer {
                : Status::not_separable;
   }
 
+  int node_of(const Candidate& k) const { return surfaces()[k.surface].node; }
+
   void lead_with_best_body() {
     double most = 0.0;
-    int first = 0;
-    for (int i = 0; i < count_ && candidates_[i].weight > 0.0; ++i) {
+    Candidate* first = found_.begin();
+    for (Candidate& a : found_) {
       double sum = 0.0;
-      for (int j = 0; j < count_; ++j) {
-        if (surfaces_[candidates_[j].surface].node == surfaces_[candidates_[i].surface].node)
-          sum += candidates_[j].weight;
-      }
+      for (const Candidate& b : found_) sum += node_of(a) == node_of(b) ? b.weight : 0.0;
       if (sum > most + 1e-12) {
         most = sum;
-        first = i;
+        first = &a;
       }
     }
     answer_.body_probability = std::min(most, 1.0);
-    std::rotate(candidates_.begin(), candidates_.begin() + first, candidates_.begin() + first + 1);
+    std::rotate(found_.begin(), first, first + 1);
   }
 
+  double spread_limit() const { return 4.0 * settings_.place_radius; }
+
   // Is nearly all of the probability at one place?
-  bool certain(double spread) const {
-    if (spread > 4.0 * settings_.place_radius) return false;
+  bool certain() {
+    if (answer_.spread > spread_limit()) return false;
     double here = 0.0;
-    for (int i = 0; i < count_; ++i) {
-      const Vec3 d = candidates_[i].point - candidates_[0].point;
-      if (norm(d) < settings_.place_radius) here += candidates_[i].weight;
+    for (const Candidate& k : found_) {
+      if (norm(k.point - found_.begin()->point) < settings_.place_radius) here += k.weight;
     }
     return here >= settings_.certain;
   }
 
-  // Covariance of the point along its surface; returns the root of the trace.
-  double spread_of(const View& view, const Candidate& k) {
-    double H[25], g[5];
-    fitter_.information(view.q, k.point, k.normal, k.fit.force, H, g);
-    std::fill(answer_.covariance, answer_.covariance + 9, 0.0);
-    if (!cholesky(H, 5)) return std::numeric_limits<double>::infinity();
-    Vec3 along[2];
-    tangents(k.normal, along[0], along[1]);
-    double trace = 0.0;
-    for (int a = 0; a < 2; ++a) {
-      double e[5] = {0, 0, 0, a == 0 ? 1.0 : 0.0, a == 1 ? 1.0 : 0.0};
-      solve_cholesky(H, 5, e);
-      for (int i = 0; i < 3; ++i) {
-        for (int j = 0; j < 3; ++j) {
-          for (int b = 0; b < 2; ++b)
-            answer_.covariance[3 * i + j] +=
-                component(along[a], i) * e[3 + b] * component(along[b], j);
-        }
+  // Covariance of the point, which stays on its surface.
+  void spread_over_surface(const Candidate& k) {
+    Vec3 s, t;
+    tangents(k.normal, s, t);
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        const double si = component(s, i), sj = component(s, j);
+        const double ti = component(t, i), tj = component(t, j);
+        answer_.covariance[3 * i + j] =
+            k.along[0] * si * sj + k.along[1] * (si * tj + ti * sj) + k.along[2] * ti * tj;
       }
-      trace += e[3 + a];
     }
-    return std::sqrt(trace);
+    answer_.spread = std::sqrt(k.along[0] + k.along[2]);
   }
 
   // Beyond it lies as much of chi2 as of a normal variable beyond `sigmas` (Wilson-Hilferty).
@@ -542,51 +321,39 @@ class Localizer {
   }
 
   // The paper's rule: along the line of the segment's wrench, the first entry into any link.
-  const Answer& first_entry(int g) {
-    if (!measurement_.has_wrench()) return answer_;
+  void first_entry(int g) {
+    if (!measurement_.has_wrench()) return;
     answer_.status = Status::wrench_only;
     const double* w = measurement_.wrench();
-    const Spatial wrench{{w[0], w[1], w[2]}, {w[3], w[4], w[5]}};
-    const double size = norm(wrench.linear);
-    if (size < 1e-9) return answer_;
-    const Line line = line_of(wrench);
+    const Spatial wrench{answer_.force, {w[3], w[4], w[5]}};
+    if (norm(wrench.linear) < 1e-9) return;
     double first = std::numeric_limits<double>::infinity();
     Candidate& k = answer_.candidates[0];
-    for (const Body& body : bodies_[g]) {
-      for (int s : body.surfaces) {
-        surfaces_[s].mesh.crossings(to_node(line, body.node), [&](const Crossing& c) {
-          const Vec3 normal = tree().state(body.node).pose.R * c.normal;
-          if (c.t >= first || dot(normal, line.direction) >= 0.0) return;
-          first = c.t;
-          k.surface = s;
-          k.point = line.at(c.t);
-          k.normal = normal;
-        });
-      }
-    }
-    if (!std::isfinite(first)) return answer_;
-    k.fit.force = wrench.linear;
+    k = Candidate{};
+    found_.entries(g, Explanations::line_of(wrench),
+                   [&](int surface, const Vec3& point, const Vec3& normal, double t) {
+                     if (t >= first) return;
+                     first = t;
+                     k.surface = surface;
+                     k.point = point;
+                     k.normal = normal;
+                   });
+    if (!std::isfinite(first)) return;
     k.weight = answer_.body_probability = 1.0;
     answer_.count = 1;
     answer_.status = Status::located;
-    answer_.point = k.point;
-    answer_.force = wrench.linear;
-    std::fill(answer_.covariance, answer_.covariance + 9, std::nan(""));
-    return answer_;
+    answer_.spread = answer_.pitch = answer_.chi2 = kNaN;
+    answer_.degrees = 0;
+    std::fill(answer_.covariance, answer_.covariance + 9, kNaN);
   }
 
   const Observer& observer_;
   LocalizerSettings settings_;
-  ForceFitter fitter_;
+  double period_;
   Measurement measurement_;
-  std::vector<LinkSurface> surfaces_;
-  std::vector<std::vector<Body>> bodies_;  // per segment
-  std::vector<std::vector<Sample>> samples_;  // per surface
-  std::vector<View> views_;
-  std::vector<Candidate> candidates_;
+  Explanations found_;
+  std::vector<Following> following_;  // per segment
   Answer answer_;
-  int used_ = 0, count_ = 0;
-  double best_ = 0.0;
 };
 
 }  // namespace touchline

@@ -49,7 +49,7 @@ class Measurement {
         layout_(observer.row_layout()),
         unit_(layout_.joints, 0.0),
         momenta_(tree_.nodes().size() * layout_.joints),
-        baselines_(6 * layout_.segments + layout_.joints) {
+        joint_offsets_(layout_.joints) {
     for (int g = 0; g < layout_.segments; ++g) rows_.push_back(rows_of(g));
     std::size_t most = 0;
     for (const auto& rows : rows_) most = std::max(most, rows.size());
@@ -83,15 +83,21 @@ class Measurement {
     has_wrench_ = observer_.layout().segments[g].sensor >= 0 &&
                   row[layout_.segment_settled() + g] > 0.0 &&
                   std::isfinite(row[layout_.segment_wrench() + 6 * g]);
-    find_baselines(normalized);
-    if (has_wrench_) {
-      for (int i = 0; i < 6; ++i) wrench_[i] = row[layout_.segment_wrench() + 6 * g + i];
-      remove_baseline();
-    }
+    for (int i = 0; i < 6; ++i) raw_wrench_[i] = row[layout_.segment_wrench() + 6 * g + i];
+    find_offsets(normalized);
     count_ = 0;
     for (const Row& r : rows_[g]) take(r);
     size_ = (has_wrench_ ? 6 : 0) + count_;
     return size_ > 0 && weigh();
+  }
+
+  // The largest of a segment's normalized rows.
+  double strength(int g, const double* normalized) const {
+    double most = 0.0;
+    for (std::size_t i = 0; i < tests_.size(); ++i) {
+      if (tests_[i].segment == g) most = std::max(most, std::fabs(normalized[i]));
+    }
+    return most;
   }
 
   bool has_wrench() const { return has_wrench_; }
@@ -189,40 +195,36 @@ class Measurement {
     return false;
   }
 
-  void find_baselines(const double* normalized) {
-    std::fill(baselines_.begin(), baselines_.end(), 0.0);
+  // A row's offset is what the detector has taken out of it.
+  void find_offsets(const double* normalized) {
+    std::fill(joint_offsets_.begin(), joint_offsets_.end(), 0.0);
+    std::copy(raw_wrench_, raw_wrench_ + 6, wrench_);
     if (normalized == nullptr) return;
+    double clean[6];
+    bool complete = false;
     for (std::size_t i = 0; i < tests_.size(); ++i) {
       const DetectionRow& test = tests_[i];
       if (test.segment != segment_) continue;
-      const double clean = normalized[i] * test.contact;
+      const double value = normalized[i] * test.contact;
       if (test.component < 0) {
-        baselines_[6 * layout_.segments + test.joint] =
-            row_[layout_.segment_torque() + test.joint] - clean;
+        joint_offsets_[test.joint] = row_[layout_.segment_torque() + test.joint] - value;
       } else {
-        baselines_[6 * segment_ + test.component] = clean;  // here: what is left of the wrench
+        clean[test.component] = value;
+        complete = test.component == 5;
       }
     }
-    offsets_known_ = true;
-  }
-
-  // From here on the wrench is free of its offset; `raw_wrench_` is not.
-  void remove_baseline() {
-    std::copy(wrench_, wrench_ + 6, raw_wrench_);
-    if (!offsets_known_) return;
-    offsets_known_ = false;
-    const double* b = baselines_.data() + 6 * segment_;
+    if (!has_wrench_ || !complete) return;
     const int sensor = observer_.layout().segments[segment_].sensor;
-    const Spatial clean = wrench_to_parent(tree_.state(observer_.sensors()[sensor].node).pose,
-                                           {{b[0], b[1], b[2]}, {b[3], b[4], b[5]}});
-    if (is_finite(clean)) store(clean, wrench_);
+    store(wrench_to_parent(tree_.state(observer_.sensors()[sensor].node).pose,
+                           {{clean[0], clean[1], clean[2]}, {clean[3], clean[4], clean[5]}}),
+          wrench_);
   }
 
   void take(const Row& r) {
     double own, outboard = std::nan("");
     if (r.joint >= 0) {
       if (!(row_[layout_.joint_settled() + r.joint] > 0.0)) return;
-      const double offset = baselines_[6 * layout_.segments + r.joint];
+      const double offset = joint_offsets_[r.joint];
       own = row_[layout_.segment_torque() + r.joint] - offset;
       outboard = row_[layout_.parity() + r.joint] - offset;
     } else {
@@ -382,8 +384,7 @@ class Measurement {
   std::vector<std::vector<Row>> rows_;  // per segment
   std::vector<double> unit_;
   std::vector<Spatial> momenta_;  // per node and joint
-  std::vector<double> baselines_;
-  bool offsets_known_ = false;
+  std::vector<double> joint_offsets_;
 
   int segment_ = 0, count_ = 0, size_ = 0;
   const double* row_ = nullptr;

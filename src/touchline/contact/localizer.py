@@ -125,19 +125,28 @@ class Localizer:
         )
         return self.answer(row[0])
 
-    def run(self, q: Array, qd: Array, estimate: Estimate, detection: Detection) -> Array:
-        """Answers for all samples of a recording and all segments that are touched then.
+    def follow(
+        self, time: Array, q: Array, qd: Array, estimate: Estimate, detection: Detection
+    ) -> tuple[Array, Array]:
+        """Takes N samples: answers where a segment is touched, and keeps track of the events.
 
         Returns:
-            (M, 2 + w): sample, segment, then a native answer, see `answer`.
+            (M, 2 + w): sample, segment, then a native answer for `answer`; one row for each sample
+            and touched segment. And (E, 2 + v): sample, segment, then a native event, for
+            `event_answer`, of each event that ended.
         """
-        return self.core.run(
+        return self.core.follow(
+            np.ascontiguousarray(time, float),
             estimate.rows,
             detection.normalized,
-            np.ascontiguousarray(detection.levels, float),
+            detection.levels,
             np.ascontiguousarray(q, float),
             np.ascontiguousarray(qd, float),
         )
+
+    def event(self, segment: int) -> Array:
+        """The native event on a segment that is touched, or was last."""
+        return self.core.event(segment)[0]
 
     def wrench_covariance(self, segment: str, q: ArrayLike, estimate: Estimate) -> Array:
         """Covariance (6, 6) of a segment's filtered wrench, world axes, about the world origin.
@@ -152,11 +161,11 @@ class Localizer:
         """Names the numbers of a native answer."""
         status = STATUS[int(row[0])]
         if row[HEAD - 1] == 0:
-            return Answer(status)
+            return Answer(status, force=_known(row[7:10]))
         candidates = self.candidates(row)
         chi2 = {"pitch": float(row[19]), "chi2": float(row[20]), "degrees": int(row[21])}
         if status in ("not_separable", "wrench_only"):
-            return Answer(status, candidates=candidates, **chi2)
+            return Answer(status, force=_known(row[7:10]), candidates=candidates, **chi2)
         return Answer(
             status,
             self.skin.patches[int(row[1])].link,
@@ -188,3 +197,7 @@ class Localizer:
         return _core.noise_figures(
             list(noise.qd), list(noise.tau), sensors, period, relative_error
         )
+
+
+def _known(values: Array) -> Array | None:
+    return values if np.isfinite(values).all() else None
