@@ -91,7 +91,7 @@ Out run(tl::Observer& o, const In& time, const In& q, const In& qd, const In& ta
 nb::tuple detect(tl::Observer& o, tl::Detector& d, double time, const In& q, const In& qd,
                  const In& tau, const In& wrench) {
   Out row = update(o, time, q, qd, tau, wrench);
-  d.step();
+  d.step(row.data());
   const std::size_t m = d.levels().size(), r = d.rows().size();
   Buffer levels(m), normalized(r);
   std::copy(d.levels().begin(), d.levels().end(), levels.data.get());
@@ -101,20 +101,20 @@ nb::tuple detect(tl::Observer& o, tl::Detector& d, double time, const In& q, con
 
 nb::tuple detect_run(tl::Observer& o, tl::Detector& d, const In& time, const In& q, const In& qd,
                      const In& tau, const In& wrench) {
-  const std::size_t rows = time.size(), n = o.row_layout().joints, k = o.row_layout().sensors;
+  const std::size_t rows = time.size();
   expect_sample(o, rows, q, qd, tau, wrench);
   const std::size_t width = o.output().size(), m = d.levels().size(), r = d.rows().size();
   Buffer out(rows * width), levels(rows * m), normalized(rows * r);
   {
     nb::gil_scoped_release release;
-    for (std::size_t i = 0; i < rows; ++i) {
-      const double* row = o.step(time.data()[i], q.data() + i * n, qd.data() + i * n,
-                                 tau.data() + i * n, wrench.data() + i * 6 * k);
-      d.step();
-      std::copy(row, row + width, out.data.get() + i * width);
-      std::copy(d.levels().begin(), d.levels().end(), levels.data.get() + i * m);
-      std::copy(d.normalized().begin(), d.normalized().end(), normalized.data.get() + i * r);
-    }
+    double* level = levels.data.get();
+    double* x = normalized.data.get();
+    o.run(rows, time.data(), q.data(), qd.data(), tau.data(), wrench.data(), out.data.get(),
+          [&](const double* row) {
+            d.step(row);
+            level = std::copy(d.levels().begin(), d.levels().end(), level);
+            x = std::copy(d.normalized().begin(), d.normalized().end(), x);
+          });
   }
   return nb::make_tuple(out.release({rows, width}), levels.release({rows, m}),
                         normalized.release({rows, r}));

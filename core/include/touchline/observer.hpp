@@ -63,20 +63,27 @@ class Observer {
     return output_.data();
   }
 
-  // Takes N samples, whose signals stand one after the other in each array; writes N rows. The
-  // numbers are those of `step`, to the last bit.
+  // Takes N samples, whose signals stand one after the other in each array; writes N rows and
+  // calls `each(row)` after each. The numbers are those of `step`, to the last bit.
+  template <class Each>
   void run(std::size_t samples, const double* time, const double* q, const double* qd,
-           const double* tau, const double* wrench, double* out) {
+           const double* tau, const double* wrench, double* out, Each&& each) {
     const std::size_t n = joints_.size(), w = 6 * sensors_.size(), width = output_.size();
     const double* last = output_.data();
     for (std::size_t i = 0; i < samples; ++i) {
       const std::size_t k = i % kLanes;
       if (k == 0) look_ahead(samples - i, q + i * n, qd + i * n);
       advance({time[i], q + i * n, qd + i * n, tau + i * n, wrench + i * w}, ahead_[k], last, out);
+      each(static_cast<const double*>(out));
       last = out;
       out += width;
     }
     if (samples > 0) std::copy_n(last, width, output_.begin());
+  }
+
+  void run(std::size_t samples, const double* time, const double* q, const double* qd,
+           const double* tau, const double* wrench, double* out) {
+    run(samples, time, q, qd, tau, wrench, out, [](const double*) {});
   }
 
   // Forgets everything: the next sample starts anew.
@@ -89,6 +96,8 @@ class Observer {
   const Layout& layout() const { return layout_; }
   const Tree& tree() const { return tree_; }
   const std::vector<double>& output() const { return output_; }
+  double time() const { return now_.time; }  // of the last accepted sample
+  const Pose& sensor_pose(int s) const { return poses_[s]; }
   // The model's terms alone, for a state of its own.
   Terms<double>& terms() { return terms_; }
 
