@@ -64,12 +64,12 @@ def fast_motion(robot: Robot, rate: float, duration: float = 1.0) -> Motion:
     needed = inverse_dynamics(robot, q, qd, qdd)
     force = np.clip((time - ONSET) / RAMP, 0.0, 1.0)[:, None] * PUSH
     push = np.hstack([force, np.cross(POINT, force)])
-    contact = contact_loads(robot, q, _middle_link(robot), push)
+    contact = contact_loads(robot, q, pushed_link(robot), push)
     tau, wrench = needed.torque - contact.torque, needed.wrench - contact.wrench
     return Motion(time, q, qd, qdd, tau, wrench, contact.torque, contact.wrench)
 
 
-def _middle_link(robot: Robot) -> str:
-    """The link that the middle one of the joints carries."""
+def pushed_link(robot: Robot) -> str:
+    """Where the push acts: the link that the middle one of the joints carries."""
     name = robot.joint_names[len(robot.joint_names) // 2]
     return robot.mechanism.joints[name].child

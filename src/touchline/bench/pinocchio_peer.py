@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+# pyright: reportAttributeAccessIssue=false
 """The same observers written with Pinocchio's Python bindings, as a user would write them.
 
 The extended one keeps each sensor as a free joint, so that mass matrix, Coriolis matrix and
@@ -104,8 +105,9 @@ def build_model(robot: Robot, sensors: bool = True) -> tuple[pin.Model, dict[str
     model = pin.Model()
     model.gravity = pin.Motion(robot.gravity, np.zeros(3))
     ids: dict[str, int] = {}
-    carriers: list[tuple[int, pin.SE3]] = []  # per node: its joint, and its pose there
-    for node in robot.nodes:
+    carriers: dict[int, tuple[int, pin.SE3]] = {}  # per node: its joint, and its pose there
+    for index in _depth_first(robot):
+        node = robot.nodes[index]
         joint, placement = carriers[node.parent] if node.parent >= 0 else (0, pin.SE3.Identity())
         placement = placement * pin.SE3(node.T_parent_node)
         name = node.joint or (node.sensor if sensors else None)
@@ -116,8 +118,20 @@ def build_model(robot: Robot, sensors: bool = True) -> tuple[pin.Model, dict[str
             placement = pin.SE3.Identity()
         body = node.inertia
         model.appendBodyToJoint(joint, pin.Inertia(body.mass, body.com, body.inertia), placement)
-        carriers.append((joint, placement))
+        carriers[index] = joint, placement
     return model, ids
+
+
+def _depth_first(robot: Robot) -> list[int]:
+    """The nodes with each subtree in one piece: Pinocchio assumes that and does not check it."""
+    children: dict[int, list[int]] = {}
+    for i, node in enumerate(robot.nodes):
+        children.setdefault(node.parent, []).append(i)
+    order, pending = [], children.get(-1, [])[::-1]
+    while pending:
+        order.append(pending.pop())
+        pending += children.get(order[-1], [])[::-1]
+    return order
 
 
 def _successors(model: pin.Model, sensor_ids: list[int]) -> list[list[int]]:

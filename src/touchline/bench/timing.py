@@ -43,5 +43,6 @@ def measure(candidates: Sequence[Candidate], rounds: int) -> list[Timing]:
             row[i] = (time.perf_counter() - start) / candidate.samples * 1e6
     middle, least = np.median(spent, axis=0), spent.min(axis=0)
     return [
-        Timing(c.name, float(m), float(x)) for c, m, x in zip(candidates, middle, least, strict=True)
+        Timing(c.name, float(m), float(x))
+        for c, m, x in zip(candidates, middle, least, strict=True)
     ]
