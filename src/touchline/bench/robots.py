@@ -13,7 +13,7 @@ from touchline.model.description import (
 )
 from touchline.model.mechanism import Inertia, Joint, Link, Mechanism
 from touchline.model.robot import Robot
-from touchline.model.tree import rotation_from_rpy, transform
+from touchline.model.transforms import pose, pose_rpy
 
 # Per link: offset from the one inboard [m], roll of its axis [rad], mass [kg], length [m].
 LINKS = (
@@ -39,10 +39,10 @@ def sara_like(bandwidth: float = 100.0) -> Robot:
     for i, (offset, roll, mass, length) in enumerate(LINKS, start=1):
         name = f"link{i}"
         links[name] = Link(name, _cylinder(mass, length))
-        placement = transform(rotation_from_rpy((roll, 0.0, 0.0)), offset)
+        placement = pose_rpy(offset, (roll, 0.0, 0.0))
         joints[f"joint{i}"] = Joint(f"joint{i}", "revolute", f"link{i - 1}", name, placement)
     links["tool"] = Link("tool", _cylinder(TOOL_MASS, 0.12))
-    mount = transform(np.eye(3), (0.0, 0.0, 0.09))
+    mount = pose(p=(0.0, 0.0, 0.09))
     joints["mount"] = Joint("mount", "fixed", "link7", "tool", mount)
     mechanism = Mechanism("sara_like", "link0", links, joints, np.array([0.0, 0.0, -9.81]))
     return Robot(_description(bandwidth), mechanism)
