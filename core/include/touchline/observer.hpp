@@ -16,6 +16,7 @@
 #include "touchline/health.hpp"
 #include "touchline/layout.hpp"
 #include "touchline/projections.hpp"
+#include "touchline/readings.hpp"
 #include "touchline/row.hpp"
 #include "touchline/signals.hpp"
 #include "touchline/terms.hpp"
@@ -43,14 +44,16 @@ class Observer {
         terms_(tree_, layout_, joints_, sensors_, local_rows()),
         packed_(tree_, layout_, joints_, sensors_, local_rows()),
         projections_(layout_, terms_.at()),
+        torques_(joints_),
         row_{count(joints_), count(sensors_), count(layout_.segments)},
-        writer_(row_, layout_, sensors_, method),
+        writer_(row_, terms_.at(), layout_, sensors_, method),
         frames_((kLanes + 1) * terms_.at().width(), 0.0),
-        poses_(sensors_.size()),
         packed_q_(2 * joints_.size()),
+        sensor_present_(sensors_.size(), 0),
         output_(row_.width(), kNaN) {
     for (int i = 0; i < kLanes; ++i) ahead_[i] = frames_.data() + i * terms_.at().width();
     before_ = frames_.data() + kLanes * terms_.at().width();
+    for (std::size_t j = 0; j < joints_.size(); ++j) find_projections(j);
   }
   Observer(const Observer&) = delete;
   Observer& operator=(const Observer&) = delete;
@@ -114,11 +117,22 @@ class Observer {
     return local;
   }
 
+  void find_projections(std::size_t j) {
+    const auto &inboard = layout_.inboard_sensors[j], &outboard = layout_.outboard_sensors[j];
+    const bool own = joints_[j].measured(), parity = own && !inboard.empty();
+    inboard_.push_back(parity ? projections_.at(inboard[0]) : projections_.unknown());
+    outboard_.push_back(!own              ? projections_.unknown()
+                        : outboard.empty() ? projections_.zero()
+                                           : projections_.at(outboard[0]));
+    if (own && outboard.size() > 1) forks_.push_back(j);
+    if (joints_[j].torque == Torque::from) sources_.push_back(j);
+  }
+
   void forget() {
     channels_.balances.forget();
     channels_.filters.forget();
     now_ = Instant{};
-    started_ = false;
+    started_ = steady_ = false;
   }
 
   // The terms of the next samples, side by side if there are enough of them.
@@ -144,18 +158,21 @@ class Observer {
     Health health = 0;
     if (!accept(sample, health, last, out)) return;
     std::swap(terms, before_);
-    const double* now = before_;
-    const double* earlier = terms;
+    const double *now = before_, *earlier = terms;
+    const std::size_t joint = channels_.joint(0), sensor = channels_.sensor(0);
     channels_.balances.begin(now_);
     channels_.filters.begin(now_);
-    for (int j = 0; j < row_.joints; ++j) take_joint(j, sample, now, health);
-    for (int s = 0; s < row_.sensors; ++s) take_sensor(s, sample.wrench + 6 * s, now, health);
-    for (int g = 0; g < row_.segments; ++g) take_segment(g);
+    const bool complete = read(sample, now, health);
+    // As long as all signals are there at all samples, nothing needs to be kept by channel.
+    const bool steady = steady_ && complete && now_.in_reach(now_.before);
+    if (!steady) book(health);
     channels_.balances.balance();
-    projections_.project(channels_, earlier, now);
-    decide();
+    if (!steady) channels_.balances.blank();
+    projections_.project(earlier, now, channels_.balances.e(sensor));
+    compare(channels_.balances.e(joint));
+    if (!steady) channels_.decide(now_);
     channels_.filters.run();
-    writer_.write(channels_, now_, poses_, health, out);
+    writer_.write(channels_, now_, steady, now, health, out);
   }
 
   // Is the sample one to go on with? If not, the row is written.
@@ -179,75 +196,56 @@ class Observer {
   }
 
   Health judge_state(const Sample& sample) const {
-    Health health = judge_all(sample.q, row_.joints) | judge_all(sample.qd, row_.joints);
     constexpr double tolerance = 0.01;  // rad or m: encoders and hard stops differ by less
     bool outside = false;
     for (int j = 0; j < row_.joints; ++j) {
       outside |= sample.q[j] < joints_[j].lower - tolerance;
       outside |= sample.q[j] > joints_[j].upper + tolerance;
     }
-    return outside ? health | kModelLimit : health;
+    return judge_all(sample.q, row_.joints) | judge_all(sample.qd, row_.joints) |
+           (outside ? kModelLimit : 0);
   }
 
-  void take_joint(std::size_t j, const Sample& sample, const double* terms, Health& health) {
-    const JointRow& joint = joints_[j];
+  // Fills the rows of the balances; returns whether all signals are usable.
+  bool read(const Sample& sample, const double* terms, Health& health) {
     Balances& balances = channels_.balances;
-    const std::size_t group = channels_.joint(j);
-    const Health own = joint.measured() ? judge(sample.tau[j]) : kMissing;
-    if (joint.measured()) health |= own;
-    if (own != 0) return balances.skip(group);
-    const double tau = read_torque(joint, sample.tau[j], sample.qd[j], health);
-    balances.take(group, now_);
-    // With its whole model taken out by the driver, the reading is minus the external torque.
-    const bool model = joint.compensated == Compensated::model;
-    *balances.p(group) = model ? 0.0 : terms[terms_.at().joint_momentum() + j];
-    *balances.u(group) = model ? tau : tau - terms[terms_.at().joint_bias() + j];
+    const TermsLayout& at = terms_.at();
+    std::copy_n(terms + at.joint_momentum(), at.joints, balances.p(channels_.joint(0)));
+    bool complete = torques_.read(sample.tau, sample.qd, terms + at.joint_bias(),
+                                  balances.u(channels_.joint(0)), health);
+    for (std::size_t s = 0; s < at.sensors; ++s) {
+      Health own = 0;
+      read_sensor(s, sample.wrench + 6 * s, terms + at.sensor(s), own);
+      sensor_present_[s] = (own & (kMissing | kNonFinite)) == 0;
+      complete &= sensor_present_[s] != 0;
+      health |= own;
+    }
+    for (int g = 0; g < row_.segments; ++g) {
+      if (layout_.segments[g].sensor >= 0) read_segment(g);
+    }
+    return complete;
   }
 
-  void take_sensor(std::size_t s, const double* logged, const double* terms, Health& health) {
+  void read_sensor(std::size_t s, const double* logged, const double* terms, Health& health) {
     const SensorRow& sensor = sensors_[s];
     Balances& balances = channels_.balances;
-    const std::size_t group = channels_.sensor(s);
-    const bool local = channels_.kind(s) == Channels::SensorFilter::local;
-    const double* block = terms + terms_.at().sensor(s);
-    poses_[s] = {load_rotation(block + TermsLayout::kRotation),
-                 load_vector(block + TermsLayout::kPosition)};
-    Health own = 0;
+    const Pose pose = load_pose(terms + TermsLayout::kPose);
     const Spatial reading = read_wrench(
-        sensor, poses_[s].R, load_rotation(block + TermsLayout::kLogRotation), logged, own);
-    health |= own;
-    if ((own & (kMissing | kNonFinite)) != 0) {
-      if (!now_.in_reach(balances.group(group).time)) health |= kSensorExcluded;
-      balances.skip(group);
-      if (local) balances.skip(channels_.local(s));
-      return;
-    }
-    balances.take(group, now_);
+        sensor, pose.R, load_rotation(terms + TermsLayout::kLogRotation), logged, health);
     const Spatial weight =
-        sensor.gravity_compensated ? Spatial{} : load(block + TermsLayout::kWeight);
-    std::copy_n(block + TermsLayout::kMomentum, 6, balances.p(group));
-    store(wrench_to_parent(poses_[s], reading) + weight, balances.u(group));
-    if (local) take_local(s, reading, block);
-  }
-
-  // The sensor's row in its own frame.
-  void take_local(std::size_t s, const Spatial& reading, const double* block) {
-    const std::size_t group = channels_.local(s);
-    channels_.balances.take(group, now_);
-    std::copy_n(block + TermsLayout::kLocalMomentum, 6, channels_.balances.p(group));
-    store(reading - load(block + TermsLayout::kLocalBias), channels_.balances.u(group));
+        sensor.gravity_compensated ? Spatial{} : load(terms + TermsLayout::kWeight);
+    std::copy_n(terms + TermsLayout::kMomentum, 6, balances.p(channels_.sensor(s)));
+    store(wrench_to_parent(pose, reading) + weight, balances.u(channels_.sensor(s)));
+    if (channels_.kind(s) != Channels::SensorFilter::local) return;
+    std::copy_n(terms + TermsLayout::kLocalMomentum, 6, balances.p(channels_.local(s)));
+    store(reading - load(terms + TermsLayout::kLocalBias), balances.u(channels_.local(s)));
   }
 
   // A segment's momentum and load: those of its sensor without those of the next ones outboard.
-  void take_segment(std::size_t g) {
+  void read_segment(std::size_t g) {
     const Segment& segment = layout_.segments[g];
     Balances& balances = channels_.balances;
-    bool usable = segment.sensor >= 0 && sensor_balance(segment.sensor).present;
-    for (int t : segment.successors) usable = usable && sensor_balance(t).present;
-    const std::size_t group = channels_.segment(g);
-    if (!usable) return balances.skip(group);
-    balances.take(group, now_);
-    double *p = balances.p(group), *u = balances.u(group);
+    double *p = balances.p(channels_.segment(g)), *u = balances.u(channels_.segment(g));
     std::copy_n(balances.p(channels_.sensor(segment.sensor)), 6, p);
     std::copy_n(balances.u(channels_.sensor(segment.sensor)), 6, u);
     for (int t : segment.successors) {
@@ -256,75 +254,48 @@ class Observer {
       for (int i = 0; i < 6; ++i) u[i] -= ut[i];
     }
   }
-  const Balances::Group& sensor_balance(std::size_t s) const {
-    return channels_.balances.group(channels_.sensor(s));
+
+  // Not the usual step: who has values, since when, and who not.
+  void book(Health& health) {
+    if (steady_) {
+      channels_.balances.catch_up(now_);
+      channels_.filters.catch_up(now_);
+    }
+    for (std::size_t s = 0; s < sensors_.size(); ++s) {
+      const bool lost = !now_.in_reach(channels_.balances.group(channels_.sensor(s)).time);
+      if (!sensor_present_[s] && lost) health |= kSensorExcluded;
+    }
+    steady_ = channels_.book(torques_.present(), sensor_present_, now_);
   }
 
-  // What each filter does with this sample.
-  void decide() {
-    for (int j = 0; j < row_.joints; ++j) {
-      if (joints_[j].torque == Torque::from) {
-        decide_source(j);
-      } else {
-        decide_joint(j);
-      }
+  // The inputs of all filters, from the innovations of all balances.
+  void compare(double* e) {
+    Filters& filters = channels_.filters;
+    const double* projected = projections_.values();
+    for (std::size_t j : sources_) e[j] = sum(layout_.source_sensors[j]);
+    double* external = filters.input(channels_.external(0));
+    double *own = filters.input(channels_.own(0)), *parity = filters.input(channels_.parity(0));
+    for (std::size_t j = 0; j < joints_.size(); ++j) {
+      external[j] = e[j];
+      own[j] = e[j] - projected[outboard_[j]];
+      parity[j] = e[j] - projected[inboard_[j]];
     }
-    for (int g = 0; g < row_.segments; ++g)
-      follow(channels_.segment_filter(g), channels_.segment(g));
-    for (int s = 0; s < row_.sensors; ++s) {
+    for (std::size_t j : forks_) own[j] = e[j] - sum(layout_.outboard_sensors[j]);
+    std::copy_n(channels_.balances.e(channels_.segment(0)), 6 * row_.segments,
+                filters.input(channels_.segment_filter(0)));
+    for (std::size_t s = 0; s < sensors_.size(); ++s) {
       const Channels::SensorFilter kind = channels_.kind(s);
       if (kind == Channels::SensorFilter::none) continue;
       const bool local = kind == Channels::SensorFilter::local;
-      follow(channels_.sensor_filter(s), local ? channels_.local(s) : channels_.sensor(s));
+      std::copy_n(channels_.balances.e(local ? channels_.local(s) : channels_.sensor(s)), 6,
+                  filters.input(channels_.sensor_filter(s)));
     }
   }
 
-  void follow(std::size_t filter, std::size_t balance) {
-    const Balances::Group& group = channels_.balances.group(balance);
-    std::copy_n(channels_.balances.e(balance), group.count, channels_.filters.input(filter));
-    channels_.filters.follow(filter, group, now_);
-  }
-
-  void decide_joint(std::size_t j) {
-    const std::size_t balance = channels_.joint(j);
-    follow(channels_.external(j), balance);
-    // All that touches the joint's own segment; all that touches between it and the sensor inboard.
-    const auto &outboard = layout_.outboard_sensors[j], &inboard = layout_.inboard_sensors[j];
-    subtract(channels_.own(j), balance, outboard);
-    if (!inboard.empty()) subtract(channels_.parity(j), balance, inboard);
-  }
-
-  // Filters the difference of a joint's innovation and what sensors' innovations explain of it.
-  void subtract(std::size_t filter, std::size_t balance, const std::vector<Projection>& pairs) {
-    const Balances::Group& joint = channels_.balances.group(balance);
-    const double e = *channels_.balances.e(balance) - projections_.sum(pairs);
-    *channels_.filters.input(filter) = e;
-    const bool begun = joint.fresh;
-    channels_.filters.act(filter, decide(filter, joint.present, begun, joint.regular, pairs), now_);
-  }
-
-  // A joint without a torque sensor: what the named sensors' loads do to it.
-  void decide_source(std::size_t j) {
-    const auto& pairs = layout_.source_sensors[j];
-    const std::size_t filter = channels_.external(j);
-    const double e = projections_.sum(pairs);
-    const Action action = decide(filter, true, true, true, pairs);
-    *channels_.filters.input(filter) = e;
-    channels_.balances.set_e(channels_.joint(j), action == Action::filter ? e : kNaN);
-    channels_.filters.act(filter, action, now_);
-  }
-
-  // Innovations are compared only where all of them span the interval from the sample before.
-  Action decide(std::size_t filter, bool present, bool fresh, bool regular,
-                const std::vector<Projection>& pairs) const {
-    for (const Projection& pair : pairs) {
-      const Balances::Group& sensor = sensor_balance(pair.sensor);
-      present = present && sensor.present;
-      regular = regular && sensor.regular;
-    }
-    if (!present) return Action::absent;
-    if (!fresh || !now_.in_reach(channels_.filters.group(filter).time)) return Action::restart;
-    return regular ? Action::filter : Action::hold;
+  double sum(const std::vector<Projection>& pairs) const {
+    double total = 0.0;
+    for (const Projection& pair : pairs) total += projections_.values()[projections_.at(pair)];
+    return total;
   }
 
   const Tree tree_;
@@ -335,17 +306,20 @@ class Observer {
   Terms<double> terms_;
   Terms<Lanes> packed_;
   Projections projections_;
+  JointReadings torques_;
   const RowLayout row_;
-  const RowWriter writer_;
-  std::vector<double> frames_;           // terms of the sample before and of those at work
+  RowWriter writer_;
+  std::vector<double> frames_;  // terms of the sample before and of those at work
   std::array<double*, kLanes> ahead_{};
   double* before_ = nullptr;
-  std::vector<Pose> poses_;              // of the sensors in world
-  std::vector<Lanes> packed_q_;          // positions, then velocities
+  std::vector<Lanes> packed_q_;  // positions, then velocities
+  std::vector<char> sensor_present_;
+  std::vector<std::size_t> sources_, forks_;  // joints read from sensors; with several outboard
+  std::vector<std::size_t> outboard_, inboard_;   // per joint: where its projections stand
   std::vector<double> output_;
   Clock clock_;
   Instant now_;
-  bool started_ = false;
+  bool started_ = false, steady_ = false;
 };
 
 }  // namespace touchline

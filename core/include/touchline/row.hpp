@@ -32,18 +32,31 @@ struct RowLayout {
 
 class RowWriter {
  public:
-  RowWriter(const RowLayout& row, const Layout& layout, const std::vector<SensorRow>& sensors,
-            Method method)
-      : row_(row), layout_(layout), sensors_(sensors), method_(method) {}
+  RowWriter(const RowLayout& row, const TermsLayout& at, const Layout& layout,
+            const std::vector<SensorRow>& sensors, Method method)
+      : row_(row),
+        at_(at),
+        layout_(layout),
+        sensors_(sensors),
+        method_(method),
+        settled_(row.joints + row.segments, 0.0) {}
 
-  // `poses`: per sensor, in world. Settling joins the health.
-  void write(const Channels& channels, const Instant& now, const std::vector<Pose>& poses,
-             Health health, double* out) const {
-    const bool settled_joints = write_joints(channels, now, out);
-    const bool settled_segments = write_segments(channels, now, poses, out);
-    for (int s = 0; s < row_.sensors; ++s) write_sensor(s, channels, poses[s], out);
-    const bool settled = settled_joints && settled_segments;
-    write_health(health | (settled ? 0 : kSettling), out);
+  // `terms`: those of this instant. In a `steady` step what is not known is NaN already.
+  void write(const Channels& channels, const Instant& now, bool steady, const double* terms,
+             Health health, double* out) {
+    const Filters& filters = channels.filters;
+    const double* e = channels.balances.e(0);
+    std::copy_n(filters.value(0), 3 * row_.joints, out + row_.tau_ext());
+    std::copy_n(e, row_.joints, out + row_.joint_innovation());
+    std::copy_n(filters.value(channels.segment_filter(0)), 6 * row_.segments,
+                out + row_.segment_wrench());
+    std::copy_n(e + row_.joints, 6 * row_.segments, out + row_.segment_innovation());
+    if (!steady) blank(filters, out);
+    if (method_ == Method::paper) write_paper(channels, terms, out);
+    for (int s = 0; s < row_.sensors; ++s) write_sensor(s, channels, terms, steady, out);
+    if (!steady || !all_settled_) settle(filters, now);
+    std::copy(settled_.begin(), settled_.end(), out + row_.joint_settled());
+    write_health(health | (all_settled_ ? 0 : kSettling), out);
   }
 
   // Nothing is known at this sample.
@@ -58,79 +71,65 @@ class RowWriter {
   }
 
  private:
-  // The values of `count` groups of filters from `first` on, `width` rows each.
-  static void write_values(const Filters& filters, std::size_t first, int count, int width,
-                           double* out) {
-    std::copy_n(filters.value(first), count * width, out);
-    for (int i = 0; i < count; ++i) {
-      if (!filters.group(first + i).present) std::fill_n(out + i * width, width, kNaN);
+  void blank(const Filters& filters, double* out) const {
+    for (int i = 0; i < 3 * row_.joints; ++i) {
+      if (!filters.group(i).present) out[row_.tau_ext() + i] = kNaN;
+    }
+    for (int g = 0; g < row_.segments; ++g) {
+      if (!filters.group(3 * row_.joints + g).present)
+        std::fill_n(out + row_.segment_wrench() + 6 * g, 6, kNaN);
     }
   }
 
-  bool write_joints(const Channels& channels, const Instant& now, double* out) const {
-    // External, own and parity follow each other here as there.
-    write_values(channels.filters, channels.external(0), 3 * row_.joints, 1, out + row_.tau_ext());
-    std::copy_n(channels.balances.e(channels.joint(0)), row_.joints,
-                out + row_.joint_innovation());
-    return write_settled(channels.filters, channels.external(0), row_.joints, now,
-                         out + row_.joint_settled());
+  void settle(const Filters& filters, const Instant& now) {
+    all_settled_ = true;
+    const auto enter = [&](std::size_t group, double& settled) {
+      settled = filters.settled(group, now) ? 1.0 : 0.0;
+      all_settled_ = all_settled_ && (settled > 0.0 || !filters.group(group).present);
+    };
+    for (int j = 0; j < row_.joints; ++j) enter(j, settled_[j]);
+    for (int g = 0; g < row_.segments; ++g)
+      enter(3 * row_.joints + g, settled_[row_.joints + g]);
   }
 
-  bool write_segments(const Channels& channels, const Instant& now, const std::vector<Pose>& poses,
-                      double* out) const {
-    const std::size_t first = channels.segment_filter(0);
-    write_values(channels.filters, first, row_.segments, 6, out + row_.segment_wrench());
-    std::copy_n(channels.balances.e(channels.segment(0)), 6 * row_.segments,
-                out + row_.segment_innovation());
-    if (method_ == Method::paper) {
-      for (int g = 0; g < row_.segments; ++g) {
-        if (channels.filters.group(first + g).present)
-          write_paper(g, channels, poses, out + row_.segment_wrench() + 6 * g);
-      }
-    }
-    return write_settled(channels.filters, first, row_.segments, now, out + row_.segment_settled());
+  Pose pose(const double* terms, int s) const {
+    return load_pose(terms + at_.sensor(s) + TermsLayout::kPose);
   }
 
   // (18), with both adjoints read as the wrench transformation from each sensor.
-  void write_paper(int g, const Channels& channels, const std::vector<Pose>& poses,
-                   double* out) const {
-    const Segment& segment = layout_.segments[g];
+  void write_paper(const Channels& channels, const double* terms, double* out) const {
     const auto residual = [&](int s) {
-      return wrench_to_parent(poses[s], load(channels.filters.value(channels.sensor_filter(s))));
+      return wrench_to_parent(pose(terms, s),
+                              load(channels.filters.value(channels.sensor_filter(s))));
     };
-    Spatial wrench = residual(segment.sensor);
-    for (int t : segment.successors) wrench = wrench - residual(t);
-    store(wrench, out);
-  }
-
-  static bool write_settled(const Filters& filters, std::size_t first, int count,
-                            const Instant& now, double* out) {
-    bool all = true;
-    for (int i = 0; i < count; ++i) {
-      const bool settled = filters.settled(first + i, now);
-      out[i] = settled ? 1.0 : 0.0;
-      all = all && (settled || !filters.group(first + i).present);
+    for (int g = 0; g < row_.segments; ++g) {
+      const Segment& segment = layout_.segments[g];
+      if (!channels.filters.group(channels.segment_filter(g)).present) continue;
+      Spatial wrench = residual(segment.sensor);
+      for (int t : segment.successors) wrench = wrench - residual(t);
+      store(wrench, out + row_.segment_wrench() + 6 * g);
     }
-    return all;
   }
 
-  void write_sensor(int s, const Channels& channels, const Pose& pose, double* row) const {
+  void write_sensor(int s, const Channels& channels, const double* terms, bool steady,
+                    double* row) const {
     double* out = row + row_.sensor_wrench() + 6 * s;
-    if (!channels.balances.group(channels.sensor(s)).present) {
+    if (!steady && !channels.balances.group(channels.sensor(s)).present) {
       std::fill_n(out, 6, kNaN);
-    } else if (method_ == Method::segment && sensors_[s].six_axis()) {
-      store(wrench_to_child(pose, outboard_sum(s, channels, row)), out);
-    } else {
+    } else if (channels.kind(s) == Channels::SensorFilter::local) {
       std::copy_n(channels.filters.value(channels.sensor_filter(s)), 6, out);
       for (int i = 0; i < 6; ++i) {
         if (!sensors_[s].axes[i]) out[i] = kNaN;
       }
+    } else {
+      store(wrench_to_child(pose(terms, s), outboard(s, channels, row)),
+            out);
     }
   }
 
   // The sum of the segments outboard of sensor s, in world, or if one of them is not known the
   // sensor's own residual.
-  Spatial outboard_sum(int s, const Channels& channels, const double* row) const {
+  Spatial outboard(int s, const Channels& channels, const double* row) const {
     Spatial sum;
     for (int g : layout_.segments_outboard[s]) {
       if (!channels.filters.group(channels.segment_filter(g)).present)
@@ -141,9 +140,12 @@ class RowWriter {
   }
 
   RowLayout row_;
+  TermsLayout at_;
   const Layout& layout_;
   const std::vector<SensorRow>& sensors_;
   Method method_;
+  std::vector<double> settled_;  // joints, then segments
+  bool all_settled_ = false;
 };
 
 }  // namespace touchline

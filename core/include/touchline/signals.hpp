@@ -50,15 +50,6 @@ struct SensorRow {
   }
 };
 
-// Torque of joint j that is not friction [Nm], from the logged number.
-inline double read_torque(const JointRow& joint, double logged, double qd, Health& health) {
-  const double reading = joint.gain * logged;
-  if (std::fabs(reading) >= joint.range) health |= kSaturated;
-  double friction = joint.viscous * qd;
-  if (joint.coulomb != 0.0) friction += joint.coulomb * std::tanh(qd / joint.coulomb_width);
-  return joint.sign * reading - joint.bias - friction;
-}
-
 // Health of `count` numbers that should have been measured.
 inline Health judge_all(const double* values, int count) {
   bool good = true;

@@ -106,6 +106,7 @@ inline Vec3 load_vector(const double* in) { return {in[0], in[1], in[2]}; }
 inline Mat3 load_rotation(const double* in) {
   return {load_vector(in), load_vector(in + 3), load_vector(in + 6)};
 }
+inline Pose load_pose(const double* in) { return {load_rotation(in), load_vector(in + 9)}; }
 inline Spatial load(const double* in) { return {{in[0], in[1], in[2]}, {in[3], in[4], in[5]}}; }
 
 inline void store(const Spatial& a, double* out) {

@@ -28,8 +28,7 @@ struct TermsLayout {
   // Within a sensor's block.
   static constexpr std::size_t kMomentum = 0;       // outboard, in world, about its origin
   static constexpr std::size_t kWeight = 6;         // the wrench of gravity, likewise
-  static constexpr std::size_t kRotation = 12;      // of the sensor frame in world, by columns
-  static constexpr std::size_t kPosition = 21;
+  static constexpr std::size_t kPose = 12;          // of the sensor frame in world
   static constexpr std::size_t kLogRotation = 24;   // of the frame of the log in world
   static constexpr std::size_t kLocalMomentum = 33;  // in the sensor frame
   static constexpr std::size_t kLocalBias = 39;
@@ -55,7 +54,8 @@ class Terms {
   // Brings the tree to joint positions q and velocities qd.
   void sweep(const T* q, const T* qd) { tree_.sweep(q, qd, state_); }
 
-  // The same, and writes one row of `at().width()` numbers per lane.
+  // The same, and writes one row of `at().width()` numbers per lane; joint rows are without what
+  // the joint's driver has already taken out of its torque.
   void evaluate(const T* q, const T* qd, double* const* out) {
     sweep(q, qd);
     std::size_t line = 0;
@@ -63,6 +63,7 @@ class Terms {
       T p, n;
       joint_row(j, qd[j], p, n);
       if (joints_[j].compensated == Compensated::gravity) n += weight_on(j);
+      if (joints_[j].compensated == Compensated::model) p = n = T{};
       put(out, at_.joint_momentum() + j, p);
       put(out, at_.joint_bias() + j, n);
       for (int node : joints_[j].nodes) put_line(out, line++, node);
@@ -137,8 +138,8 @@ class Terms {
     put(out, first + TermsLayout::kMomentum + 3, node.angular_momentum + cross(node.p, l));
     put(out, first + TermsLayout::kWeight, G);
     put(out, first + TermsLayout::kWeight + 3, weight_moment(sensor.node) + cross(node.p, G));
-    put(out, first + TermsLayout::kRotation, node.R);
-    put(out, first + TermsLayout::kPosition, node.p);
+    put(out, first + TermsLayout::kPose, node.R);
+    put(out, first + TermsLayout::kPose + 9, node.p);
     if (sensor.turned) {
       const NodeState<T>& log = state_.node(sensor.log_node);  // -1: the world
       put(out, first + TermsLayout::kLogRotation, log.R * sensor.R_node_log);
