@@ -2,32 +2,44 @@
 """From a signed distance field to a closed triangle mesh of a wanted size.
 
 Surface nets on a regular grid, then quadric decimation (spends triangles where the surface is
-curved), then every vertex is put back onto the exact surface.
+curved), rounder triangles, and every vertex back on the exact surface.
 """
 
 import numpy as np
 import trimesh
 
+from arms.relax import relax
 from arms.sdf import Array, Field, gradient
 
 
 def mesh_field(
-    field: Field, low: Array, high: Array, cell: float, triangles: int
+    field: Field, low: Array, high: Array, cell: float, triangles: int, tries: int = 4
 ) -> trimesh.Trimesh:
     """The zero level of `field` inside the box `low`..`high` as about `triangles` triangles.
+
+    Surface nets can pinch where a cell is crossed twice; then the cell is made smaller.
 
     Raises:
         ValueError: the result is not a closed, outward-oriented surface.
     """
-    vertices, faces = surface_nets(field, low, high, cell)
-    vertices = project(field, vertices, 4 * cell)
-    vertices, faces = decimate(vertices, faces, triangles)
-    vertices = project(field, vertices, 2 * cell)
-    vertices = vertices.astype(np.float32).astype(np.float64)  # what binary STL keeps
-    mesh = trimesh.Trimesh(vertices, faces, process=True)
-    if not mesh.is_watertight or not mesh.is_winding_consistent or mesh.volume <= 0:
-        raise ValueError("the mesh is not closed and outward; refine the cell or the shape")
-    return mesh
+    for attempt in range(tries):
+        size = cell * 0.88**attempt
+        vertices, faces = surface_nets(field, low, high, size)
+        if not is_closed(vertices, faces):
+            continue
+        vertices, faces = decimate(project(field, vertices, 4 * size), faces, triangles)
+        vertices, faces = relax(field, project(field, vertices, 2 * size), faces)
+        vertices = project(field, vertices, 2 * size)
+        vertices = vertices.astype(np.float32).astype(np.float64)  # what binary STL keeps
+        if is_closed(vertices, faces):
+            return trimesh.Trimesh(vertices, faces)
+    raise ValueError("the mesh is not closed and outward; refine the cell or the shape")
+
+
+def is_closed(vertices: Array, faces: Array) -> bool:
+    """Does every edge join two faces, all facing outwards?"""
+    mesh = trimesh.Trimesh(vertices, faces)
+    return bool(mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0)
 
 
 def surface_nets(field: Field, low: Array, high: Array, cell: float) -> tuple[Array, Array]:
