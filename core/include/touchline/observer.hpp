@@ -100,7 +100,10 @@ class Observer {
   const Tree& tree() const { return tree_; }
   const std::vector<double>& output() const { return output_; }
   double time() const { return now_.time; }  // of the last accepted sample
-  const Pose& sensor_pose(int s) const { return poses_[s]; }
+  // Of sensor s in world, at the last accepted sample.
+  Pose sensor_pose(int s) const {
+    return load_pose(before_ + terms_.at().sensor(s) + TermsLayout::kPose);
+  }
   // The model's terms alone, for a state of its own.
   Terms<double>& terms() { return terms_; }
 
