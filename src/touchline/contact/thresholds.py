@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri, erfc
 
 from touchline.model.description import DetectionDescription, LevelDescription
 from touchline.model.robot import Robot
@@ -57,6 +56,8 @@ def make_thresholds(robot: Robot, period: float = 1e-3) -> Thresholds:
         the floors of this module). The sum limit has the false-alarm rate of one row.
     """
     detection = robot.description.detection
+    from scipy.special import chdtri, erfc  # slow to import
+
     joint_sigma, segment_sigma = residual_noise(robot, period)
     rows: list[RowThreshold] = []
     for g, segment in enumerate(robot.segment_names):

@@ -1,0 +1,36 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Makes .venv with Touchline and everything its demo, tests and checks need.
+# What is missing is installed where that is allowed (root on Debian), else named in one line.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+fail() {
+  echo "touchline: $1" >&2
+  exit 1
+}
+
+# need WHAT PACKAGE TEST...: installs the Debian package unless the test passes.
+need() {
+  local what=$1 package=$2
+  shift 2
+  if "$@" >/dev/null 2>&1; then return; fi
+  if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
+    echo "touchline: installing $package" >&2
+    (apt-get update -qq && apt-get install -y -qq "$package") >/dev/null 2>&1 || true
+  fi
+  "$@" >/dev/null 2>&1 || fail "$what is missing; on Debian: apt-get install $package"
+}
+
+need "python3" python3 command -v python3
+need "python3 3.11 or newer" python3 python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))'
+need "a C++ compiler (g++)" g++ command -v g++
+need "Python's venv module" python3-venv python3 -c 'import ensurepip, venv'
+need "Python's header files" python3-dev python3 -c \
+  'import os, sysconfig; os.stat(os.path.join(sysconfig.get_paths()["include"], "Python.h"))'
+
+[ -x .venv/bin/python ] || python3 -m venv .venv
+.venv/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
+.venv/bin/python -m pip install --quiet --disable-pip-version-check \
+  --editable ".[logs,report]" --group test --group check
+touch .venv/ready
