@@ -1,21 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The main job on a recording: log in, estimates, contacts and events out."""
+"""The main job on a recording: log in, estimates, contacts, events and report out."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from touchline.contact.event import Event
 from touchline.contact.pipeline import Pipeline
+from touchline.contact.thresholds import Thresholds
 from touchline.errors import InputError
 from touchline.estimation.observer import METHODS
 from touchline.estimation.samples import Samples
 from touchline.logs import Log, open_log
 from touchline.model.robot import Robot, load_robot
 from touchline.report.contact_rows import ContactRows
-from touchline.report.outputs import Outputs, prepare_directory
+from touchline.report.curves import Curves
+from touchline.report.facts import bandwidth_warnings, bandwidths
+from touchline.report.outputs import REPORT, Outputs, prepare_directory, write_text
 from touchline.report.statistics import Statistics
 
 CHUNK = 1 << 15  # samples; bounds the memory
@@ -32,7 +36,9 @@ class Analysis:
         method: of the observer.
         bandwidth: that overrides the description's [rad/s], or None.
         period: median time between the first samples [s].
+        thresholds: of the detection.
         statistics: of all samples.
+        curves: for plots.
         events: all events.
         warnings: what the user should know.
     """
@@ -43,7 +49,9 @@ class Analysis:
     method: str
     bandwidth: float | None
     period: float
+    thresholds: Thresholds
     statistics: Statistics
+    curves: Curves
     events: list[Event]
     warnings: list[str]
 
@@ -55,7 +63,7 @@ def analyze(
     bandwidth: float | None = None,
     method: str = "segment",
 ) -> Analysis:
-    """Analyze a recording and write `estimates.parquet`, `contacts.parquet`, `events.json`.
+    """Analyze a recording; writes estimates, contacts, events and the report into a directory.
 
     Args:
         log: the recording.
@@ -67,6 +75,8 @@ def analyze(
     Raises:
         InputError: an input cannot be used; what had been written before stays readable.
     """
+    from touchline.report.page import page_text
+
     _check_options(bandwidth, method)
     log, out, model = Path(log), Path(out), load_robot(robot)
     with open_log(log, model.description) as recording:
@@ -75,13 +85,14 @@ def analyze(
         if first is None or not len(first):
             raise InputError(f"{log}: holds no samples")
         prepare_directory(out, log, Path(robot))
-        period = typical_period(first.time)
-        pipeline = Pipeline(model, bandwidth, method, period)
-        statistics = _stream(recording, _chain(first, parts), pipeline, Outputs(out, model))
-        warnings = [*recording.warnings, *model.warnings]
-    return Analysis(
-        model, log, out, method, bandwidth, period, statistics, pipeline.events, warnings
-    )
+        run = _Run(Pipeline(model, bandwidth, method, typical_period(first.time)), out, first)
+        for part in _with_progress(recording, chain([first], parts)):
+            run.add(part)
+        warnings = bandwidth_warnings(bandwidths(model, bandwidth), run.period)
+        warnings += [*recording.warnings, *model.warnings]
+    analysis = run.finish(log, method, bandwidth, warnings)
+    write_text(out / REPORT, page_text(analysis))
+    return analysis
 
 
 def typical_period(time: np.ndarray) -> float:
@@ -98,25 +109,48 @@ def _check_options(bandwidth: float | None, method: str) -> None:
         raise InputError(f"--method {method}: unknown; allowed: {', '.join(METHODS)}")
 
 
-def _chain(first: Samples, rest: Iterator[Samples]) -> Iterator[Samples]:
-    yield first
-    yield from rest
+class _Run:
+    """One recording on its way through the pipeline, a part at a time."""
 
+    def __init__(self, pipeline: Pipeline, out: Path, first: Samples) -> None:
+        self.pipeline = pipeline
+        self.period = typical_period(first.time)
+        robot = pipeline.robot
+        self._out = out
+        self._outputs = Outputs(out, robot)
+        self._contacts = ContactRows(robot)
+        self._statistics = Statistics.of(len(robot.joint_names), len(robot.segment_names))
+        self._curves = Curves(pipeline, self.period)
 
-def _stream(
-    log: Log, parts: Iterator[Samples], pipeline: Pipeline, outputs: Outputs
-) -> Statistics:
-    robot = pipeline.robot
-    statistics = Statistics.of(len(robot.joint_names), len(robot.segment_names))
-    contact_rows = ContactRows(robot)
-    for part in _with_progress(log, parts):
-        estimate, detection = pipeline.run(part.time, part.q, part.qd, part.tau, part.wrench)
-        statistics.add(part.time, estimate, detection)
-        outputs.estimates(part.time, estimate)
-        outputs.contacts(contact_rows.rows(part.time, estimate, detection, pipeline.events))
-        outputs.events(pipeline.events)
-    outputs.finish(pipeline.events)
-    return statistics
+    def add(self, part: Samples) -> None:
+        """Take the next samples."""
+        time, events = part.time, self.pipeline.events
+        estimate, detection = self.pipeline.run(time, part.q, part.qd, part.tau, part.wrench)
+        self._statistics.add(time, estimate, detection)
+        self._curves.add(time, estimate, detection)
+        self._outputs.estimates(time, estimate)
+        self._outputs.contacts(self._contacts.rows(time, estimate, detection, events))
+        self._outputs.events(events)
+
+    def finish(
+        self, log: Path, method: str, bandwidth: float | None, warnings: list[str]
+    ) -> Analysis:
+        """Close the files; returns what there is to tell."""
+        events = self.pipeline.events
+        self._outputs.finish(events)
+        return Analysis(
+            robot=self.pipeline.robot,
+            log=log,
+            out=self._out,
+            method=method,
+            bandwidth=bandwidth,
+            period=self.period,
+            thresholds=self.pipeline.detector.thresholds,
+            statistics=self._statistics,
+            curves=self._curves,
+            events=events,
+            warnings=warnings,
+        )
 
 
 def _with_progress(log: Log, parts: Iterator[Samples]) -> Iterator[Samples]:
