@@ -117,7 +117,7 @@ class Statistics:
         self.healthy += int((health == 0).sum())
         for bit in Health:
             self.health[bit] += int(np.count_nonzero(health & bit))
-        quiet = ~(detection.levels > 0).any(axis=1)[:, None]
+        quiet = np.all(detection.levels == 0, axis=1, keepdims=True)
         settled = estimate.joint_settled
         self.torque.add(estimate.tau_ext, settled)
         self.quiet_torque.add(estimate.tau_ext, settled & quiet)
