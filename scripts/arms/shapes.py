@@ -16,10 +16,10 @@ from arms.sdf import (
     intersection,
     loop_tube,
     moved,
+    normalized,
     quintic,
     rounded_box,
     rounded_cylinder,
-    normalized,
     smoothstep,
     union,
 )

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.estimation.samples import Samples
-from touchline.model.description import JointDescription, SensorDescription
-from touchline.model.robot import AXES, Robot
+from touchline.model.description import AXES, JointDescription, SensorDescription
+from touchline.model.robot import Robot
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.simulator import Readings
 
