@@ -31,15 +31,23 @@ def mesh_field(
         vertices, faces = relax(field, project(field, vertices, 2 * size), faces)
         vertices = project(field, vertices, 2 * size)
         vertices = vertices.astype(np.float32).astype(np.float64)  # what binary STL keeps
-        if is_closed(vertices, faces):
+        if is_closed(vertices, faces) and steepest(field, vertices, faces) > 0.7:
             return trimesh.Trimesh(vertices, faces)
-    raise ValueError("the mesh is not closed and outward; refine the cell or the shape")
+    raise ValueError("the mesh is not closed and sound; refine the cell or the shape")
 
 
 def is_closed(vertices: Array, faces: Array) -> bool:
     """Does every edge join two faces, all facing outwards?"""
     mesh = trimesh.Trimesh(vertices, faces)
     return bool(mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0)
+
+
+def steepest(field: Field, vertices: Array, faces: Array) -> float:
+    """The least cosine between a triangle's normal and the surface's at its middle."""
+    mesh = trimesh.Trimesh(vertices, faces)
+    normals = gradient(field, mesh.triangles_center)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    return float((normals * mesh.face_normals).sum(axis=1).min())
 
 
 def surface_nets(field: Field, low: Array, high: Array, cell: float) -> tuple[Array, Array]:
