@@ -8,7 +8,7 @@ curved), rounder triangles, and every vertex back on the exact surface.
 import numpy as np
 import trimesh
 
-from arms.relax import relax
+from arms.relax import Faces, relax
 from arms.sdf import Array, Field, gradient
 
 
@@ -36,13 +36,13 @@ def mesh_field(
     raise ValueError("the mesh is not closed and sound; refine the cell or the shape")
 
 
-def is_closed(vertices: Array, faces: Array) -> bool:
+def is_closed(vertices: Array, faces: Faces) -> bool:
     """Does every edge join two faces, all facing outwards?"""
     mesh = trimesh.Trimesh(vertices, faces)
     return bool(mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0)
 
 
-def steepest(field: Field, vertices: Array, faces: Array) -> float:
+def steepest(field: Field, vertices: Array, faces: Faces) -> float:
     """The least cosine between a triangle's normal and the surface's at its middle."""
     mesh = trimesh.Trimesh(vertices, faces)
     normals = gradient(field, mesh.triangles_center)
@@ -50,7 +50,7 @@ def steepest(field: Field, vertices: Array, faces: Array) -> float:
     return float((normals * mesh.face_normals).sum(axis=1).min())
 
 
-def surface_nets(field: Field, low: Array, high: Array, cell: float) -> tuple[Array, Array]:
+def surface_nets(field: Field, low: Array, high: Array, cell: float) -> tuple[Array, Faces]:
     """Vertices (V, 3) and triangles (F, 3): one vertex per grid cell that the surface crosses."""
     counts = np.ceil((high - low) / cell).astype(int) + 1
     axes = [low[i] + cell * np.arange(counts[i]) for i in range(3)]
@@ -69,7 +69,7 @@ def sample(field: Field, axes: list[Array]) -> Array:
     return values
 
 
-def _cell_vertices(values: Array) -> tuple[Array, Array]:
+def _cell_vertices(values: Array) -> tuple[Array, Faces]:
     """Mean of the edge crossings of each crossed cell, in cells; and cell -> vertex number."""
     shape = np.array(values.shape) - 1
     total, count = np.zeros((*shape, 3)), np.zeros(shape)
@@ -95,7 +95,7 @@ def _cell_vertices(values: Array) -> tuple[Array, Array]:
     return np.argwhere(used) + total[used] / count[used][:, None], index
 
 
-def _crossing_quads(values: Array, index: Array) -> Array:
+def _crossing_quads(values: Array, index: Faces) -> Faces:
     """Two triangles around every grid edge that the surface crosses, oriented outwards."""
     faces = []
     for axis in range(3):
@@ -129,7 +129,7 @@ def project(field: Field, vertices: Array, limit: float, steps: int = 6) -> Arra
     return result
 
 
-def decimate(vertices: Array, faces: Array, triangles: int) -> tuple[Array, Array]:
+def decimate(vertices: Array, faces: Faces, triangles: int) -> tuple[Array, Faces]:
     """Quadric edge collapse to about `triangles` triangles (package fast-simplification)."""
     import fast_simplification
 

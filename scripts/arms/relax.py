@@ -41,7 +41,9 @@ def _flip(field: Field, vertices: Array, faces: Faces) -> tuple[Faces, int]:
         if ring & touched or new in existing:
             continue
         touched |= ring
-        result[left[i]], result[right[i]] = _turned(faces[left[i]], a[i], b[i], c[i], d[i])
+        result[left[i]], result[right[i]] = _turned(
+            faces[left[i]], int(a[i]), int(b[i]), int(c[i]), int(d[i])
+        )
         count += 1
     return result, count
 
