@@ -17,7 +17,6 @@ from touchline.model.mechanism import Inertia, Joint, Link, Mechanism
 from touchline.model.robot import Robot, load_robot
 from touchline.model.transforms import pose, rotation_rpy
 
-
 EXAMPLES = Path(__file__).parents[1] / "examples" / "robots"
 
 

@@ -6,6 +6,8 @@ import pytest
 from motion import Recording, ramp
 from robots import describe, random_mechanism
 
+from touchline.bench.motion import fast_motion
+from touchline.bench.robots import sara_like
 from touchline.errors import InputError
 from touchline.estimation.classical import (
     ClassicalObserver,
@@ -13,7 +15,12 @@ from touchline.estimation.classical import (
     classical_error,
     tool_wrench,
 )
-from touchline.estimation.dynamics import contact_loads, gravity_loads, point_jacobian
+from touchline.estimation.dynamics import (
+    contact_loads,
+    gravity_loads,
+    inverse_dynamics,
+    point_jacobian,
+)
 from touchline.estimation.observer import Observer
 from touchline.model.description import Friction, JointDescription, SensorDescription
 from touchline.model.robot import Robot
@@ -100,6 +107,19 @@ def test_the_error_of_the_classical_route_is_its_closed_form(robot, speed):
     predicted = classical_error(robot, record.q, estimate.tau_ext, truth_joints)
     np.testing.assert_allclose(error, predicted, rtol=1e-9, atol=1e-9)
     assert np.abs(error).max() > 1.0  # the transient of a ramp passes through M^-1
+
+
+def test_an_unmeasured_joint_torque_disturbs_the_classical_wrenches_only():
+    """The paper's figure 4: a couple inside the arm, which no sensor's row feels from outside."""
+    arm = sara_like(K)
+    motion = fast_motion(arm, 1000.0, 1.0)
+    needed = inverse_dynamics(arm, motion.q, motion.qd, motion.qdd)
+    tau = needed.torque.copy()
+    tau[:, 4] -= 10.0 * np.sin(2 * np.pi * 2.0 * motion.time)
+    signals = motion.time, motion.q, motion.qd, tau, needed.wrench
+    classical = np.abs(ClassicalObserver(arm).run(*signals).sensor_wrench[..., :3])
+    extended = np.abs(Observer(arm).run(*signals).sensor_wrench[..., :3])
+    assert classical.max() > 1.0 > 1e-2 > extended.max()
 
 
 def test_the_classical_route_has_no_lag_where_the_residual_has_none(robot):
@@ -289,12 +309,15 @@ def test_an_unmeasured_joint_lowers_the_rank(robot):
     assert np.isfinite(result.wrench).all()
 
 
-def test_a_singular_posture_shows_in_the_condition(robot):
-    q = np.full(7, 0.4)
-    regular = tool_wrench(robot, q, np.ones(7), "link7")
-    few = tool_wrench(robot, q, np.where(np.arange(7) < 6, 1.0, np.nan), "link7")
-    assert regular.rank == few.rank == 6
-    assert few.condition > regular.condition
+def test_a_singular_posture_costs_rank_and_its_neighbourhood_condition():
+    arm = sara_like()
+    straight, bent = np.zeros(7), np.full(7, 0.6)
+    near = straight + 1e-4 * bent
+    results = [tool_wrench(arm, q, np.ones(7), "tool") for q in (straight, near, bent)]
+    # Straight up, four axes coincide and the other three are parallel in one plane: 1 + 2.
+    assert [int(result.rank) for result in results] == [3, 6, 6]
+    assert results[1].condition > 1e3 * results[2].condition
+    assert np.linalg.norm(results[1].wrench) > 1e3 * np.linalg.norm(results[2].wrench)
 
 
 def test_an_unknown_link_is_named(robot):

@@ -60,9 +60,7 @@ def with_base_sensor(robot):
     base = SensorDescription("under_base", link, (0.02, -0.01, 0.03), (0.4, 0.2, -0.3))
     sensors = (base, *robot.description.sensors)
     bandwidths = {**robot.description.bandwidth_sensors, "under_base": 100.0}
-    description = replace(
-        robot.description, sensors=sensors, bandwidth_sensors=bandwidths
-    )
+    description = replace(robot.description, sensors=sensors, bandwidth_sensors=bandwidths)
     return Robot(description, robot.mechanism)
 
 

@@ -64,7 +64,9 @@ def test_missing_velocities_in_every_format(tmp_path, ending):
         with pa.output_stream(str(path), compression="detect") as stream:
             arrow_csv.write_csv(table, stream)
     with open_log(path, robot) as log:
+        assert log.progress == 0.0
         (chunk,) = log.chunks()
+        assert log.progress == 1.0
         assert log.warnings[0].startswith(f"{path}: no velocities of j2: estimated")
     np.testing.assert_array_equal(chunk.qd[:, 0], make_samples(5000).qd[:, 0])
     np.testing.assert_allclose(chunk.qd[:, 1], make_samples(5000).qd[:, 1], atol=1e-4)
@@ -120,9 +122,9 @@ def test_integers_and_nulls_in_parquet(tmp_path):
 
 
 @pytest.mark.parametrize("ending", ["csv", "csv.gz"])
-@pytest.mark.parametrize("row", [3, 61234])
+@pytest.mark.parametrize("row", [3, 41234])
 def test_cell_that_is_no_number(tmp_path, ending, row):
-    lines = rows(70000)
+    lines = rows(50000)
     lines[row] = lines[row].rsplit(",", 1)[0] + ",1.2.3"
     text = problems(write_csv(tmp_path / f"log.{ending}", *lines))
     assert f"row {row} (line {row + 2}), column 'tau.j2': '1.2.3' is not a number" in text
@@ -157,7 +159,7 @@ def test_missing_final_newline_is_no_cut(tmp_path):
 
 @pytest.mark.parametrize("keep", [0.3, 0.9, 0.9999])
 def test_cut_off_gzip(tmp_path, keep):
-    path = write_csv(tmp_path / "log.csv.gz", *rows(50000))
+    path = write_csv(tmp_path / "log.csv.gz", *rows(20000))
     whole = read_log(path, ROBOT)
     path.write_bytes(path.read_bytes()[: int(keep * path.stat().st_size)])
     with open_log(path, ROBOT) as log:
@@ -168,13 +170,13 @@ def test_cut_off_gzip(tmp_path, keep):
 
 
 def test_damaged_gzip(tmp_path):
-    path = write_csv(tmp_path / "log.csv.gz", *rows(50000))
+    path = write_csv(tmp_path / "log.csv.gz", *rows(20000))
     data = bytearray(path.read_bytes())
     data[len(data) // 2 : len(data) // 2 + 50] = bytes(50)
     path.write_bytes(bytes(data))
     try:
         with open_log(path, ROBOT) as log:
-            assert sum(len(chunk) for chunk in log.chunks()) < 50000
+            assert sum(len(chunk) for chunk in log.chunks()) < 20000
             assert "damaged after row" in log.warnings[0]
     except InputError as error:  # what came out of the damaged part was no table
         assert "row" in str(error)
@@ -290,9 +292,9 @@ def test_real_kinova(data):
     for file in sorted((data / "kinova_gen3").glob("*.csv")):
         samples = read_log(file, describe(joints, (), log))
         assert np.median(np.diff(samples.time)) == pytest.approx(0.001)
-        # The estimates agree with the robot's own, but where it logged a position twice (3 %).
+        # The estimates agree with the robot's own, except where a position was logged twice.
         with open_log(file, describe(joints, (), log | {"qd": "none{i1}"})) as opened:
             estimated = np.concatenate([chunk.qd for chunk in opened.chunks(500)])
             assert "estimated" in opened.warnings[0]
-        difference = np.std(estimated - samples.qd, axis=0)
-        assert np.all(difference < 0.06 * np.std(samples.qd, axis=0))
+        difference = np.median(np.abs(estimated - samples.qd), axis=0)
+        assert np.all(difference < 0.04 * np.std(samples.qd, axis=0))

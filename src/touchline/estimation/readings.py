@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.estimation.dynamics import Posture, gravity_loads
+from touchline.model.description import AXES
 from touchline.model.robot import Robot
-from touchline.model.values import AXES
 
 Array = NDArray[np.float64]
 

@@ -77,6 +77,7 @@ class CsvSource:
         found = next(blocks, empty)
         blocks.close()
         self.close()
+        self._stream = None
         return take(found, 0, HEAD_ROWS)
 
     def blocks(self) -> Iterator[Block]:
@@ -175,7 +176,7 @@ class CsvSource:
 
     def progress(self) -> float:
         """Fraction of the file's bytes read."""
-        return self._stream.fraction() if self._stream else 0.0
+        return self._stream.fraction if self._stream else 0.0
 
     def close(self) -> None:
         """Release the file."""

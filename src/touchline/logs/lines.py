@@ -16,6 +16,7 @@ class WholeLines(io.RawIOBase):
     Attributes:
         damage: why the file ended early, or None.
         partial: True when a cut-off last line was dropped.
+        fraction: of the file's bytes that have been taken in, 0 to 1.
     """
 
     def __init__(self, path: Path, delimiter: bytes = b",", fields: int = 0):
@@ -30,6 +31,7 @@ class WholeLines(io.RawIOBase):
         self._pending, self._ended = b"", False
         self.damage: str | None = None
         self.partial = False
+        self.fraction = 0.0
 
     def readable(self) -> bool:
         """Always."""
@@ -59,6 +61,7 @@ class WholeLines(io.RawIOBase):
             except (EOFError, zlib.error, gzip.BadGzipFile) as error:
                 self.damage, piece = str(error), b""
             self._ended = not piece
+            self.fraction = self._raw.tell() / self.size if self.size else 1.0
             pieces.append(piece)
             held += len(piece)
         if len(pieces) > 1:
@@ -74,10 +77,6 @@ class WholeLines(io.RawIOBase):
         if last.strip() and not whole:
             self._pending = self._pending[:start]
             self.partial = True
-
-    def fraction(self) -> float:
-        """Fraction of the file's bytes that have been taken in."""
-        return self._raw.tell() / self.size if self.size else 1.0
 
     def close(self) -> None:
         """Close the file."""

@@ -58,7 +58,10 @@ class Log:
 
         Raises:
             InputError: the log is damaged or holds something that is no number.
+            ValueError: `rows` is not positive.
         """
+        if rows < 1:
+            raise ValueError(f"chunks of {rows} rows")
         for window in windows(self._source.blocks(), rows, self._preparation.halo):
             yield self._preparation.samples(window)
 

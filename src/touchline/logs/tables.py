@@ -9,9 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from touchline.errors import InputError
-from touchline.logs.naming import AXES
 from touchline.logs.parquet import METADATA_KEY
-from touchline.model.description import RobotDescription
+from touchline.model.description import AXES, RobotDescription
 
 
 class SamplesLike(Protocol):

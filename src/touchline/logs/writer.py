@@ -17,8 +17,8 @@ from typing import Any, Self
 import numpy as np
 
 from touchline.errors import InputError
-from touchline.logs.naming import AXES
 from touchline.logs.parquet import METADATA_KEY
+from touchline.model.description import AXES
 
 PART_ROWS = 1 << 18
 PART_SECONDS = 5.0

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from touchline import _core
+from touchline.model.description import AXES
 from touchline.model.tree import Node
-from touchline.model.values import AXES
 
 if TYPE_CHECKING:
     from touchline.model.robot import Robot

@@ -13,14 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from touchline.model.description import Vector
+from touchline.model.description import AXES, Vector
 from touchline.model.mechanism import Inertia
 from touchline.model.plausibility import inertia_problem
 from touchline.model.suggest import not_allowed
 from touchline.model.transforms import inertia_matrix
 from touchline.model.yaml_file import kind_of
 
-AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 TORQUES = ("sensor", "motor", "none")
 
 Hook = Callable[..., Any]

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The main job on a recording: log in, estimates, contacts, events and report out."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+
+from touchline.contact.event import Event
+from touchline.contact.pipeline import Pipeline
+from touchline.contact.thresholds import Thresholds
+from touchline.errors import InputError
+from touchline.estimation.observer import METHODS
+from touchline.estimation.samples import Samples
+from touchline.logs import Log, open_log
+from touchline.model.robot import Robot, load_robot
+from touchline.report.contact_rows import ContactRows
+from touchline.report.curves import Curves
+from touchline.report.facts import bandwidth_warnings, bandwidths
+from touchline.report.outputs import REPORT, Outputs, prepare_directory, write_text
+from touchline.report.statistics import Statistics
+
+CHUNK = 1 << 15  # samples; bounds the memory
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """What came out of a recording.
+
+    Attributes:
+        robot: the robot.
+        log: path of the recording.
+        out: directory with the results.
+        method: of the observer.
+        bandwidth: that overrides the description's [rad/s], or None.
+        period: median time between the first samples [s].
+        thresholds: of the detection.
+        statistics: of all samples.
+        curves: for plots.
+        events: all events.
+        warnings: what the user should know.
+    """
+
+    robot: Robot
+    log: Path
+    out: Path
+    method: str
+    bandwidth: float | None
+    period: float
+    thresholds: Thresholds
+    statistics: Statistics
+    curves: Curves
+    events: list[Event]
+    warnings: list[str]
+
+
+def analyze(
+    log: Path | str,
+    robot: Path | str,
+    out: Path | str,
+    bandwidth: float | None = None,
+    method: str = "segment",
+) -> Analysis:
+    """Analyze a recording; writes estimates, contacts, events and the report into a directory.
+
+    Args:
+        log: the recording.
+        robot: path of its `robot.yaml`, or the name of a robot that ships with Touchline.
+        out: directory for the results.
+        bandwidth: K [rad/s] of all rows; default: the description's.
+        method: of the observer, "segment" or "paper".
+
+    Raises:
+        InputError: an input cannot be used; what had been written before stays readable.
+    """
+    from touchline.report.page import page_text
+
+    _check_options(bandwidth, method)
+    log, out, model = Path(log), Path(out), load_robot(robot)
+    with open_log(log, model.description) as recording:
+        parts = recording.chunks(CHUNK)
+        first = next(parts, None)
+        if first is None or not len(first):
+            raise InputError(f"{log}: holds no samples")
+        prepare_directory(out, log, Path(robot))
+        run = _Run(Pipeline(model, bandwidth, method, typical_period(first.time)), out, first)
+        for part in _with_progress(recording, chain([first], parts)):
+            run.add(part)
+        warnings = bandwidth_warnings(bandwidths(model, bandwidth), run.period)
+        warnings += [*recording.warnings, *model.warnings]
+    analysis = run.finish(log, method, bandwidth, warnings)
+    write_text(out / REPORT, page_text(analysis))
+    return analysis
+
+
+def typical_period(time: np.ndarray) -> float:
+    """Median step of time stamps [s] that go forward; 1 ms where there is none."""
+    steps = np.diff(time[np.isfinite(time)])
+    steps = steps[steps > 0]
+    return float(np.median(steps)) if len(steps) else 1e-3
+
+
+def _check_options(bandwidth: float | None, method: str) -> None:
+    if bandwidth is not None and not (np.isfinite(bandwidth) and bandwidth > 0):
+        raise InputError(f"--bandwidth {bandwidth}: must be a positive number [rad/s]")
+    if method not in METHODS:
+        raise InputError(f"--method {method}: unknown; allowed: {', '.join(METHODS)}")
+
+
+class _Run:
+    """One recording on its way through the pipeline, a part at a time."""
+
+    def __init__(self, pipeline: Pipeline, out: Path, first: Samples) -> None:
+        self.pipeline = pipeline
+        self.period = typical_period(first.time)
+        robot = pipeline.robot
+        self._out = out
+        self._outputs = Outputs(out, robot)
+        self._contacts = ContactRows(robot)
+        self._statistics = Statistics.of(len(robot.joint_names), len(robot.segment_names))
+        self._curves = Curves(pipeline, self.period)
+
+    def add(self, part: Samples) -> None:
+        """Take the next samples."""
+        time, events = part.time, self.pipeline.events
+        estimate, detection = self.pipeline.run(time, part.q, part.qd, part.tau, part.wrench)
+        self._statistics.add(time, estimate, detection)
+        self._curves.add(time, estimate, detection)
+        self._outputs.estimates(time, estimate)
+        self._outputs.contacts(self._contacts.rows(time, estimate, detection, events))
+        self._outputs.events(events)
+
+    def finish(
+        self, log: Path, method: str, bandwidth: float | None, warnings: list[str]
+    ) -> Analysis:
+        """Close the files; returns what there is to tell."""
+        events = self.pipeline.events
+        self._outputs.finish(events)
+        return Analysis(
+            robot=self.pipeline.robot,
+            log=log,
+            out=self._out,
+            method=method,
+            bandwidth=bandwidth,
+            period=self.period,
+            thresholds=self.pipeline.detector.thresholds,
+            statistics=self._statistics,
+            curves=self._curves,
+            events=events,
+            warnings=warnings,
+        )
+
+
+def _with_progress(log: Log, parts: Iterator[Samples]) -> Iterator[Samples]:
+    from tqdm import tqdm
+
+    form = "{desc} {percentage:3.0f} %|{bar}| {elapsed} (about {remaining} left)"
+    with tqdm(total=1.0, desc=log.path.name, bar_format=form, disable=None, leave=False) as bar:
+        for part in parts:
+            yield part
+            bar.update(log.progress - bar.n)

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the summary and the report say of an analysis, as rows of plain values."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from touchline.contact.event import Event
+from touchline.contact.thresholds import Thresholds
+from touchline.health import Health
+from touchline.model.robot import Robot
+from touchline.report.statistics import Statistics
+
+TUSTIN_LIMIT, RINGING = 0.5, 1.0  # of bandwidth times period
+SUGGESTED = 1 / 3
+
+HEALTH_MEANING = {
+    Health.SETTLING: "less than 5/K after the start, a gap or a reset; no event begins",
+    Health.GAP: "a step in time too long to integrate over; the filters restart",
+    Health.BAD_TIME: "the time stamp repeats or goes back; the sample is ignored",
+    Health.MISSING: "a signal that should be there is missing",
+    Health.NON_FINITE: "a signal is infinite or absurdly large",
+    Health.SATURATED: "a reading is at the end of its range",
+    Health.SENSOR_EXCLUDED: "a sensor has been absent for longer than a gap",
+    Health.MODEL_LIMIT: "a joint is outside its limits in the model",
+}
+
+
+@dataclass(frozen=True)
+class JointFacts:
+    """External torque of one joint [Nm]; NaN where it is not known, `threshold` None if untested.
+
+    `rms`, `mean` and `largest` count all settled samples, `quiet_rms` those without contact.
+    """
+
+    name: str
+    rms: float
+    quiet_rms: float
+    mean: float
+    largest: float
+    threshold: float | None
+
+
+@dataclass(frozen=True)
+class SegmentFacts:
+    """External wrench on one segment [N, Nm]: size of the vectors, root mean square."""
+
+    name: str
+    force_rms: float
+    quiet_force_rms: float
+    moment_rms: float
+    quiet_moment_rms: float
+    force_threshold: float
+    moment_threshold: float
+
+
+def joint_facts(
+    robot: Robot, statistics: Statistics, thresholds: Thresholds
+) -> tuple[JointFacts, ...]:
+    """One row per joint."""
+    limits = {row.joint: row.contact for row in thresholds.rows if row.joint >= 0}
+    torque, quiet = statistics.torque, statistics.quiet_torque
+    return tuple(
+        JointFacts(
+            name,
+            float(torque.rms[j]),
+            float(quiet.rms[j]),
+            float(torque.mean[j]),
+            float(torque.largest[j]),
+            limits.get(j),
+        )
+        for j, name in enumerate(robot.joint_names)
+    )
+
+
+def segment_facts(
+    robot: Robot, statistics: Statistics, thresholds: Thresholds
+) -> tuple[SegmentFacts, ...]:
+    """One row per segment whose wrench is measured."""
+    wrench, quiet = statistics.wrench, statistics.quiet_wrench
+    rows = []
+    for g, name in enumerate(robot.segment_names):
+        if name == "root":
+            continue
+        limits = {row.component: row.contact for row in thresholds.rows if row.segment == g}
+        force, moment = slice(6 * g, 6 * g + 3), slice(6 * g + 3, 6 * g + 6)
+        rows.append(
+            SegmentFacts(
+                name,
+                float(np.linalg.norm(wrench.rms[force])),
+                float(np.linalg.norm(quiet.rms[force])),
+                float(np.linalg.norm(wrench.rms[moment])),
+                float(np.linalg.norm(quiet.rms[moment])),
+                max(limits[i] for i in range(3)),
+                max(limits[i] for i in range(3, 6)),
+            )
+        )
+    return tuple(rows)
+
+
+def health_facts(statistics: Statistics) -> tuple[tuple[str, int, str], ...]:
+    """Name, count and meaning of every health bit that occurs."""
+    return tuple(
+        (bit.name.lower(), count, HEALTH_MEANING[bit])
+        for bit, count in statistics.health.items()
+        if count and bit.name
+    )
+
+
+def bandwidths(robot: Robot, override: float | None) -> dict[float, list[str]]:
+    """Every bandwidth in use [rad/s], with the joints and sensors that use it."""
+    users: dict[float, list[str]] = {}
+    joints = robot.description.bandwidth_joints
+    if len(set(joints)) == 1 or override:
+        users[override or joints[0]] = ["all joints"]
+    else:
+        for name, value in zip(robot.joint_names, joints, strict=True):
+            users.setdefault(value, []).append(name)
+    for name in robot.sensor_names:
+        users.setdefault(override or robot.description.bandwidth_sensors[name], []).append(name)
+    return users
+
+
+def bandwidth_warnings(users: dict[float, list[str]], period: float) -> list[str]:
+    """What there is to say of bandwidths that are high for the sample rate."""
+    lines = []
+    for value, names in users.items():
+        product = value * period
+        if product <= TUSTIN_LIMIT:
+            continue
+        what = f"bandwidth {value:g} rad/s at {1 / period:.4g} Hz (K dt = {product:.2f}"
+        who = ", ".join(names)
+        if product > RINGING:
+            better = one_digit(SUGGESTED / period)
+            lines.append(
+                f"{what} > 1) of {who}: too high for the sample rate, the estimates are noisier "
+                f"than need be; use about {better:g} (--bandwidth {better:g}, or under observer)"
+            )
+        else:
+            lines.append(f"{what} > 0.5) of {who}: the exponential form of the filter is in use")
+    return lines
+
+
+def one_digit(value: float) -> float:
+    """The value rounded to one significant digit."""
+    return float(f"{value:.0e}")
+
+
+def event_where(event: Event) -> str:
+    """The best word there is for where an event was: a link, else the most distal loaded joint."""
+    link = getattr(event, "link", None)
+    if link is not None:
+        return f"link {link}"
+    return f"beyond {event.joint}" if event.joint else ""

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Small pieces of HTML."""
+
+from collections.abc import Iterable, Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+
+
+def text(value: Any) -> str:
+    """A value as escaped text; numbers short, nothing for None and NaN."""
+    if value is None or (isinstance(value, float) and np.isnan(value)):
+        return ""
+    if isinstance(value, float):
+        return escape(f"{value:.6g}")
+    if isinstance(value, tuple | list):
+        return ", ".join(map(text, value))
+    return escape(str(value))
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[Any]], rows_as: Sequence[str] = ()) -> str:
+    """A table; a number, or text that is one, stands on the right. Empty columns are left out.
+
+    Args:
+        head: the columns' names.
+        rows: values, or finished cells as `Cell`.
+        rows_as: attributes of each row.
+    """
+    rows = [list(row) for row in rows]
+    kept = [i for i in range(len(head)) if not rows or any(text(row[i]) for row in rows)]
+    head, rows = [head[i] for i in kept], [[row[i] for i in kept] for row in rows]
+    numeric = [all(_is_number(row[i]) for row in rows) for i in range(len(head))]
+    kinds = [' class="number"' if is_number else "" for is_number in numeric]
+    lines = ['<div class="scroll"><table><thead><tr>']
+    lines += [f"<th{kind}>{escape(name)}</th>" for name, kind in zip(head, kinds, strict=True)]
+    lines.append("</tr></thead><tbody>")
+    for i, row in enumerate(rows):
+        cells = (f"<td{kind}>{cell(v)}</td>" for v, kind in zip(row, kinds, strict=True))
+        lines.append(f"<tr{rows_as[i] if rows_as else ''}>{''.join(cells)}</tr>")
+    return "".join([*lines, "</tbody></table></div>"])
+
+
+class Cell(str):
+    """HTML that stands as it is."""
+
+
+def cell(value: Any) -> str:
+    """The content of a table's cell."""
+    return value if isinstance(value, Cell) else text(value)
+
+
+def _is_number(value: Any) -> bool:
+    if value is None or isinstance(value, int | float):
+        return True
+    try:
+        float(str(value))
+    except ValueError:
+        return str(value) == ""
+    return True
+
+
+def section(title: str, *parts: str, anchor: str = "") -> str:
+    """A section with a heading."""
+    mark = f' id="{anchor}"' if anchor else ""
+    return f"<section{mark}><h2>{escape(title)}</h2>{''.join(parts)}</section>"
+
+
+def note(words: str) -> str:
+    """A remark in small print."""
+    return f'<p class="note">{escape(words)}</p>'

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The files that an analysis leaves in its directory, readable even if it is killed."""
+
+import json
+import os
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from touchline.contact.event import Event
+from touchline.errors import InputError
+from touchline.logs import EstimateWriter, TableWriter
+from touchline.model.robot import Robot
+from touchline.report.contact_rows import CONTACT_SCHEMA
+
+ESTIMATES, CONTACTS, EVENTS, REPORT = (
+    "estimates.parquet",
+    "contacts.parquet",
+    "events.json",
+    "report.html",
+)
+NAMES = (ESTIMATES, CONTACTS, EVENTS, REPORT)
+PARTS = ("estimates.parts", "contacts.parts")
+
+
+def prepare_directory(directory: Path, *inputs: Path) -> None:
+    """Make the directory, and take an older analysis out of it; other files stay as they are.
+
+    Args:
+        directory: where the results go.
+        inputs: files that are read; none of them may be among those that are replaced.
+
+    Raises:
+        InputError: it is a file, cannot be written, or a result would replace an input.
+    """
+    targets = {(directory / name).resolve() for name in NAMES}
+    for path in inputs:
+        if path.resolve() in targets:
+            raise InputError(f"{path}: would be replaced by the results; choose another --out")
+    if directory.exists() and not directory.is_dir():
+        raise InputError(f"--out {directory}: is a file; a directory is needed")
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        for name in NAMES:
+            (directory / name).unlink(missing_ok=True)
+        for name in PARTS:
+            if (directory / name).is_dir():
+                shutil.rmtree(directory / name)
+    except OSError as error:
+        raise InputError(f"--out {directory}: cannot be written: {error.strerror}") from error
+    if not os.access(directory, os.W_OK):
+        raise InputError(f"--out {directory}: cannot be written")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file in one step: a reader finds the old one or the new one, never half of it."""
+    draft = path.with_name(f".{path.name}.part")
+    draft.write_text(text, encoding="utf-8")
+    draft.replace(path)
+
+
+def strict(value: Any) -> Any:
+    """The value with null in place of what JSON cannot say (NaN, infinities); arrays as lists."""
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, dict):
+        return {str(key): strict(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [strict(item) for item in value]
+    if isinstance(value, float | np.floating):
+        return float(value) if np.isfinite(value) else None
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def write_events(path: Path, events: Sequence[Event]) -> None:
+    """Write `events.json`."""
+    lines = [json.dumps(strict(event.as_json()), allow_nan=False) for event in events]
+    body = ",\n".join(lines)
+    write_text(path, f"[\n{body}\n]\n" if lines else "[]\n")
+
+
+class Outputs:
+    """The tables of a running analysis and its list of events."""
+
+    def __init__(self, directory: Path, robot: Robot) -> None:
+        self.directory = directory
+        names = (robot.joint_names, robot.sensor_names, robot.segment_names)
+        self._estimates = EstimateWriter(directory, *names)
+        self._contacts = TableWriter(directory / CONTACTS, CONTACT_SCHEMA)
+        self._written: list[Any] | None = None
+        self.events([])
+
+    def estimates(self, time: np.ndarray, estimate: Any) -> None:
+        """Append the estimates of N samples."""
+        self._estimates.write(
+            time, estimate.health, estimate.tau_ext, estimate.sensor_wrench, estimate.segment_wrench
+        )
+
+    def contacts(self, rows: dict[str, Any]) -> None:
+        """Append rows of contacts."""
+        self._contacts.write(rows)
+
+    def events(self, events: Sequence[Event]) -> None:
+        """Bring `events.json` up to date: an event is in it as soon as it begins."""
+        state = [(event.cleared, event.level) for event in events]
+        if state != self._written:
+            write_events(self.directory / EVENTS, events)
+            self._written = state
+
+    def finish(self, events: Sequence[Event]) -> None:
+        """Turn the parts into the tables, and write the events for good."""
+        self._estimates.close()
+        self._contacts.close()
+        write_events(self.directory / EVENTS, events)

@@ -1,0 +1,271 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`report.html`: one file that needs nothing else, no network least of all."""
+
+import base64
+import json
+from html import escape
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+from touchline import __version__
+from touchline.contact.event import Event
+from touchline.report.analysis import Analysis
+from touchline.report.curves import Panel
+from touchline.report.facts import event_where, health_facts, joint_facts, segment_facts
+from touchline.report.html import Cell, note, section, table
+from touchline.report.outputs import strict
+from touchline.report.robot_section import robot_section
+
+MOST_EVENTS, MOST_SHADED = 1000, 5000
+EPOCH = 1e6  # s; stamps beyond it are dates, and plots count from their first sample
+STEPS = 32767
+
+PAGE = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy"
+  content="default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'">
+<title>{title}</title>
+<style>
+{style}</style>
+</head>
+<body>
+<main>
+{body}
+<footer>Touchline {version}. Forces and torques are those on the robot; SI units; wrenches of
+segments in world axes about the world origin. Not a certified safety function.</footer>
+</main>
+<script type="application/json" id="data">{data}</script>
+<script>
+{script}</script>
+</body>
+</html>
+"""
+
+
+def page_text(analysis: Analysis) -> str:
+    """The whole page."""
+    assets = files("touchline.report") / "assets"
+    body = [
+        _header(analysis),
+        _warnings(analysis),
+        _events(analysis),
+        _plots(analysis),
+        _residuals(analysis),
+        _health(analysis),
+        robot_section(analysis),
+    ]
+    return PAGE.format(
+        title=escape(f"{analysis.log.name} - Touchline"),
+        style=(assets / "report.css").read_text(encoding="utf-8"),
+        body="\n".join(body),
+        version=__version__,
+        data=json.dumps(strict(_data(analysis)), allow_nan=False).replace("<", "\\u003c"),
+        script=(assets / "report.js").read_text(encoding="utf-8"),
+    )
+
+
+def _origin(analysis: Analysis) -> float:
+    start = analysis.statistics.clock.first
+    return start if abs(start) > EPOCH else 0.0
+
+
+def _header(analysis: Analysis) -> str:
+    statistics = analysis.statistics
+    clock, events = statistics.clock, analysis.events
+    collisions = sum(event.level == "collision" for event in events)
+    healthy = 100 * statistics.healthy / max(clock.rows, 1)
+    cards = [
+        (f"{clock.duration:.2f} s", f"{clock.rows} samples"),
+        (f"{1 / analysis.period:.4g} Hz", f"longest step {1e3 * clock.longest:.3g} ms"),
+        (str(len(events)), f"events, {collisions} of them collisions"),
+        (f"{healthy:.1f} %", "of the samples without remark"),
+    ]
+    boxes = "".join(f'<div class="card"><b>{a}</b><span>{b}</span></div>' for a, b in cards)
+    return (
+        f"<h1>{escape(analysis.log.name)}</h1>"
+        f'<p class="soft">{escape(analysis.robot.name)}, observer method '
+        f'{analysis.method}</p><div class="cards">{boxes}</div>'
+    )
+
+
+def _warnings(analysis: Analysis) -> str:
+    if not analysis.warnings:
+        return ""
+    items = "".join(f"<li>{escape(line)}</li>" for line in analysis.warnings)
+    return f'<div class="warnings"><ul>{items}</ul></div>'
+
+
+def _events(analysis: Analysis) -> str:
+    events = analysis.events
+    if not events:
+        return section("Events", "<p>None.</p>")
+    head = ["", "detected [s]", "lasted [s]", "level", "segment", "force [N]", "torque [Nm]"]
+    rows = [_event_row(event, _origin(analysis)) for event in events[:MOST_EVENTS]]
+    marks = [f' data-event="{i}"' for i in range(len(rows))]
+    hidden = len(events) - MOST_EVENTS
+    words = "Peaks of force and of the torque on the named joint. A click shows the event below."
+    if hidden > 0:
+        words += f" {hidden} more are in events.json."
+    strip = (
+        '<div class="plot" data-strip><svg role="img" aria-label="events over time"></svg></div>'
+    )
+    return section("Events", strip, table([*head, "where", "located"], rows, marks), note(words))
+
+
+def _event_row(event: Event, origin: float) -> list[Any]:
+    lasted = "to the end" if event.cleared is None else f"{event.cleared - event.detected:.3f}"
+    peak = event.force_peak, event.torque_peak
+    return [
+        event.id,
+        f"{event.detected - origin:.3f}",
+        lasted,
+        Cell(f'<span class="level {event.level}">{event.level}</span>'),
+        event.segment,
+        *("" if value is None else f"{value:.2f}" for value in peak),
+        event_where(event),
+        event.status.replace("_", " "),
+    ]
+
+
+def _plots(analysis: Analysis) -> str:
+    panels = list(enumerate(analysis.curves.panels))
+    panels.sort(key=lambda pair: pair[1].kind != "test")  # the tests tell most, so they come first
+    tools = (
+        '<div class="tools"><button id="reset">whole recording</button><span id="shown"></span>'
+        '<span id="at"></span></div>'
+    )
+    origin = _origin(analysis)
+    since = f" Times count from {origin:.3f} s." if origin else ""
+    words = (
+        "Each point of a curve spans the least and the largest value of its piece of time. Drag "
+        "over a plot to zoom in, double-click to see all; events are shaded. The band is the slow "
+        f"baseline with the contact threshold on either side.{since}"
+    )
+    figures = "".join(_figure(panel, index) for index, panel in panels)
+    return section("Plots", note(words), tools, figures, anchor="plots")
+
+
+def _figure(panel: Panel, index: int) -> str:
+    keys = "".join(
+        f'<span class="key s{i}">{escape(curve.name)} '
+        f'<span class="value" data-curve="{curve.column}"></span></span>'
+        for i, curve in enumerate(panel.curves)
+    )
+    return (
+        f'<div class="plot" data-panel="{index}"><header><b>{escape(panel.title)}</b>'
+        f'<span class="soft">{escape(panel.unit)}</span>{keys}</header>'
+        f'<svg role="img" aria-label="{escape(panel.title)} over time"></svg></div>'
+    )
+
+
+def _residuals(analysis: Analysis) -> str:
+    robot, statistics, thresholds = analysis.robot, analysis.statistics, analysis.thresholds
+    rows = [
+        [j.name, *_digits(j.rms, j.quiet_rms, j.mean, j.largest, j.threshold)]
+        for j in joint_facts(robot, statistics, thresholds)
+    ]
+    head = ["joint", "RMS", "RMS without contact", "mean", "largest", "contact threshold"]
+    parts = ["<h3>External joint torques [Nm]</h3>", table(head, rows)]
+    segments = segment_facts(robot, statistics, thresholds)
+    if segments:
+        rows = [
+            [
+                s.name,
+                *_digits(
+                    s.force_rms,
+                    s.quiet_force_rms,
+                    s.force_threshold,
+                    s.moment_rms,
+                    s.quiet_moment_rms,
+                    s.moment_threshold,
+                ),
+            ]
+            for s in segments
+        ]
+        head = [
+            "segment",
+            "force RMS [N]",
+            "without contact",
+            "threshold",
+            "moment RMS [Nm]",
+            "without contact",
+            "threshold",
+        ]
+        parts += ["<h3>External wrenches of segments</h3>", table(head, rows)]
+        parts.append(
+            note(
+                "Moments about the world origin; thresholds are those in the frame of "
+                "the segment's sensor, about its origin."
+            )
+        )
+    words = (
+        "Settled samples only. While nothing touches, what is left is the model's error and noise."
+    )
+    return section("Residuals", *parts, note(words))
+
+
+def _digits(*values: float | None) -> list[str]:
+    return ["" if v is None or not np.isfinite(v) else f"{v:.3f}" for v in values]
+
+
+def _health(analysis: Analysis) -> str:
+    rows = list(health_facts(analysis.statistics))
+    if not rows:
+        return section("Health", "<p>No sample with a remark.</p>")
+    return section("Health", table(["bit", "samples", "meaning"], rows))
+
+
+def _data(analysis: Analysis) -> dict[str, Any]:
+    traces = analysis.curves.traces
+    used, start = traces.used, traces.start
+    end = start + used * traces.width
+    columns = range(traces.low.shape[1])
+    return {
+        "start": start,
+        "origin": _origin(analysis),
+        "width": traces.width,
+        "count": used,
+        "curves": [_packed(traces.low[:used, i], traces.high[:used, i]) for i in columns],
+        "panels": [_panel_data(panel) for panel in analysis.curves.panels],
+        "segments": list(analysis.robot.segment_names),
+        "events": [
+            {
+                "segment": event.segment,
+                "level": event.level,
+                "from": event.detected - start,
+                "to": (end if event.cleared is None else event.cleared) - start,
+                "title": f"{event.id}: {event.level}, {event_where(event) or event.segment}",
+            }
+            for event in analysis.events[:MOST_SHADED]
+        ],
+    }
+
+
+def _panel_data(panel: Panel) -> dict[str, Any]:
+    curves = [{"name": curve.name, "column": curve.column} for curve in panel.curves]
+    return {
+        "segment": panel.segment,
+        "curves": curves,
+        "band": panel.band,
+        "limit": panel.limit,
+    }
+
+
+def _packed(low: np.ndarray, high: np.ndarray) -> dict[str, Any]:
+    """A curve in 16 bits a value: middle + step * number, the smallest number standing for NaN."""
+    least, largest = np.fmin.reduce(low, initial=np.inf), np.fmax.reduce(high, initial=-np.inf)
+    if least > largest:
+        least = largest = 0.0
+    middle, half = 0.5 * (least + largest), 0.5 * (largest - least)
+    step = half / STEPS if half > 0 else 1.0
+
+    def pack(values: np.ndarray) -> str:
+        numbers = np.where(np.isfinite(values), np.round((values - middle) / step), -STEPS - 1)
+        return base64.b64encode(numbers.astype("<i2").tobytes()).decode("ascii")
+
+    return {"middle": float(middle), "step": float(step), "low": pack(low), "high": pack(high)}

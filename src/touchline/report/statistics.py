@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figures of a whole recording, gathered part by part."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.contact.detector import Detection
+from touchline.estimation.observer import Estimate
+from touchline.health import Health
+
+Array = NDArray[np.float64]
+
+
+class Moments:
+    """Root mean square, mean and largest magnitude of columns (c,); NaN does not count."""
+
+    def __init__(self, columns: int) -> None:
+        self.count = np.zeros(columns, dtype=int)
+        self._sum, self._squares = np.zeros(columns), np.zeros(columns)
+        self._largest = np.zeros(columns)
+
+    def add(self, values: Array, where: NDArray[np.bool_]) -> None:
+        """Take rows (N, c) where (N, c) is true."""
+        used = where & np.isfinite(values)
+        clean = np.where(used, values, 0.0)
+        self.count += used.sum(axis=0)
+        self._sum += clean.sum(axis=0)
+        self._squares += np.einsum("ij,ij->j", clean, clean)
+        if len(values):
+            self._largest = np.maximum(self._largest, np.maximum(clean.max(0), -clean.min(0)))
+
+    def _per_sample(self, total: Array) -> Array:
+        return np.divide(total, self.count, out=np.full(len(total), np.nan), where=self.count > 0)
+
+    @property
+    def mean(self) -> Array:
+        """Mean (c,); NaN without samples."""
+        return self._per_sample(self._sum)
+
+    @property
+    def rms(self) -> Array:
+        """Root mean square (c,); NaN without samples."""
+        return np.sqrt(self._per_sample(self._squares))
+
+    @property
+    def largest(self) -> Array:
+        """Largest magnitude (c,); NaN without samples."""
+        return np.where(self.count > 0, self._largest, np.nan)
+
+
+@dataclass
+class Clock:
+    """Time stamps: first and last [s], and the longest step."""
+
+    rows: int = 0
+    first: float = np.nan
+    last: float = np.nan
+    longest: float = 0.0
+
+    def add(self, time: Array) -> None:
+        """Take N stamps."""
+        self.rows += len(time)
+        stamps = time[np.isfinite(time)]
+        if not len(stamps):
+            return
+        if np.isnan(self.first):
+            self.first = float(stamps[0])
+        else:
+            stamps = np.concatenate([[self.last], stamps])
+        self.longest = max(self.longest, float(np.diff(stamps).max(initial=0.0)))
+        self.last = float(stamps[-1])
+
+    @property
+    def duration(self) -> float:
+        """From the first stamp to the last [s]."""
+        return self.last - self.first
+
+    @property
+    def rate(self) -> float:
+        """Samples per second on average; NaN where time stands still."""
+        return (self.rows - 1) / self.duration if self.duration > 0 else np.nan
+
+
+@dataclass
+class Statistics:
+    """What a recording's samples amount to.
+
+    Attributes:
+        clock: time stamps.
+        health: samples with each health bit.
+        healthy: samples without any.
+        torque: external joint torques, all settled samples.
+        quiet_torque: the same while nothing touches.
+        wrench: segment wrenches (6 m columns), all settled samples.
+        quiet_wrench: the same while nothing touches.
+    """
+
+    torque: Moments
+    quiet_torque: Moments
+    wrench: Moments
+    quiet_wrench: Moments
+    clock: Clock = field(default_factory=Clock)
+    health: dict[Health, int] = field(default_factory=lambda: dict.fromkeys(Health, 0))
+    healthy: int = 0
+
+    @classmethod
+    def of(cls, joints: int, segments: int) -> "Statistics":
+        """Statistics of nothing yet."""
+        return cls(Moments(joints), Moments(joints), Moments(6 * segments), Moments(6 * segments))
+
+    def add(self, time: Array, estimate: Estimate, detection: Detection) -> None:
+        """Take N samples."""
+        self.clock.add(time)
+        health = estimate.health
+        self.healthy += int((health == 0).sum())
+        for bit in Health:
+            self.health[bit] += int(np.count_nonzero(health & bit))
+        quiet = np.all(detection.levels == 0, axis=1, keepdims=True)
+        settled = estimate.joint_settled
+        self.torque.add(estimate.tau_ext, settled)
+        self.quiet_torque.add(estimate.tau_ext, settled & quiet)
+        wrench = estimate.segment_wrench.reshape(len(time), -1)
+        settled = np.repeat(estimate.segment_settled, 6, axis=1)
+        self.wrench.add(wrench, settled)
+        self.quiet_wrench.add(wrench, settled & quiet)
