@@ -50,6 +50,21 @@ class Answer:
     candidates: tuple[Candidate, ...] = ()
 
 
+@dataclass(frozen=True)
+class EventAnswer:
+    """Where an event is, from all its strong samples; see `touchline.Event`."""
+
+    status: str
+    link: str | None = None
+    body: str | None = None
+    body_probability: float | None = None
+    position: Array | None = None
+    position_link: Array | None = None
+    time_of_position: float | None = None
+    position_std: float | None = None
+    candidates: tuple[Candidate, ...] = ()
+
+
 class Localizer:
     """One estimator for every layout of sensors (see `core/include/touchline/localizer.hpp`).
 
@@ -144,9 +159,40 @@ class Localizer:
             np.ascontiguousarray(qd, float),
         )
 
-    def event(self, segment: int) -> Array:
-        """The native event on a segment that is touched, or was last."""
-        return self.core.event(segment)[0]
+    def event(self, segment: int) -> EventAnswer:
+        """The event on a segment, by its index, that is touched or was last."""
+        return self.event_answer(self.core.event(segment)[0])
+
+    def event_answer(self, row: Array) -> EventAnswer:
+        """Names the numbers of a native event."""
+        status = STATUS[int(row[0])] or "wrench_only"
+        n = len(self.robot.joint_names)
+        time, variance, q = float(row[1]), float(row[2]), row[4 : 4 + n]
+        places = row[4 + n :].reshape(-1, PER_CANDIDATE)[: int(row[3])]
+        poses = self.robot.poses(q) if len(places) else np.empty((0, 4, 4))
+        candidates = tuple(self._candidate(place, poses) for place in places)
+        if status not in ("located", "ambiguous"):
+            return EventAnswer(status, candidates=candidates)
+        best = candidates[0]
+        T_node_link = self.skin.patches[int(places[0][0])].T_node_link
+        return EventAnswer(
+            status,
+            best.link,
+            best.body,
+            sum(other.probability for other in candidates if other.body == best.body),
+            best.position,
+            T_node_link[:3, :3].T @ (places[0][3:] - T_node_link[:3, 3]),
+            time,
+            float(np.sqrt(variance)),
+            candidates,
+        )
+
+    def _candidate(self, place: Array, poses: Array) -> Candidate:
+        surface, node, share = place[:3]
+        T = poses[int(node)]
+        position = T[:3, :3] @ place[3:] + T[:3, 3]
+        link = self.skin.patches[int(surface)].link
+        return Candidate(link, self._body_names[int(node)], float(share), position)
 
     def wrench_covariance(self, segment: str, q: ArrayLike, estimate: Estimate) -> Array:
         """Covariance (6, 6) of a segment's filtered wrench, world axes, about the world origin.
