@@ -36,7 +36,7 @@ inline tl::Vec3 vec3(const In& v) {
   return {v.data()[0], v.data()[1], v.data()[2]};
 }
 
-inline tl::Line line(const In& origin, const In& direction) {
+inline tl::ForceLine line(const In& origin, const In& direction) {
   const tl::Vec3 d = vec3(direction);
   const double length = tl::norm(d);
   if (!(length > 0.0)) throw std::invalid_argument("a line needs a direction");

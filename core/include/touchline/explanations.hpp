@@ -50,7 +50,7 @@ class Explanations {
   Explanations(const Observer& observer, const Measurement& measurement,
                const LocalizerSettings& settings, std::vector<LinkSurface> surfaces)
       : observer_(observer),
-        tree_(measurement.tree()),
+        posture_(measurement.posture()),
         fitter_(settings),
         surfaces_(std::move(surfaces)) {
     for (int g = 0; g < observer.row_layout().segments; ++g) bodies_.push_back(bodies_of(g));
@@ -98,26 +98,26 @@ class Explanations {
   const std::vector<LinkSurface>& surfaces() const { return surfaces_; }
   const ForceFitter& fitter() const { return fitter_; }
 
-  static Line line_of(const Spatial& w) {
+  static ForceLine line_of(const Spatial& w) {
     const double size2 = dot(w.linear, w.linear);
     return {(1.0 / size2) * cross(w.linear, w.angular), (1.0 / std::sqrt(size2)) * w.linear};  // (19)
   }
-  Line to_node(const Line& line, int node) const {
-    const Pose& X = tree_.state(node).pose;
+  ForceLine to_node(const ForceLine& line, int node) const {
+    const Pose& X = posture_.pose(node);
     return {transposed_times(X.R, line.origin - X.p), transposed_times(X.R, line.direction)};
   }
   Vec3 to_world(const Vec3& p, int node) const {
-    const Pose& X = tree_.state(node).pose;
+    const Pose& X = posture_.pose(node);
     return X.R * p + X.p;
   }
   Vec3 to_node(const Vec3& p, int node) const {
-    const Pose& X = tree_.state(node).pose;
+    const Pose& X = posture_.pose(node);
     return transposed_times(X.R, p - X.p);
   }
 
   // Calls `visit(surface, point, normal, t)` for each entry of a line into the links of segment g.
   template <class Visit>
-  void entries(int g, const Line& line, Visit&& visit) const {
+  void entries(int g, const ForceLine& line, Visit&& visit) const {
     for (const Body& body : bodies_[g]) {
       for (int s : body.surfaces) entries_of(s, line, visit);
     }
@@ -158,12 +158,12 @@ class Explanations {
   int segment_of(int node) const {
     const auto& segments = observer_.layout().segments;
     bool moves = false;
-    for (int n = node; n >= 0; n = tree_.nodes()[n].parent) {
+    for (int n = node; n >= 0; n = posture_.nodes()[n].parent) {
       for (std::size_t g = 0; g < segments.size(); ++g) {
         if (segments[g].sensor >= 0 && observer_.sensors()[segments[g].sensor].node == n)
           return static_cast<int>(g);
       }
-      moves = moves || tree_.nodes()[n].kind != NodeKind::fixed;
+      moves = moves || posture_.nodes()[n].kind != NodeKind::fixed;
     }
     if (!moves || segments.back().sensor >= 0) return -1;
     return static_cast<int>(segments.size()) - 1;
@@ -213,9 +213,9 @@ class Explanations {
   }
 
   template <class Visit>
-  void entries_of(int surface, const Line& line, Visit&& visit) const {
+  void entries_of(int surface, const ForceLine& line, Visit&& visit) const {
     const int node = surfaces_[surface].node;
-    const Mat3& R = tree_.state(node).pose.R;
+    const Mat3& R = posture_.pose(node).R;
     surfaces_[surface].mesh.crossings(to_node(line, node), [&](const Crossing& c) {
       const Vec3 normal = R * c.normal;
       if (dot(normal, line.direction) < 0.0) visit(surface, line.at(c.t), normal, c.t);
@@ -224,7 +224,7 @@ class Explanations {
 
   // All entries of the line into the body.
   void enter(View& view) {
-    const Line line = line_of(view.wrench);
+    const ForceLine line = line_of(view.wrench);
     const int before = count_;
     for (int s : *view.surfaces) {
       entries_of(s, line, [&](int surface, const Vec3& point, const Vec3& normal, double) {
@@ -281,7 +281,7 @@ class Explanations {
 
   // The surface nearest to the line, and from there the best explanation nearby.
   void miss(View& view) {
-    const Line line = line_of(view.wrench);
+    const ForceLine line = line_of(view.wrench);
     for (int s : *view.surfaces) {
       const SurfacePoint p = surfaces_[s].mesh.nearest_to_line(to_node(line, view.node), kFar);
       if (p.face < 0 || count_ == kMost) continue;
@@ -295,7 +295,7 @@ class Explanations {
   void place(const View& view, int surface, const Vec3& point, const Vec3& normal) {
     Candidate& k = fresh(view, surface);
     k.point = to_world(point, view.node);
-    k.normal = tree_.state(view.node).pose.R * normal;
+    k.normal = posture_.pose(view.node).R * normal;
     k.fit = fitter_.fit(view.q, k.point, k.normal);
   }
 
@@ -371,7 +371,7 @@ class Explanations {
   }
 
   bool try_point(const View& view, Candidate& k, const Vec3& target) {
-    const Pose& X = tree_.state(view.node).pose;
+    const Pose& X = posture_.pose(view.node);
     const SurfacePoint p =
         surfaces_[k.surface].mesh.nearest_to_point(transposed_times(X.R, target - X.p), 0.05);
     if (p.face < 0) return false;
@@ -385,7 +385,7 @@ class Explanations {
   }
 
   const Observer& observer_;
-  const Tree& tree_;
+  const Posture& posture_;
   ForceFitter fitter_;
   std::vector<LinkSurface> surfaces_;
   std::vector<std::vector<Body>> bodies_;     // per segment

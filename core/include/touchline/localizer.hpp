@@ -213,11 +213,11 @@ class Localizer {
   double reachable(const Candidate& k) const {
     const double size = norm(k.fit.force);
     if (size == 0.0) return 0.0;
-    const Line line{k.point, (1.0 / size) * k.fit.force};
+    const ForceLine line{k.point, (1.0 / size) * k.fit.force};
     double nearest = -std::numeric_limits<double>::infinity();
     bool inside = false;
     for (const LinkSurface& surface : surfaces()) {
-      const Line local = found_.to_node(line, surface.node);
+      const ForceLine local = found_.to_node(line, surface.node);
       surface.mesh.crossings(local, [&](const Crossing& c) {
         if (c.t > -1e-6 || c.t <= nearest) return;
         nearest = c.t;

@@ -12,6 +12,7 @@
 #include "touchline/dense.hpp"
 #include "touchline/detector.hpp"
 #include "touchline/observer.hpp"
+#include "touchline/posture.hpp"
 
 namespace touchline {
 
@@ -43,12 +44,10 @@ class Measurement {
  public:
   Measurement(const Observer& observer, std::vector<DetectionRow> tests, NoiseFigures noise)
       : observer_(observer),
-        tree_(observer.tree()),
+        posture_(observer.tree(), observer.row_layout().joints),
         tests_(std::move(tests)),
         noise_(std::move(noise)),
         layout_(observer.row_layout()),
-        unit_(layout_.joints, 0.0),
-        momenta_(tree_.nodes().size() * layout_.joints),
         joint_offsets_(layout_.joints) {
     for (int g = 0; g < layout_.segments; ++g) rows_.push_back(rows_of(g));
     std::size_t most = 0;
@@ -62,18 +61,8 @@ class Measurement {
     design_.resize(size * 7);
   }
 
-  // The configuration of the sample; twists are zero without `qd`.
-  void set_state(const double* q, const double* qd) {
-    const int n = layout_.joints;
-    for (int i = 0; i < n; ++i) {  // the momentum that a unit velocity of each joint makes
-      unit_[i] = 1.0;
-      tree_.update(q, unit_.data());
-      unit_[i] = 0.0;
-      for (std::size_t a = 0; a < tree_.nodes().size(); ++a)
-        momenta_[a * n + i] = tree_.state(static_cast<int>(a)).momentum;
-    }
-    tree_.update(q, qd != nullptr ? qd : unit_.data());
-  }
+  // The configuration of the sample; `qd` may be null.
+  void set_state(const double* q, const double* qd) { posture_.set(q, qd); }
 
   // Takes the observer's row, and the detector's normalized rows (or null) from which the offsets
   // follow. Returns false where nothing is known of the segment.
@@ -105,7 +94,7 @@ class Measurement {
   // Rows in use: six of a wrench and the others.
   int size() const { return size_; }
   int scalars() const { return count_; }
-  const Tree& tree() const { return tree_; }
+  const Posture& posture() const { return posture_; }
   std::size_t tests() const { return tests_.size(); }
 
   // Covariance (6, 6) of the segment's wrench.
@@ -179,7 +168,7 @@ class Measurement {
   }
 
   int inboard_sensor(int node) const {
-    for (; node >= 0; node = tree_.nodes()[node].parent) {
+    for (; node >= 0; node = posture_.nodes()[node].parent) {
       for (std::size_t s = 0; s < observer_.sensors().size(); ++s) {
         if (observer_.sensors()[s].six_axis() && observer_.sensors()[s].node == node)
           return static_cast<int>(s);
@@ -215,7 +204,7 @@ class Measurement {
     }
     if (!has_wrench_ || !complete) return;
     const int sensor = observer_.layout().segments[segment_].sensor;
-    store(wrench_to_parent(tree_.state(observer_.sensors()[sensor].node).pose,
+    store(wrench_to_parent(posture_.pose(observer_.sensors()[sensor].node),
                            {{clean[0], clean[1], clean[2]}, {clean[3], clean[4], clean[5]}}),
           wrench_);
   }
@@ -244,7 +233,7 @@ class Measurement {
     if (r.joint >= 0) {
       for (int own : observer_.joints()[r.joint].nodes) {
         if (!observer_.layout().is_outboard(node, own)) continue;
-        sum = sum + tree_.state(own).subspace;
+        sum = sum + posture_.subspace(own);
         loaded = true;
       }
     } else if (observer_.layout().is_outboard(node, observer_.sensors()[r.sensor].node)) {
@@ -258,7 +247,7 @@ class Measurement {
 
   // The twist whose product with a wrench is the sensor's reading of that axis.
   Spatial axis_in_world(int sensor, int axis) const {
-    const Pose& X = tree_.state(observer_.sensors()[sensor].node).pose;
+    const Pose& X = posture_.pose(observer_.sensors()[sensor].node);
     const Vec3 columns[3] = {X.R.x, X.R.y, X.R.z};
     const Vec3& a = columns[axis % 3];
     if (axis < 3) return {a, {}};
@@ -305,7 +294,7 @@ class Measurement {
 
   // The error of gains and model, which grows with the load, by the sensor's axes.
   Spatial load_error(int sensor) const {
-    const Spatial w = wrench_to_child(tree_.state(observer_.sensors()[sensor].node).pose,
+    const Spatial w = wrench_to_child(posture_.pose(observer_.sensors()[sensor].node),
                                       {{wrench_[0], wrench_[1], wrench_[2]},
                                        {wrench_[3], wrench_[4], wrench_[5]}});
     return {{noise_.relative * norm3(w.linear), 0.0, 0.0},
@@ -322,14 +311,14 @@ class Measurement {
                  sign * std::sqrt(filtered * filtered + load * load), sources);
     }
     for (int i = 0; i < n; ++i)
-      add_column(6 * layout_.sensors + n + i, momenta_[node * n + i],
+      add_column(6 * layout_.sensors + n + i, posture_.momentum(node, i),
                  sign * g.velocity * noise_.qd[i], sources);
   }
 
   Spatial unit_wrench(int node, int axis) const {
     double w[6] = {0, 0, 0, 0, 0, 0};
     w[axis] = 1.0;
-    return wrench_to_parent(tree_.state(node).pose, {{w[0], w[1], w[2]}, {w[3], w[4], w[5]}});
+    return wrench_to_parent(posture_.pose(node), {{w[0], w[1], w[2]}, {w[3], w[4], w[5]}});
   }
 
   void add_column(int source, const Spatial& w, double scale, int sources) {
@@ -349,7 +338,7 @@ class Measurement {
       const Spatial axis = axis_in_world(r.sensor, r.axis);
       const int node = observer_.sensors()[r.sensor].node;
       for (int c = 0; c < n; ++c)
-        out[6 * k + n + c] = g.velocity * noise_.qd[c] * dot(axis, momenta_[node * n + c]);
+        out[6 * k + n + c] = g.velocity * noise_.qd[c] * dot(axis, posture_.momentum(node, c));
       return;
     }
     const JointRow& joint = observer_.joints()[r.joint];
@@ -357,33 +346,31 @@ class Measurement {
     const double load = noise_.relative * own_[i], filtered = g.reading * noise_.tau[r.joint];
     out[6 * k + r.joint] = std::sqrt(filtered * filtered + load * load);
     for (int node : joint.nodes) {
-      const Spatial& s = tree_.state(node).subspace;
+      const Spatial& s = posture_.subspace(node);
       for (int c = 0; c < n; ++c)
-        out[6 * k + n + c] += g.velocity * noise_.qd[c] * dot(s, momenta_[node * n + c]);
+        out[6 * k + n + c] += g.velocity * noise_.qd[c] * dot(s, posture_.momentum(node, c));
     }
     for (const Projection& pair : observer_.layout().outboard_sensors[r.joint])
-      subtract_sensor(pair, joint, g, out);
+      subtract_sensor(pair, g, out);
   }
 
-  void subtract_sensor(const Projection& pair, const JointRow& joint, const Gains& g, double* out) {
+  void subtract_sensor(const Projection& pair, const Gains& g, double* out) {
     const int n = layout_.joints, k = layout_.sensors;
-    const Spatial& s = tree_.state(joint.nodes[pair.which]).subspace;
+    const Spatial& s = posture_.subspace(observer_.layout().lines[pair.line].node);
     const int node = observer_.sensors()[pair.sensor].node;
     for (int a = 0; a < 6; ++a)
       out[6 * pair.sensor + a] -=
           g.reading * noise_.wrench[6 * pair.sensor + a] * dot(s, unit_wrench(node, a));
     for (int c = 0; c < n; ++c)
-      out[6 * k + n + c] -= g.velocity * noise_.qd[c] * dot(s, momenta_[node * n + c]);
+      out[6 * k + n + c] -= g.velocity * noise_.qd[c] * dot(s, posture_.momentum(node, c));
   }
 
   const Observer& observer_;
-  Tree tree_;
+  Posture posture_;
   std::vector<DetectionRow> tests_;
   NoiseFigures noise_;
   RowLayout layout_;
   std::vector<std::vector<Row>> rows_;  // per segment
-  std::vector<double> unit_;
-  std::vector<Spatial> momenta_;  // per node and joint
   std::vector<double> joint_offsets_;
 
   int segment_ = 0, count_ = 0, size_ = 0;

@@ -17,7 +17,7 @@ namespace touchline {
 inline double norm(const Vec3& v) { return std::sqrt(dot(v, v)); }
 
 // A line in space; `direction` is a unit vector.
-struct Line {
+struct ForceLine {
   Vec3 origin, direction;
   Vec3 at(double t) const { return origin + t * direction; }
 };
@@ -60,7 +60,7 @@ class Mesh {
   // Calls `visit(Crossing)` for each crossing of the whole line, in no order. A line through an
   // edge is reported by both triangles and never by none.
   template <class Visit>
-  void crossings(const Line& line, Visit&& visit) const {
+  void crossings(const ForceLine& line, Visit&& visit) const {
     if (empty()) return;
     const Vec3 inverse = invert(line.direction);
     int stack[kDepth], size = 0;
@@ -83,7 +83,7 @@ class Mesh {
   }
 
   // The point of the surface nearest to the line, if nearer than `limit`.
-  SurfacePoint nearest_to_line(const Line& line,
+  SurfacePoint nearest_to_line(const ForceLine& line,
                                double limit = std::numeric_limits<double>::infinity()) const {
     return nearest(
         limit,
@@ -181,7 +181,7 @@ class Mesh {
     return enter <= leave;
   }
 
-  static bool crosses(const Triangle& tri, const Line& line, double& t) {
+  static bool crosses(const Triangle& tri, const ForceLine& line, double& t) {
     const Vec3 p = cross(line.direction, tri.ac);
     const double det = dot(tri.ab, p);
     if (det == 0.0) return false;
@@ -233,7 +233,7 @@ class Mesh {
   }
 
   // Beside the line, the nearest point of a triangle lies on an edge.
-  static void nearer_to_line(const Triangle& tri, const Line& line, SurfacePoint& best) {
+  static void nearer_to_line(const Triangle& tri, const ForceLine& line, SurfacePoint& best) {
     double t;
     if (crosses(tri, line, t)) {
       if (best.distance > 0.0) best = {0.0, tri.face, line.at(t), tri.normal};
