@@ -12,6 +12,13 @@ def did_you_mean(word: Any, allowed: Iterable[str]) -> str:
     return f" (did you mean '{close[0]}'?)" if close else ""
 
 
+def listing(names: Iterable[str], limit: int = 60) -> str:
+    """Return the names, comma separated, of many only the first."""
+    names = list(names)
+    more = f", ... ({len(names) - limit} more)" if len(names) > limit else ""
+    return (", ".join(names[:limit]) or "none") + more
+
+
 def not_allowed(word: Any, allowed: Iterable[str]) -> str:
     """Return `'word' is not allowed; allowed: a, b, c (did you mean 'a'?)`."""
     allowed = list(allowed)
@@ -19,7 +26,6 @@ def not_allowed(word: Any, allowed: Iterable[str]) -> str:
 
 
 def unknown(word: Any, kind: str, known: Iterable[str]) -> str:
-    """Return `unknown KIND 'word'; known: a, b, c (did you mean 'a'?)`, of many names only some."""
+    """Return `unknown KIND 'word'; known: a, b, c (did you mean 'a'?)`."""
     known = list(known)
-    shown = ", ".join(known[:20]) + (", ..." if len(known) > 20 else "")
-    return f"unknown {kind} '{word}'; known: {shown or 'none'}{did_you_mean(word, known)}"
+    return f"unknown {kind} '{word}'; known: {listing(known, 20)}{did_you_mean(word, known)}"
