@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Generated: python -m nanobind.stubgen -m touchline._core -o src/touchline/_core.pyi
-from collections.abc import Sequence
 import enum
+from collections.abc import Sequence
 
 import numpy
 import numpy.typing

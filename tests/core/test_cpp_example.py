@@ -50,7 +50,7 @@ def test_example_prints_the_push(tmp_path):
 SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 
-@pytest.mark.parametrize("flags", [("-O1",), SANITIZERS], ids=["plain", "sanitized"])
+@pytest.mark.parametrize("flags", [("-O2",), SANITIZERS], ids=["plain", "sanitized"])
 def test_no_allocation_per_step(tmp_path, flags):
     program = tmp_path / "program"
     complaint = compile_program(Path(__file__).parent / "no_allocation.cpp", program, *flags)
