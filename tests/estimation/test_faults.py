@@ -206,7 +206,6 @@ def test_a_clock_set_back_begins_anew():
     np.testing.assert_array_equal(known(estimate), known(second.run()))
 
 
-@pytest.mark.parametrize("jump", [0.0041, 1.0, 1e6, 1e300])
 def test_a_wrong_first_stamp_does_not_block_what_follows():
     feed = Feed()
     for stamp in (1.0, 1e300, 0.3):
@@ -226,6 +225,7 @@ def test_a_clock_set_back_a_little_is_followed_after_some_samples():
     assert health[-1] == 0
 
 
+@pytest.mark.parametrize("jump", [0.0041, 1.0, 1e6, 1e300])
 def test_a_gap_restarts_the_filters(jump):
     feed = Feed()
     feed.time[300:] += jump
