@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "arrays.hpp"
+#include "contact_bindings.hpp"
 #include "touchline/detector.hpp"
 #include "touchline/observer.hpp"
 
@@ -277,6 +278,7 @@ NB_MODULE(_core, m) {
   bind_enums(m);
   bind_rows(m);
   bind_detector(m);
+  bind_contact(m);
   nb::class_<tl::Observer>(m, "Observer")
       .def("__init__",
            [](tl::Observer* self, std::vector<tl::Node> nodes, const std::vector<double>& gravity,
