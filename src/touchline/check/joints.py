@@ -16,7 +16,6 @@ from touchline.check.fit import (
     scatter_of,
 )
 from touchline.check.windows import Windows
-from touchline.contact.thresholds import make_thresholds
 from touchline.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -38,6 +37,11 @@ class TorqueFit:
     offset: float
     scatter: float
     varied: bool
+
+    @property
+    def certain(self) -> bool:
+        """Is the factor known well enough to be judged?"""
+        return not self.varied or self.error < 0.15 * max(abs(self.factor), 0.3)
 
 
 def check_velocities(robot: Robot, windows: Windows, findings: Findings) -> None:
@@ -66,8 +70,13 @@ def _velocity_problem(name: str, factor: float, scatter: float, size: float) -> 
     return f"{start}{': ' + unit if unit else '; check its unit and that of time'}"
 
 
-def check_torques(robot: Robot, windows: Windows, dead: set[str], findings: Findings) -> None:
-    """Compare measured torques with those the model expects without contact."""
+def check_torques(
+    robot: Robot, windows: Windows, dead: set[str], limits: dict[int, float], findings: Findings
+) -> None:
+    """Compare measured torques with those the model expects without contact.
+
+    `limits` are the contact thresholds by joint [Nm].
+    """
     measured = [
         j
         for j, joint in enumerate(robot.description.joints)
@@ -83,7 +92,6 @@ def check_torques(robot: Robot, windows: Windows, dead: set[str], findings: Find
         a, b = robot.joint_names[i], robot.joint_names[k]
         findings.find(f"torques of {a} and {b} fit each other's joint: the columns seem swapped")
     inside = {joint for pair in swapped for joint in pair}
-    limits = {row.joint: row.contact for row in make_thresholds(robot).rows if row.joint >= 0}
     for j in measured:
         name = robot.joint_names[j]
         size = float(np.nanmax(np.abs(windows.expected_torque[:, j]), initial=0.0))
@@ -96,7 +104,7 @@ def check_torques(robot: Robot, windows: Windows, dead: set[str], findings: Find
             continue
         _note_fit(name, fit, findings)
         if j not in inside:
-            _judge(name, fit, limits.get(j, np.inf), findings)
+            _judge(name, fit, size, limits.get(j, np.inf), findings)
 
 
 def fit_torque(windows: Windows, j: int) -> TorqueFit | None:
@@ -121,16 +129,18 @@ def fit_torque(windows: Windows, j: int) -> TorqueFit | None:
 
 
 def _note_fit(name: str, fit: TorqueFit, findings: Findings) -> None:
+    if not fit.certain:
+        findings.note("joint torques", f"  {name}: the load varies too little, or touches hide it")
+        return
     offset = f", offset {fit.offset:+.2f} Nm" if fit.varied else " (one load only: no offset told)"
     line = f"  {name}: reads {fit.factor:.3f} of what the model expects{offset}"
     findings.note("joint torques", f"{line}, scatter {fit.scatter:.2f} Nm")
 
 
-def _judge(name: str, fit: TorqueFit, limit: float, findings: Findings) -> None:
+def _judge(name: str, fit: TorqueFit, size: float, limit: float, findings: Findings) -> None:
     start = f"torque of {name} is {fit.factor:.3g} times what the model expects"
     unit = named_factor(fit.factor, {k: v for k, v in MOMENT_FACTORS.items() if abs(k - 1) > 0.5})
-    certain = fit.error < 0.15 * max(abs(fit.factor), 0.3) or not fit.varied
-    if not certain:
+    if not fit.certain:
         return
     if abs(fit.factor) < TAKEN_OUT and unit is None:
         findings.find(f"{start}: gravity seems taken out already; compensated: gravity (or model)")
@@ -139,7 +149,7 @@ def _judge(name: str, fit: TorqueFit, limit: float, findings: Findings) -> None:
         findings.find(f"{start}: in {unit} (or gain){sign}")
     elif fit.factor < 0:
         findings.find(f"{start}: opposite sign; set the other sign ({name}: sign)")
-    elif abs(fit.factor - 1) > GAIN_OFF:
+    elif abs(fit.factor - 1) > GAIN_OFF and abs(fit.factor - 1) * size > max(limit, TELLING):
         findings.find(f"{start}: check gain, unit, and the masses outboard of it")
     if fit.varied and abs(fit.offset) > limit:
         findings.find(

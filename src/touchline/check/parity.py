@@ -62,9 +62,9 @@ def parity_of(robot: Robot) -> Parity:
 
 
 def response(robot: Robot, q: Array) -> Array:
-    """A(q) (measured signals, 6 segments): the residuals by wrenches in world axes about its origin.
+    """A(q) (measured signals, 6 segments): residuals by wrenches in world, about its origin.
 
-    Moments count per metre, so that newtons and newton metres compare.
+    Numbers in N and Nm stand side by side: a metre is the scale of an arm.
     """
     poses = robot.poses(q)
     starts = {node.sensor: i for i, node in enumerate(robot.nodes) if node.sensor}

@@ -11,6 +11,7 @@ from touchline.check.signals import SignalTable
 from touchline.check.stamps import Stamps
 from touchline.check.windows import WindowMaker
 from touchline.check.wrenches import check_wrenches
+from touchline.contact.thresholds import make_thresholds
 from touchline.errors import InputError
 from touchline.logs import open_log
 from touchline.model.robot import Robot
@@ -43,12 +44,11 @@ def check_recording(robot: Robot, path: Path, findings: Findings) -> None:
     table.report(robot, findings)
     if stamps.credible:
         for warning in bandwidth_warnings(bandwidths(robot, None), stamps.period):
-            (findings.find if "> 1)" in warning else _noting(findings))(warning)
+            if "> 1)" in warning:
+                findings.find(warning)
+            else:
+                findings.note("time stamps", f"  {warning}")
     _compare(robot, maker, stamps, table, findings)
-
-
-def _noting(findings: Findings):
-    return lambda line: findings.note("time stamps", f"  {line}")
 
 
 def _compare(
@@ -69,7 +69,11 @@ def _compare(
         f"  {len(windows)} pieces compared with the model, the arm at rest in {int(still.sum())} "
         "of them",
     )
-    dead = table.dead()
+    rows = make_thresholds(robot, stamps.period).rows
+    names = robot.segment_names
+    joints = {row.joint: row.contact for row in rows if row.joint >= 0}
+    components = {(names[r.segment], r.component): r.contact for r in rows if r.component >= 0}
+    dead = {kind: {name for k, name in table.dead() if k == kind} for kind in ("tau", "wrench")}
     check_velocities(robot, windows, findings)
-    check_torques(robot, windows, {name for kind, name in dead if kind == "tau"}, findings)
-    check_wrenches(robot, windows, {name for kind, name in dead if kind == "wrench"}, findings)
+    check_torques(robot, windows, dead["tau"], joints, findings)
+    check_wrenches(robot, windows, dead["wrench"], components, findings)

@@ -12,7 +12,6 @@ from touchline.check.findings import Findings
 from touchline.check.fit import FORCE_FACTORS, MOMENT_FACTORS, named_factor
 from touchline.check.model import outboard_mass
 from touchline.check.windows import Windows
-from touchline.contact.thresholds import make_thresholds
 from touchline.model.description import SensorDescription
 from touchline.model.robot import Robot
 
@@ -51,18 +50,29 @@ class Fit:
     telling: bool
 
 
-def check_wrenches(robot: Robot, windows: Windows, dead: set[str], findings: Findings) -> None:
-    """Polarity, axes, frame, units, weight and bias of every sensor."""
+Limits = dict[tuple[str, int], float]
+
+
+def check_wrenches(
+    robot: Robot, windows: Windows, dead: set[str], limits: Limits, findings: Findings
+) -> None:
+    """Polarity, axes, frame, units, weight and bias of every sensor.
+
+    `limits` are the contact thresholds by segment and component [N, Nm].
+    """
     if len(windows) < 1:
         return
     for k, sensor in enumerate(robot.description.sensors):
         names = {f"{sensor.name}.{axis}" for axis in sensor.axes}
         if not names & dead and np.isfinite(windows.wrench[:, k]).any():
-            _SensorCheck(robot, windows, k, findings).run()
+            _SensorCheck(robot, windows, k, limits, findings).run()
 
 
 class _SensorCheck:
-    def __init__(self, robot: Robot, windows: Windows, k: int, findings: Findings) -> None:
+    def __init__(
+        self, robot: Robot, windows: Windows, k: int, limits: Limits, findings: Findings
+    ) -> None:
+        self.limits = limits
         self.robot, self.windows, self.k, self.findings = robot, windows, k, findings
         self.sensor: SensorDescription = robot.description.sensors[k]
         self.mass = outboard_mass(robot, self.sensor.name)
@@ -190,20 +200,14 @@ class _SensorCheck:
             self.findings.find(f"{start}: check the unit, and what is mounted on it")
 
     def _judge_bias(self, force: Fit, moment: Fit | None) -> None:
-        rows = make_thresholds(self.robot).rows
-        own = self.robot.segment_names
-        limits = {
-            row.component: row.contact
-            for row in rows
-            if row.component >= 0 and own[row.segment] == self.sensor.name
-        }
+        name = self.sensor.name
         for fit, what, first, unit in ((force, "force", 0, "N"), (moment, "moment", 3, "Nm")):
             if fit is None or not fit.varied:
                 continue
             words = ", ".join(f"{x:.3g}" for x in fit.offset)
             line = f"  {self.sensor.name}: {what} bias about [{words}] {unit} in the log's axes"
             self.findings.note("wrenches", line)
-            limit = min((limits.get(i, np.inf) for i in range(first, first + 3)), default=np.inf)
+            limit = min(self.limits.get((name, i), np.inf) for i in range(first, first + 3))
             given = np.abs(np.array(self.sensor.bias[first : first + 3])).max()
             if np.abs(fit.offset).max() > max(limit, 1.05 * given + limit):
                 self.findings.find(
