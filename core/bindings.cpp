@@ -75,17 +75,13 @@ Out update(tl::Observer& o, double time, const In& q, const In& qd, const In& ta
 
 Out run(tl::Observer& o, const In& time, const In& q, const In& qd, const In& tau,
         const In& wrench) {
-  const std::size_t rows = time.size(), n = o.row_layout().joints, k = o.row_layout().sensors;
+  const std::size_t rows = time.size();
   expect_sample(o, rows, q, qd, tau, wrench);
   const std::size_t width = o.output().size();
   Buffer out(rows * width);
   {
     nb::gil_scoped_release release;
-    for (std::size_t i = 0; i < rows; ++i) {
-      const double* row = o.step(time.data()[i], q.data() + i * n, qd.data() + i * n,
-                                 tau.data() + i * n, wrench.data() + i * 6 * k);
-      std::copy(row, row + width, out.data.get() + i * width);
-    }
+    o.run(rows, time.data(), q.data(), qd.data(), tau.data(), wrench.data(), out.data.get());
   }
   return out.release({rows, width});
 }
@@ -95,7 +91,7 @@ Out run(tl::Observer& o, const In& time, const In& q, const In& qd, const In& ta
 nb::tuple detect(tl::Observer& o, tl::Detector& d, double time, const In& q, const In& qd,
                  const In& tau, const In& wrench) {
   Out row = update(o, time, q, qd, tau, wrench);
-  d.step();
+  d.step(row.data());
   const std::size_t m = d.levels().size(), r = d.rows().size();
   Buffer levels(m), normalized(r);
   std::copy(d.levels().begin(), d.levels().end(), levels.data.get());
@@ -105,20 +101,20 @@ nb::tuple detect(tl::Observer& o, tl::Detector& d, double time, const In& q, con
 
 nb::tuple detect_run(tl::Observer& o, tl::Detector& d, const In& time, const In& q, const In& qd,
                      const In& tau, const In& wrench) {
-  const std::size_t rows = time.size(), n = o.row_layout().joints, k = o.row_layout().sensors;
+  const std::size_t rows = time.size();
   expect_sample(o, rows, q, qd, tau, wrench);
   const std::size_t width = o.output().size(), m = d.levels().size(), r = d.rows().size();
   Buffer out(rows * width), levels(rows * m), normalized(rows * r);
   {
     nb::gil_scoped_release release;
-    for (std::size_t i = 0; i < rows; ++i) {
-      const double* row = o.step(time.data()[i], q.data() + i * n, qd.data() + i * n,
-                                 tau.data() + i * n, wrench.data() + i * 6 * k);
-      d.step();
-      std::copy(row, row + width, out.data.get() + i * width);
-      std::copy(d.levels().begin(), d.levels().end(), levels.data.get() + i * m);
-      std::copy(d.normalized().begin(), d.normalized().end(), normalized.data.get() + i * r);
-    }
+    double* level = levels.data.get();
+    double* x = normalized.data.get();
+    o.run(rows, time.data(), q.data(), qd.data(), tau.data(), wrench.data(), out.data.get(),
+          [&](const double* row) {
+            d.step(row);
+            level = std::copy(d.levels().begin(), d.levels().end(), level);
+            x = std::copy(d.normalized().begin(), d.normalized().end(), x);
+          });
   }
   return nb::make_tuple(out.release({rows, width}), levels.release({rows, m}),
                         normalized.release({rows, r}));
@@ -129,14 +125,15 @@ nb::tuple terms(tl::Observer& o, const In& q, const In& qd) {
   const tl::RowLayout& layout = o.row_layout();
   expect(q, layout.joints, "q");
   expect(qd, layout.joints, "qd");
-  o.tree().update(q.data(), qd.data());
+  tl::Terms<double>& model = o.terms();
+  model.sweep(q.data(), qd.data());
   const std::size_t size = layout.joints + 6 * layout.sensors;
   Buffer p(size), n(size);
   for (int j = 0; j < layout.joints; ++j)
-    o.joint_terms(j, qd.data()[j], p.data[j], n.data[j]);
+    model.joint_row(j, qd.data()[j], p.data[j], n.data[j]);
   for (int s = 0; s < layout.sensors; ++s) {
     tl::Spatial momentum, bias;
-    o.sensor_terms(s, momentum, bias);
+    model.sensor_row(s, momentum, bias);
     tl::store(momentum, p.data.get() + layout.joints + 6 * s);
     tl::store(bias, n.data.get() + layout.joints + 6 * s);
   }
@@ -148,10 +145,10 @@ Out poses(tl::Observer& o, const In& q) {
   const std::size_t n = o.row_layout().joints, count = o.tree().nodes().size();
   expect(q, n, "q");
   const std::vector<double> rest(n, 0.0);
-  o.tree().update(q.data(), rest.data());
+  o.terms().sweep(q.data(), rest.data());
   Buffer out(16 * count);
   for (std::size_t i = 0; i < count; ++i) {
-    const tl::Pose& X = o.tree().state(static_cast<int>(i)).pose;
+    const tl::NodeState<double>& X = o.terms().state().node(static_cast<int>(i));
     const double rows[16] = {X.R.x.x, X.R.y.x, X.R.z.x, X.p.x, X.R.x.y, X.R.y.y, X.R.z.y, X.p.y,
                              X.R.x.z, X.R.y.z, X.R.z.z, X.p.z, 0.0,     0.0,     0.0,     1.0};
     std::copy(rows, rows + 16, out.data.get() + 16 * i);

@@ -18,8 +18,8 @@ from arms.shapes import box, shells
 from arms.trim import trims
 
 TARGET = Path(__file__).resolve().parents[1] / "src" / "touchline" / "robots"
-CELLS = {"link0": 0.0015, "handle": 0.0015, "link7": 0.0015, "tool": 0.0015}
-TRIANGLES = {"handle": 3600, "link7": 2600, "tool": 2600}
+CELL = 0.0015
+TRIANGLES = {"handle": 4000, "link7": 3000, "tool": 2800}
 
 
 def make_shells(only: set[str] | None = None) -> dict[str, trimesh.Trimesh]:
@@ -28,8 +28,8 @@ def make_shells(only: set[str] | None = None) -> dict[str, trimesh.Trimesh]:
     for name, shell in shells().items():
         if only is None or name in only:
             low, high = box(shell)
-            cell, triangles = CELLS.get(name, 0.0025), TRIANGLES.get(name, 4400)
-            meshes[name] = mesh_field(shell.field, low, high, cell, triangles)
+            triangles = TRIANGLES.get(name, 5000)
+            meshes[name] = mesh_field(shell.field, low, high, CELL, triangles)
     return meshes
 
 
@@ -37,9 +37,7 @@ def save_stl(mesh: trimesh.Trimesh, path: Path) -> trimesh.Trimesh:
     """Writes binary STL and returns what a reader gets back."""
     path.parent.mkdir(parents=True, exist_ok=True)
     mesh.export(path, file_type="stl")
-    read = trimesh.load(path, force="mesh")
-    assert isinstance(read, trimesh.Trimesh)
-    return read
+    return trimesh.load_mesh(path)
 
 
 def make(target: Path) -> dict[str, Body]:

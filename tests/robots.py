@@ -4,7 +4,9 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from touchline.errors import InputError
 from touchline.model.description import (
     JointDescription,
     Noise,
@@ -12,8 +14,18 @@ from touchline.model.description import (
     SensorDescription,
 )
 from touchline.model.mechanism import Inertia, Joint, Link, Mechanism
-from touchline.model.robot import Robot
+from touchline.model.robot import Robot, load_robot
 from touchline.model.transforms import pose, rotation_rpy
+
+EXAMPLES = Path(__file__).parents[1] / "examples" / "robots"
+
+
+def load_example(name):
+    """A robot of examples/robots; skips where its model is not on this machine."""
+    try:
+        return load_robot(EXAMPLES / f"{name}.yaml")
+    except InputError as error:
+        pytest.skip(f"{name}: {error}")
 
 
 def random_pose(rng, scale=0.3):

@@ -21,6 +21,7 @@ class JointRow:
 
 
 Z, Y = (0, 0, 1), (0, 1, 0)
+FOLD = radians(115)  # limit of the pitch joints
 MOUNT = 0.024  # height of the plate that carries the base sensor
 
 # distances along the stretched arm [m]
@@ -43,11 +44,11 @@ W2, W4, W6 = 0.086, 0.074, 0.060
 JOINTS = (
     JointRow("base_sensor", "base_mount", "link0", (0, 0, MOUNT)),
     JointRow("joint1", "link0", "link1", (0, 0, BASE_TO_ROLL_1), Z, radians(170), 2.6, 200.0),
-    JointRow("joint2", "link1", "link2", (0, 0, ROLL_1_TO_SHOULDER), Y, radians(120), 2.6, 200.0),
+    JointRow("joint2", "link1", "link2", (0, 0, ROLL_1_TO_SHOULDER), Y, FOLD, 2.6, 200.0),
     JointRow("joint3", "link2", "link3", (0, 0, SHOULDER_TO_ROLL_3), Z, radians(170), 2.8, 120.0),
-    JointRow("joint4", "link3", "link4", (0, 0, ROLL_3_TO_ELBOW), Y, radians(120), 2.8, 120.0),
+    JointRow("joint4", "link3", "link4", (0, 0, ROLL_3_TO_ELBOW), Y, FOLD, 2.8, 120.0),
     JointRow("joint5", "link4", "link5", (0, 0, ELBOW_TO_ROLL_5), Z, radians(170), 3.6, 70.0),
-    JointRow("joint6", "link5", "link6", (0, 0, ROLL_5_TO_WRIST), Y, radians(120), 3.6, 50.0),
+    JointRow("joint6", "link5", "link6", (0, 0, ROLL_5_TO_WRIST), Y, FOLD, 3.6, 50.0),
     JointRow("joint7", "link6", "link7", (0, 0, WRIST_TO_ROLL_7), Z, radians(175), 3.6, 50.0),
     JointRow("wrist_sensor", "link7", "tool", (0, 0, ROLL_7_TO_FLANGE)),
     JointRow("handle_sensor", "link5", "handle", (0, -W6, ROLL_5_TO_WRIST), rpy=(pi / 2, 0, 0)),
@@ -63,7 +64,7 @@ MASSES = {
     "link5": 2.8,
     "link6": 1.9,
     "link7": 1.05,
-    "handle": 0.45,
     "tool": 0.9,
+    "handle": 0.45,
 }
 MOVING = ("link1", "link2", "link3", "link4", "link5", "link6", "link7", "handle")

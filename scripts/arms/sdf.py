@@ -24,19 +24,7 @@ def rounded_cylinder(axis: int, radius: float, low: float, high: float, edge: fl
     def field(points: Array) -> Array:
         d_radial = np.linalg.norm(points[:, others], axis=1) - radius + edge
         d_axial = np.abs(points[:, axis] - middle) - half + edge
-        return _corner(d_radial, d_axial) - edge
-
-    return field
-
-
-def pebble(axis: int, radius: float, low: float, high: float, edges: tuple[float, float]) -> Field:
-    """A rounded cylinder with its own edge radius at the `low` and at the `high` end."""
-    middle = (low + high) / 2
-    at_low = rounded_cylinder(axis, radius, low, high + 1.0, edges[0])
-    at_high = rounded_cylinder(axis, radius, low - 1.0, high, edges[1])
-
-    def field(points: Array) -> Array:
-        return np.where(points[:, axis] < middle, at_low(points), at_high(points))
+        return corner(d_radial, d_axial) - edge
 
     return field
 
@@ -52,45 +40,26 @@ def rounded_box(centre: tuple[float, float, float], half: Array, edge: float) ->
     return field
 
 
-def revolved(knots: list[tuple[float, float]], edge: float) -> Field:
-    """A polygon of (radius, z) `knots` turned about z; convex corners get radius `edge`.
-
-    The polygon starts and ends on the axis and runs upwards along the outside.
-    """
-    corners = np.array(knots)
-
-    def field(points: Array) -> Array:
-        rz = np.column_stack([np.linalg.norm(points[:, :2], axis=1), points[:, 2]])
-        return _polygon(rz, corners) - edge
-
-    return field
-
-
-def loop_tube(half_y: float, low_z: float, high_z: float, corner: float, radius: Profile) -> Field:
-    """A tube along a rounded rectangle in the y-z plane; `radius` maps y to the tube's radius."""
+def loop_tube(half_y: float, low_z: float, high_z: float, bend: float, radius: Profile) -> Field:
+    """A tube along a rounded rectangle in the y-z plane; `radius` maps z to the tube's radius."""
     middle, half_z = (low_z + high_z) / 2, (high_z - low_z) / 2
 
     def field(points: Array) -> Array:
-        d_y = np.abs(points[:, 1]) - half_y + corner
-        d_z = np.abs(points[:, 2] - middle) - half_z + corner
-        in_plane = _corner(d_y, d_z) - corner
-        return np.hypot(in_plane, points[:, 0]) - radius(points[:, 1])
+        d_y = np.abs(points[:, 1]) - half_y + bend
+        d_z = np.abs(points[:, 2] - middle) - half_z + bend
+        in_plane = corner(d_y, d_z) - bend
+        return np.hypot(in_plane, points[:, 0]) - radius(points[:, 2])
 
     return field
 
 
-def swept(
-    centre_y: Profile, half_x: Profile, half_y: Profile, exponent: Profile
-) -> Field:
-    """A body along z whose sections are superellipses; every argument is a function of z."""
+def column(radius: Profile, low: float, high: float) -> Field:
+    """A body of revolution about z with `radius` as a function of z, cut flat at both ends."""
 
-    def raw(points: Array) -> Array:
-        x, y, z = points.T
-        n = exponent(z)
-        u = np.abs(x / half_x(z)) ** n + np.abs((y - centre_y(z)) / half_y(z)) ** n
-        return (np.maximum(u, 1e-12) ** (1.0 / n) - 1.0) * np.minimum(half_x(z), half_y(z))
+    def side(points: Array) -> Array:
+        return np.hypot(points[:, 0], points[:, 1]) - radius(points[:, 2])
 
-    return normalized(raw)
+    return intersection(0.0, normalized(side), half_space(2, low, -1), half_space(2, high, 1))
 
 
 def normalized(field: Field, step: float = 1e-4) -> Field:
@@ -153,14 +122,15 @@ def moved(field: Field, T_link_shape: Array) -> Field:
     return lambda points: field(points @ inverse[:3, :3].T + inverse[:3, 3])
 
 
+def quintic(t: Array) -> Array:
+    """The step from 0 at t = 0 to 1 at t = 1, twice continuously differentiable."""
+    t = np.clip(t, 0.0, 1.0)
+    return t**3 * (t * (6 * t - 15) + 10)
+
+
 def smoothstep(low: float, high: float) -> Profile:
-    """The quintic step from 0 at `low` to 1 at `high`, twice continuously differentiable."""
-
-    def step(z: Array) -> Array:
-        t = np.clip((z - low) / (high - low), 0.0, 1.0)
-        return t**3 * (t * (6 * t - 15) + 10)
-
-    return step
+    """The quintic step from 0 at `low` to 1 at `high`."""
+    return lambda z: quintic((z - low) / (high - low))
 
 
 def _negative(field: Field) -> Field:
@@ -177,22 +147,6 @@ def _fold(two: Callable[[Array, Array], Array], fields: tuple[Field, ...]) -> Fi
     return field
 
 
-def _corner(a: Array, b: Array) -> Array:
+def corner(a: Array, b: Array) -> Array:
     """Distance to the quarter plane a < 0, b < 0."""
     return np.hypot(np.maximum(a, 0.0), np.maximum(b, 0.0)) + np.minimum(np.maximum(a, b), 0.0)
-
-
-def _polygon(points: Array, corners: Array) -> Array:
-    """Signed distance of points (N, 2) to a simple polygon (M, 2)."""
-    squared = np.full(len(points), np.inf)
-    inside = np.zeros(len(points), dtype=bool)
-    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        edge, relative = b - a, points - a
-        t = np.clip(relative @ edge / (edge @ edge), 0.0, 1.0)
-        if not (a[0] == 0.0 and b[0] == 0.0):  # the axis itself is no surface
-            squared = np.minimum(squared, ((relative - t[:, None] * edge) ** 2).sum(axis=1))
-        crosses = (a[1] > points[:, 1]) != (b[1] > points[:, 1])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            at = a[0] + (points[:, 1] - a[1]) * edge[0] / edge[1]
-        inside ^= crosses & (points[:, 0] < at)
-    return np.where(inside, -1.0, 1.0) * np.sqrt(squared)

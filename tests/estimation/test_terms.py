@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Momentum and n-bar of every row against Pinocchio with the sensors as free joints."""
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
 from oracle import PinocchioTwin
-from robots import random_robot
+from robots import load_example, random_robot
+
+import touchline
+from touchline.model.description import SensorDescription
+from touchline.model.robot import Robot
 
 STATES = 300
 
@@ -46,3 +52,23 @@ def test_momentum_is_linear_in_the_velocity():
     q, a, b = rng.normal(size=(3, 7))
     momenta = [robot.terms(q, qd)[0] for qd in (a, b, a + 3 * b)]
     np.testing.assert_allclose(momenta[2], momenta[0] + 3 * momenta[1], atol=1e-12)
+
+
+def with_base_sensor(robot):
+    """The same robot with one more sensor, under its first link that has mass."""
+    link = next(name for name, link in robot.mechanism.links.items() if link.inertia.mass > 0)
+    base = SensorDescription("under_base", link, (0.02, -0.01, 0.03), (0.4, 0.2, -0.3))
+    sensors = (base, *robot.description.sensors)
+    bandwidths = {**robot.description.bandwidth_sensors, "under_base": 100.0}
+    description = replace(robot.description, sensors=sensors, bandwidth_sensors=bandwidths)
+    return Robot(description, robot.mechanism)
+
+
+@pytest.mark.parametrize("name", ["panda_wrist_ft", "panda_hand", "ur10e", "kinova_gen3"])
+def test_real_arms_agree_with_pinocchio(name):
+    check_against_pinocchio(with_base_sensor(load_example(name)))
+
+
+@pytest.mark.parametrize("name", ["sara", "sara-full"])
+def test_shipped_arms_agree_with_pinocchio(name):
+    check_against_pinocchio(touchline.load_robot(name))

@@ -126,9 +126,10 @@ def messy_samples():
     return dataclasses.replace(samples, time=time)
 
 
-@pytest.mark.parametrize("rows", [17, 1000, 65536])
-def test_numbers_do_not_depend_on_chunks(tmp_path, rows):
-    robot, messy = delayed_robot(), messy_samples()
+@pytest.mark.parametrize("robot", [delayed_robot(), describe()], ids=["delayed", "prompt"])
+@pytest.mark.parametrize("rows", [1, 17, 1000, 65536])
+def test_numbers_do_not_depend_on_chunks(tmp_path, rows, robot):
+    messy = messy_samples()
     path = tmp_path / "log.parquet"
     without = {f"qd.{joint.name}": None for joint in robot.joints}
     write_without(path, messy, robot, without)

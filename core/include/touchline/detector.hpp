@@ -45,8 +45,9 @@ class Detector {
         normalized_(rows_.size(), 0.0),
         levels_(sum_limit_.size(), 0) {}
 
-  // To be called after each step of the observer.
-  void step() {
+  // To be called after each step of the observer, with the row it wrote.
+  void step(const double* output) {
+    row_ = output;
     const double now = observer_.time();
     const double dt = timed_ ? std::max(0.0, now - time_) : 0.0;
     timed_ = true;
@@ -76,17 +77,18 @@ class Detector {
   };
 
   double residual(const DetectionRow& row) const {
-    const std::vector<double>& out = observer_.output();
     const RowLayout& layout = observer_.row_layout();
     if (row.component < 0) {
-      return out[layout.joint_settled() + row.joint] > 0.0
-                 ? out[layout.segment_torque() + row.joint]
+      return row_[layout.joint_settled() + row.joint] > 0.0
+                 ? row_[layout.segment_torque() + row.joint]
                  : std::nan("");
     }
-    if (!(out[layout.segment_settled() + row.segment] > 0.0)) return std::nan("");
-    const Spatial w = observer_.local_segment_wrench(row.segment);
-    const double parts[6] = {w.linear.x,  w.linear.y,  w.linear.z,
-                             w.angular.x, w.angular.y, w.angular.z};
+    if (!(row_[layout.segment_settled() + row.segment] > 0.0)) return std::nan("");
+    const Spatial w = wrench_to_child(
+        observer_.sensor_pose(observer_.layout().segments[row.segment].sensor),
+        load(row_ + layout.segment_wrench() + 6 * row.segment));
+    double parts[6];
+    store(w, parts);
     return parts[row.component];
   }
 
@@ -140,6 +142,7 @@ class Detector {
   }
 
   const Observer& observer_;
+  const double* row_ = nullptr;
   std::vector<DetectionRow> rows_;
   std::vector<double> sum_limit_;
   DetectionTimes times_;

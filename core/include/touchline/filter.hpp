@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// First-order residual filters, fed with the mean external load over each interval,
-//   e = (p_k+1 - p_k) / dt - (u_k + u_k+1) / 2,   r+ = a r + (1 - a) e,
-// so that no integral grows and the interval may vary.
+// First-order residual filters,  r+ = a r + (1 - a) e,  fed with mean loads over intervals that
+// may vary. Rows and groups are as for the balances.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <vector>
 
-#include "touchline/spatial.hpp"
+#include "touchline/balance.hpp"
 
 namespace touchline {
 
@@ -24,109 +23,111 @@ inline double pole(double bandwidth, double dt, Discretization rule) {
   return tustin ? (1.0 - 0.5 * x) / (1.0 + 0.5 * x) : std::exp(-x);
 }
 
-// The poles of all bandwidths in use, computed once per interval and not once per row.
-class Bandwidths {
+// What a filter does with a sample: nothing, for want of a value now (absent) or over the
+// interval (hold); begin anew at zero; or its step.
+enum class Action { absent, hold, restart, filter };
+
+class Filters {
  public:
-  explicit Bandwidths(Discretization rule) : rule_(rule) {}
+  struct Group {
+    std::size_t first, count;
+    std::size_t bandwidth;  // its handle
+    double time = kNaN;     // of the last step or restart
+    double since = kNaN;    // of the last restart
+    bool present = false;   // there is a value at this instant
+  };
 
-  // Registers a bandwidth [rad/s]; returns its handle.
-  int add(double bandwidth) {
-    for (std::size_t i = 0; i < entries_.size(); ++i) {
-      if (entries_[i].bandwidth == bandwidth) return static_cast<int>(i);
-    }
-    entries_.push_back({bandwidth, 0.0, 1.0});
-    return static_cast<int>(entries_.size()) - 1;
+  explicit Filters(Discretization rule) : rule_(rule) {}
+
+  // Returns the number of the group.
+  std::size_t add(std::size_t count, double bandwidth) {
+    groups_.push_back({value_.size(), count, handle_of(bandwidth)});
+    const std::size_t size = value_.size() + count;
+    for (auto* rows : {&value_, &input_, &keep_}) rows->resize(size, kNaN);
+    handles_.resize(size, groups_.back().bandwidth);
+    return groups_.size() - 1;
   }
 
-  double pole(int handle, double dt) {
-    Entry& entry = entries_[handle];
-    if (entry.dt != dt) {
-      entry.pole = touchline::pole(entry.bandwidth, dt, rule_);
-      entry.dt = dt;
-    }
-    return entry.pole;
+  const Group& group(std::size_t g) const { return groups_[g]; }
+  const double* value(std::size_t g) const { return value_.data() + groups_[g].first; }
+  double* input(std::size_t g) { return input_.data() + groups_[g].first; }
+
+  bool settled(std::size_t g, const Instant& now) const {
+    return groups_[g].present &&
+           now.time - groups_[g].since >= 5.0 / bandwidths_[groups_[g].bandwidth];
   }
 
-  double settling_time(int handle) const { return 5.0 / entries_[handle].bandwidth; }
+  // Poles of all rows for the interval from the sample before: without more ado, all filter.
+  void begin(const Instant& now) {
+    const double dt = now.time - now.before;
+    if (dt == dt_) return;
+    for (std::size_t h = 0; h < poles_.size(); ++h) poles_[h] = pole(bandwidths_[h], dt, rule_);
+    if (poles_.size() == 1) {
+      std::fill(keep_.begin(), keep_.end(), poles_[0]);
+    } else {
+      for (std::size_t i = 0; i < keep_.size(); ++i) keep_[i] = poles_[handles_[i]];
+    }
+    dt_ = dt;
+  }
+
+  // Until the sample before, all groups with a value filtered.
+  void catch_up(const Instant& now) {
+    for (Group& group : groups_) {
+      if (group.present) group.time = now.before;
+    }
+  }
+
+  // Decides what group g does, before `run`. `interval`: that which its input spans, if it is not
+  // that from the sample before.
+  void act(std::size_t g, Action action, const Instant& now, double interval = kNaN) {
+    Group& group = groups_[g];
+    group.present = action != Action::absent;
+    if (action == Action::filter) {
+      group.time = now.time;
+      if (interval == interval) keep(group, pole(bandwidths_[group.bandwidth], interval, rule_));
+      return;
+    }
+    keep(group, 1.0);
+    std::fill_n(input_.begin() + group.first, group.count, 0.0);
+    if (action != Action::restart) return;
+    std::fill_n(value_.begin() + group.first, group.count, 0.0);
+    group.time = group.since = now.time;
+  }
+
+  void run() { step(keep_.data(), input_.data(), value_.data(), value_.size()); }
+
+  void forget() {
+    for (Group& group : groups_) group.time = kNaN;
+  }
 
  private:
-  struct Entry {
-    double bandwidth, dt, pole;
-  };
+  std::size_t handle_of(double bandwidth) {
+    const auto found = std::find(bandwidths_.begin(), bandwidths_.end(), bandwidth);
+    const auto handle = static_cast<std::size_t>(found - bandwidths_.begin());
+    if (found == bandwidths_.end()) {
+      bandwidths_.push_back(bandwidth);
+      poles_.push_back(kNaN);
+    }
+    return handle;
+  }
+
+  void keep(const Group& group, double a) {
+    std::fill_n(keep_.begin() + group.first, group.count, a);
+    dt_ = kNaN;  // poles must be set anew
+  }
+
+  static void step(const double* __restrict keep, const double* __restrict input,
+                   double* __restrict value, std::size_t size) {
+    for (std::size_t i = 0; i < size; ++i)
+      value[i] = keep[i] * value[i] + (1.0 - keep[i]) * input[i];
+  }
+
   Discretization rule_;
-  std::vector<Entry> entries_;
+  std::vector<Group> groups_;
+  std::vector<double> bandwidths_, poles_;  // by handle
+  std::vector<std::size_t> handles_;        // by row
+  std::vector<double> value_, input_, keep_;
+  double dt_ = kNaN;  // that the poles stand for
 };
-
-// What all channels share of one step.
-struct Instant {
-  double time = 0.0;
-  long index = 0;       // of the accepted sample
-  double max_gap = 0.0;  // an interval longer than this is not integrated over
-};
-
-// First-order low-pass of an innovation. `present`: there is a value at this instant.
-template <class T>
-struct LowPass {
-  T value{};
-  double since = 0.0;  // time of the last reset
-  double time = -std::numeric_limits<double>::infinity();
-  int bandwidth = 0;
-  bool present = false;
-
-  void restart(const Instant& now) {
-    value = T{};
-    since = time = now.time;
-    present = true;
-  }
-  void step(const T& innovation, const Instant& now, double dt, Bandwidths& bandwidths) {
-    const double a = bandwidths.pole(bandwidth, dt);
-    value = a * value + (1.0 - a) * innovation;
-    time = now.time;
-    present = true;
-  }
-  bool stale(const Instant& now) const { return now.time - time > now.max_gap; }
-  bool settled(const Instant& now, const Bandwidths& bandwidths) const {
-    return present && now.time - since >= bandwidths.settling_time(bandwidth);
-  }
-};
-
-inline bool is_finite(double v) { return std::isfinite(v); }
-
-// A momentum balance: momentum p, known load u, external load e between two samples.
-template <class T>
-struct Balance {
-  T p{}, u{}, e{};
-  double time = -std::numeric_limits<double>::infinity();
-  double dt = 0.0;
-  long index = -1;         // the sample that p and u stand for
-  bool anchored = false;   // p and u are of this instant
-  bool fresh = false;      // e spans an interval that ends at this instant
-
-  void skip() { anchored = fresh = false; }
-
-  void observe(const T& p_now, const T& u_now, const Instant& now) {
-    dt = now.time - time;
-    fresh = index >= 0 && dt <= now.max_gap;
-    if (fresh) e = (1.0 / dt) * (p_now - p) - 0.5 * (u + u_now);
-    p = p_now;
-    u = u_now;
-    time = now.time;
-    index = now.index;
-    anchored = true;
-  }
-};
-
-// Filters the innovation of a balance; starts anew where the balance did.
-template <class T>
-void follow(LowPass<T>& filter, const Balance<T>& balance, const Instant& now,
-            Bandwidths& bandwidths) {
-  filter.present = false;
-  if (!balance.anchored) return;
-  if (balance.fresh) {
-    filter.step(balance.e, now, balance.dt, bandwidths);
-  } else {
-    filter.restart(now);
-  }
-}
 
 }  // namespace touchline

@@ -10,9 +10,14 @@
 
 namespace touchline {
 
-// A pair for projections: the load of a sensor, on the joint of the `which`-th node of a row.
+// A node that moves with an observed joint: the line along which wrenches load that joint.
+struct Line {
+  int joint, node;
+};
+
+// A pair for projections: the load of a sensor, on a line.
 struct Projection {
-  int which, sensor;
+  int line, sensor;
 };
 
 struct Segment {
@@ -27,10 +32,12 @@ class Layout {
       : segment_of_sensor(sensors.size(), -1), tree_(tree), sensors_(sensors) {
     check(joints);
     make_segments();
+    for (std::size_t s = 0; s < sensors.size(); ++s) segments_outboard.push_back(outboard_of(s));
     for (const JointRow& joint : joints) {
-      inboard_sensor.push_back(joint.nodes.size() == 1 ? inboard(joint.nodes[0], true) : -1);
+      inboard_sensors.push_back(next_inboard(joint));
       outboard_sensors.push_back(next_outboard(joint));
       source_sensors.push_back(on_same_path(joint));
+      for (int node : joint.nodes) lines.push_back({static_cast<int>(inboard_sensors.size()) - 1, node});
     }
   }
 
@@ -41,10 +48,12 @@ class Layout {
   }
 
   std::vector<Segment> segments;  // one per six-axis sensor in their order, then the root's
-  std::vector<int> inboard_sensor;  // per joint: the nearest six-axis sensor inboard, -1: none
-  std::vector<std::vector<Projection>> outboard_sensors;  // per joint: the next ones outboard
-  std::vector<std::vector<Projection>> source_sensors;    // per joint: those it is read from
-  std::vector<int> segment_of_sensor;                     // -1: has fewer than six axes
+  std::vector<int> segment_of_sensor;                // -1: has fewer than six axes
+  std::vector<std::vector<int>> segments_outboard;   // per sensor: all of them
+  std::vector<Line> lines;                           // joint by joint
+  // Per joint: the nearest six-axis sensor inboard, if any (and if no other joint mimics this
+  // one); the next ones outboard; those that the joint is read from.
+  std::vector<std::vector<Projection>> inboard_sensors, outboard_sensors, source_sensors;
 
  private:
   void check(const std::vector<JointRow>& joints) const {
@@ -98,6 +107,28 @@ class Layout {
     }
   }
 
+  std::vector<int> outboard_of(std::size_t sensor) const {
+    std::vector<int> found;
+    for (std::size_t g = 0; g < segments.size(); ++g) {
+      const int s = segments[g].sensor;
+      if (s >= 0 && segment_of_sensor[sensor] >= 0 &&
+          is_outboard(sensors_[s].node, sensors_[sensor].node))
+        found.push_back(static_cast<int>(g));
+    }
+    return found;
+  }
+
+  // The line of the i-th node of the joint that is being worked on.
+  Projection pair(std::size_t i, int sensor) const {
+    return {static_cast<int>(lines.size() + i), sensor};
+  }
+
+  std::vector<Projection> next_inboard(const JointRow& joint) const {
+    const int sensor = joint.nodes.size() == 1 ? inboard(joint.nodes[0], true) : -1;
+    if (sensor < 0) return {};
+    return {pair(0, sensor)};
+  }
+
   std::vector<Projection> next_outboard(const JointRow& joint) const {
     std::vector<Projection> pairs;
     for (std::size_t i = 0; i < joint.nodes.size(); ++i) {
@@ -105,7 +136,7 @@ class Layout {
       for (std::size_t s = 0; s < sensors_.size(); ++s) {
         if (sensors_[s].six_axis() && is_outboard(sensors_[s].node, joint.nodes[i]) &&
             inboard(sensors_[s].node, false) == own)
-          pairs.push_back({static_cast<int>(i), static_cast<int>(s)});
+          pairs.push_back(pair(i, static_cast<int>(s)));
       }
     }
     return pairs;
@@ -118,7 +149,7 @@ class Layout {
       const int node = sensors_[source].node;
       for (std::size_t i = 0; i < joint.nodes.size(); ++i) {
         if (is_outboard(node, joint.nodes[i]) || is_outboard(joint.nodes[i], node))
-          pairs.push_back({static_cast<int>(i), source});
+          pairs.push_back(pair(i, source));
       }
     }
     return pairs;

@@ -1,40 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
 // The extended momentum observer (Iskandar et al., ICRA 2021, eqs. 11-18) without matrices: the
 // generalized momentum of a sensor's locked virtual joint is the spatial momentum of everything
-// outboard of it. No allocation, lock, exception or output in `step`.
+// outboard of it. No allocation, lock, exception or output in `step` and `run`.
 #pragma once
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
+#include <array>
+#include <cstddef>
+#include <utility>
 #include <vector>
 
+#include "touchline/channels.hpp"
+#include "touchline/clock.hpp"
 #include "touchline/filter.hpp"
 #include "touchline/health.hpp"
 #include "touchline/layout.hpp"
+#include "touchline/projections.hpp"
+#include "touchline/readings.hpp"
+#include "touchline/row.hpp"
 #include "touchline/signals.hpp"
+#include "touchline/terms.hpp"
 #include "touchline/tree.hpp"
 
 namespace touchline {
 
-// `segment` filters the momentum of each segment in world axes: no ghost contact in motion.
-// `paper` filters each residual in its own sensor frame and subtracts afterwards (18).
-enum class Method { segment, paper };
-
-// Where each output stands in a row of numbers, for n joints, k sensors and m segments.
-struct RowLayout {
-  int joints, sensors, segments;
-  int tau_ext() const { return 0; }
-  int segment_torque() const { return joints; }
-  int parity() const { return 2 * joints; }
-  int joint_innovation() const { return 3 * joints; }
-  int sensor_wrench() const { return 4 * joints; }
-  int segment_wrench() const { return sensor_wrench() + 6 * sensors; }
-  int segment_innovation() const { return segment_wrench() + 6 * segments; }
-  int joint_settled() const { return segment_innovation() + 6 * segments; }
-  int segment_settled() const { return joint_settled() + joints; }
-  int health() const { return segment_settled() + segments; }
-  int width() const { return health() + 1; }
+// One sample as the robot reports it: q, qd, tau have one number per joint, wrench six per sensor;
+// NaN where not measured.
+struct Sample {
+  double time;
+  const double *q, *qd, *tau, *wrench;
 };
 
 class Observer {
@@ -46,421 +40,289 @@ class Observer {
         joints_(std::move(joints)),
         sensors_(std::move(sensors)),
         layout_(tree_, joints_, sensors_),
+        channels_(layout_, joints_, sensors_, method, discretization),
+        terms_(tree_, layout_, joints_, sensors_, local_rows()),
+        packed_(tree_, layout_, joints_, sensors_, local_rows()),
+        projections_(layout_, terms_.at()),
+        torques_(joints_),
         row_{count(joints_), count(sensors_), count(layout_.segments)},
-        method_(method),
-        bandwidths_(discretization),
-        joint_channels_(joints_.size()),
-        sensor_channels_(sensors_.size()),
-        segment_channels_(layout_.segments.size()),
+        writer_(row_, terms_.at(), layout_, sensors_, method),
+        frames_((kLanes + 1) * terms_.at().width(), 0.0),
+        packed_q_(2 * joints_.size()),
+        sensor_present_(sensors_.size(), 0),
         output_(row_.width(), kNaN) {
-    for (int j = 0; j < row_.joints; ++j) {
-      const int handle = bandwidths_.add(joints_[j].bandwidth);
-      JointChannel& c = joint_channels_[j];
-      c.external.bandwidth = c.own.bandwidth = c.parity.bandwidth = handle;
-      c.subspaces.resize(joints_[j].nodes.size());
-    }
-    for (int s = 0; s < row_.sensors; ++s) {
-      const int handle = bandwidths_.add(sensors_[s].bandwidth);
-      sensor_channels_[s].total.bandwidth = sensor_channels_[s].local.bandwidth = handle;
-      const int segment = layout_.segment_of_sensor[s];
-      if (segment >= 0) segment_channels_[segment].filter.bandwidth = handle;
-    }
+    for (int i = 0; i < kLanes; ++i) ahead_[i] = frames_.data() + i * terms_.at().width();
+    before_ = frames_.data() + kLanes * terms_.at().width();
+    for (std::size_t j = 0; j < joints_.size(); ++j) find_projections(j);
   }
-
   Observer(const Observer&) = delete;
   Observer& operator=(const Observer&) = delete;
 
-  // Takes one sample as the robot reports it: q, qd, tau have one number per joint, wrench six per
-  // sensor; NaN where not measured. Returns a row of `row_layout().width()` numbers.
+  // Takes one sample; returns a row of `row_layout().width()` numbers, valid until the next call.
   const double* step(double time, const double* q, const double* qd, const double* tau,
                      const double* wrench) {
-    Health health = 0;
-    if (!accept_time(time, health)) {
-      write_health(health);
-      return output_.data();
-    }
-    const Health state = judge_state(q, qd);
-    health |= state;
-    if ((state & (kMissing | kNonFinite)) != 0) {
-      std::fill(output_.begin(), output_.end(), kNaN);
-      std::fill_n(output_.begin() + row_.joint_settled(), row_.joints + row_.segments, 0.0);
-      write_health(health | (started_ ? 0 : kSettling));
-      return output_.data();
-    }
-    started_ = true;
-    ++now_.index;
-    tree_.update(q, qd);
-    for (int s = 0; s < row_.sensors; ++s) step_sensor(s, wrench + 6 * s, health);
-    for (int g = 0; g < row_.segments; ++g) step_segment(g);
-    for (int j = 0; j < row_.joints; ++j) step_joint(j, qd[j], tau[j], health);
-    write(health);
+    terms_.evaluate(q, qd, ahead_.data());
+    advance({time, q, qd, tau, wrench}, ahead_[0], output_.data(), output_.data());
     return output_.data();
+  }
+
+  // Takes N samples, whose signals stand one after the other in each array; writes N rows and
+  // calls `each(row)` after each. The numbers are those of `step`, to the last bit.
+  template <class Each>
+  void run(std::size_t samples, const double* time, const double* q, const double* qd,
+           const double* tau, const double* wrench, double* out, Each&& each) {
+    const std::size_t n = joints_.size(), w = 6 * sensors_.size(), width = output_.size();
+    const double* last = output_.data();
+    for (std::size_t i = 0; i < samples; ++i) {
+      const std::size_t k = i % kLanes;
+      if (k == 0) look_ahead(samples - i, q + i * n, qd + i * n);
+      advance({time[i], q + i * n, qd + i * n, tau + i * n, wrench + i * w}, ahead_[k], last, out);
+      each(static_cast<const double*>(out));
+      last = out;
+      out += width;
+    }
+    if (samples > 0) std::copy_n(last, width, output_.begin());
+  }
+
+  void run(std::size_t samples, const double* time, const double* q, const double* qd,
+           const double* tau, const double* wrench, double* out) {
+    run(samples, time, q, qd, tau, wrench, out, [](const double*) {});
   }
 
   // Forgets everything: the next sample starts anew.
   void reset() {
-    // A balance with no sample behind it restarts the filters that follow it.
-    for (JointChannel& c : joint_channels_) c.index = c.balance.index = -1;
-    for (SensorChannel& c : sensor_channels_) c.total_balance.index = c.local_balance.index = -1;
-    for (SegmentChannel& c : segment_channels_) c.balance.index = -1;
-    now_ = Instant{};
-    period_ = 0.0;
-    started_ = timed_ = false;
+    clock_ = Clock{};
+    forget();
   }
 
   const RowLayout& row_layout() const { return row_; }
   const Layout& layout() const { return layout_; }
   const Tree& tree() const { return tree_; }
-  Tree& tree() { return tree_; }
-  const std::vector<JointRow>& joints() const { return joints_; }
-  const std::vector<SensorRow>& sensors() const { return sensors_; }
   const std::vector<double>& output() const { return output_; }
-  double time() const { return now_.time; }
-
-  // The wrench of segment g [N, Nm] in the frame of the sensor it begins at.
-  Spatial local_segment_wrench(int g) const {
-    const int sensor = layout_.segments[g].sensor;
-    return wrench_to_child(tree_.state(sensors_[sensor].node).pose, segment_wrench_[g]);
+  double time() const { return now_.time; }  // of the last accepted sample
+  // Of sensor s in world, at the last accepted sample.
+  Pose sensor_pose(int s) const {
+    return load_pose(before_ + terms_.at().sensor(s) + TermsLayout::kPose);
   }
-
-  // Momentum and n-bar (11, 12) of joint j; the tree must be up to date.
-  void joint_terms(int j, double qd, double& p, double& n) const {
-    p = n = 0.0;
-    for (int node : joints_[j].nodes) {
-      const NodeState& s = tree_.state(node);
-      p += dot(s.subspace, s.momentum);
-      n += dot(s.subspace, cross_force(s.twist, s.momentum) - tree_.gravity_wrench(node));
-    }
-    p += joints_[j].rotor_inertia * qd;
-  }
-
-  // Momentum and n-bar (11, 12) of sensor s, in the sensor's frame.
-  void sensor_terms(int s, Spatial& p, Spatial& n) const {
-    const int node = sensors_[s].node;
-    const NodeState& state = tree_.state(node);
-    p = wrench_to_child(state.pose, state.momentum);
-    n = wrench_to_child(state.pose,
-                        cross_force(state.twist, state.momentum) - tree_.gravity_wrench(node));
-  }
+  // The model's terms alone, for a state of its own.
+  Terms<double>& terms() { return terms_; }
 
  private:
-  static constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-  static constexpr double kGapPeriods = 3.5;  // up to three samples may be lost
-
-  struct JointChannel {
-    Balance<double> balance;
-    LowPass<double> external;  // all of the joint's external torque
-    LowPass<double> own;       // without what the next sensors outboard see
-    LowPass<double> parity;    // without what the sensor inboard sees
-    std::vector<Spatial> subspaces;  // at the last instant, for the mean over an interval
-    long index = -1;                 // of that instant
-  };
-  struct SensorChannel {
-    bool usable = false;
-    Spatial reading;  // in the sensor frame
-    Balance<Spatial> total_balance, local_balance;  // world and sensor frame
-    LowPass<Spatial> total, local;
-  };
-  struct SegmentChannel {
-    Balance<Spatial> balance;
-    LowPass<Spatial> filter;
-  };
-
   template <class T>
   static int count(const std::vector<T>& v) {
     return static_cast<int>(v.size());
   }
 
-  bool accept_time(double time, Health& health) {
-    if (!std::isfinite(time)) {
-      health |= kBadTime;
-      return false;
-    }
-    if (timed_) {
-      const double dt = time - now_.time;
-      const double limit = kGapPeriods * period_;
-      if (dt <= 0.0 && (dt >= -limit || period_ == 0.0)) {
-        health |= kBadTime;
-        return false;
-      }
-      if (dt < 0.0) {  // the clock was set back: begin anew at the new time
-        reset();
-        health |= kBadTime;
-      } else if (period_ == 0.0) {
-        period_ = dt;
-      } else {
-        if (dt > limit) health |= kGap;
-        // Tends to the median whatever the jitter, and soon follows another rate.
-        period_ *= dt > limit ? 1.25 : dt > period_ ? 1.05 : 1.0 / 1.05;
-      }
-    }
-    now_.max_gap = period_ > 0.0 ? kGapPeriods * period_ : kInfinity;
-    if ((health & kGap) != 0) now_.max_gap = 0.0;
-    now_.time = time;
-    timed_ = true;
-    return true;
+  std::vector<char> local_rows() const {
+    std::vector<char> local;
+    for (std::size_t s = 0; s < sensors_.size(); ++s)
+      local.push_back(channels_.kind(s) == Channels::SensorFilter::local);
+    return local;
   }
 
-  Health judge_state(const double* q, const double* qd) const {
-    Health health = 0;
-    constexpr double tolerance = 0.01;  // rad or m: encoders and hard stops differ by less
-    for (int j = 0; j < row_.joints; ++j) {
-      health |= judge(q[j]) | judge(qd[j]);
-      if (q[j] < joints_[j].lower - tolerance || q[j] > joints_[j].upper + tolerance)
-        health |= kModelLimit;
-    }
-    return health;
+  void find_projections(std::size_t j) {
+    const auto &inboard = layout_.inboard_sensors[j], &outboard = layout_.outboard_sensors[j];
+    const bool own = joints_[j].measured(), parity = own && !inboard.empty();
+    inboard_.push_back(parity ? projections_.at(inboard[0]) : projections_.unknown());
+    outboard_.push_back(!own              ? projections_.unknown()
+                        : outboard.empty() ? projections_.zero()
+                                           : projections_.at(outboard[0]));
+    if (own && outboard.size() > 1) forks_.push_back(j);
+    if (joints_[j].torque == Torque::from) sources_.push_back(j);
   }
 
-  void step_sensor(int s, const double* logged, Health& health) {
-    const SensorRow& sensor = sensors_[s];
-    SensorChannel& c = sensor_channels_[s];
-    Health own = 0;
-    c.reading = read_wrench(sensor, tree_, logged, own);
-    c.usable = (own & (kMissing | kNonFinite)) == 0;
-    health |= own;
-    if (!c.usable) {
-      c.total_balance.skip();
-      c.local_balance.skip();
-      if (now_.time - c.total_balance.time > now_.max_gap) health |= kSensorExcluded;
-    } else {
-      const NodeState& node = tree_.state(sensor.node);
-      const Spatial weight =
-          sensor.gravity_compensated ? Spatial{} : tree_.gravity_wrench(sensor.node);
-      const Spatial known = wrench_to_parent(node.pose, c.reading) + weight;
-      c.total_balance.observe(node.momentum, known, now_);
-      const Spatial moving = known - cross_force(node.twist, node.momentum);
-      c.local_balance.observe(wrench_to_child(node.pose, node.momentum),
-                              wrench_to_child(node.pose, moving), now_);
-    }
-    follow(c.total, c.total_balance, now_, bandwidths_);
-    follow(c.local, c.local_balance, now_, bandwidths_);
+  void forget() {
+    channels_.balances.forget();
+    channels_.filters.forget();
+    now_ = Instant{};
+    started_ = steady_ = false;
   }
 
-  void step_segment(int g) {
-    const Segment& segment = layout_.segments[g];
-    SegmentChannel& c = segment_channels_[g];
-    bool usable = segment.sensor >= 0 && sensor_channels_[segment.sensor].usable;
-    for (int t : segment.successors) usable = usable && sensor_channels_[t].usable;
-    if (!usable) {
-      c.balance.skip();
-    } else {
-      Spatial p = sensor_channels_[segment.sensor].total_balance.p;
-      Spatial u = sensor_channels_[segment.sensor].total_balance.u;
-      for (int t : segment.successors) {
-        p = p - sensor_channels_[t].total_balance.p;
-        u = u - sensor_channels_[t].total_balance.u;
-      }
-      c.balance.observe(p, u, now_);
-    }
-    follow(c.filter, c.balance, now_, bandwidths_);
-  }
-
-  void step_joint(int j, double qd, double logged, Health& health) {
-    const JointRow& joint = joints_[j];
-    JointChannel& c = joint_channels_[j];
-    c.external.present = c.own.present = c.parity.present = false;
-    c.balance.skip();
-    if (joint.measured()) {
-      const Health own = judge(logged);
-      health |= own;
-      if (own == 0) {
-        observe_joint(j, qd, read_torque(joint, logged, qd, health));
-        follow(c.external, c.balance, now_, bandwidths_);
-        step_own(j);
-        step_parity(j);
-      }
-    } else if (joint.torque == Torque::from) {
-      step_from(j);
-    }
-    for (std::size_t i = 0; i < joint.nodes.size(); ++i)
-      c.subspaces[i] = tree_.state(joint.nodes[i]).subspace;
-    c.index = now_.index;
-  }
-
-  void observe_joint(int j, double qd, double tau) {
-    const JointRow& joint = joints_[j];
-    Balance<double>& balance = joint_channels_[j].balance;
-    if (joint.compensated == Compensated::model) {  // the reading is minus the external torque
-      balance.observe(0.0, tau, now_);
+  // The terms of the next samples, side by side if there are enough of them.
+  void look_ahead(std::size_t left, const double* q, const double* qd) {
+    const std::size_t n = joints_.size();
+    if (left < kLanes) {
+      for (std::size_t k = 0; k < left; ++k)
+        terms_.evaluate(q + k * n, qd + k * n, ahead_.data() + k);
       return;
     }
-    double p, n;
-    joint_terms(j, qd, p, n);
-    if (joint.compensated == Compensated::gravity) {
-      for (int node : joint.nodes)
-        n += dot(tree_.state(node).subspace, tree_.gravity_wrench(node));
-    }
-    balance.observe(p, tau - n, now_);
-  }
-
-  // Do the innovations of joint j and sensor s span the same interval, from the last sample on?
-  bool comparable(int j, int s) const {
-    const Balance<double>& a = joint_channels_[j].balance;
-    const Balance<Spatial>& b = sensor_channels_[s].total_balance;
-    return a.fresh && b.fresh && a.dt == b.dt && joint_channels_[j].index == now_.index - 1;
-  }
-
-  // One difference of innovations, each projected at its instant, and then filtered.
-  void step_difference(LowPass<double>& filter, const Balance<double>& balance, double projected,
-                       bool same_interval) {
-    filter.present = balance.anchored;
-    if (!balance.fresh || filter.stale(now_)) {
-      filter.restart(now_);
-    } else if (same_interval) {
-      filter.step(balance.e - projected, now_, balance.dt, bandwidths_);
-    }
-  }
-
-  // The torque by contacts on the joint's own segment.
-  void step_own(int j) {
-    JointChannel& c = joint_channels_[j];
-    double projected = 0.0;
-    bool same = true;
-    for (const Projection& pair : layout_.outboard_sensors[j]) {
-      const SensorChannel& sensor = sensor_channels_[pair.sensor];
-      if (!sensor.usable) return;
-      same = same && comparable(j, pair.sensor);
-      projected += dot(mean_subspace(j, pair.which), sensor.total_balance.e);
-    }
-    step_difference(c.own, c.balance, projected, same);
-  }
-
-  // Zero unless something touches between the joint and the sensor inboard of it.
-  void step_parity(int j) {
-    const int s = layout_.inboard_sensor[j];
-    if (s < 0 || !sensor_channels_[s].usable) return;
-    JointChannel& c = joint_channels_[j];
-    step_difference(c.parity, c.balance,
-                    dot(mean_subspace(j, 0), sensor_channels_[s].total_balance.e),
-                    comparable(j, s));
-  }
-
-  // A joint without a torque sensor: what the named sensors' loads do to it.
-  void step_from(int j) {
-    JointChannel& c = joint_channels_[j];
-    Balance<double>& balance = c.balance;
-    balance.e = 0.0;
-    balance.anchored = true;
-    balance.fresh = c.index == now_.index - 1;
-    for (const Projection& pair : layout_.source_sensors[j]) {
-      const SensorChannel& sensor = sensor_channels_[pair.sensor];
-      if (!sensor.usable) {
-        balance.skip();
-        break;
+    for (std::size_t j = 0; j < n; ++j) {
+      for (int k = 0; k < kLanes; ++k) {
+        set_lane(packed_q_[j], k, q[k * n + j]);
+        set_lane(packed_q_[n + j], k, qd[k * n + j]);
       }
-      balance.fresh = balance.fresh && sensor.total_balance.fresh;
-      balance.dt = sensor.total_balance.dt;
-      balance.e += dot(mean_subspace(j, pair.which), sensor.total_balance.e);
     }
-    follow(c.external, balance, now_, bandwidths_);
+    packed_.evaluate(packed_q_.data(), packed_q_.data() + n, ahead_.data());
   }
 
-  // The joint's subspace over the last interval, at second order.
-  Spatial mean_subspace(int j, int which) const {
-    return 0.5 * (joint_channels_[j].subspaces[which] +
-                  tree_.state(joints_[j].nodes[which]).subspace);
+  // The sequential part of a step. `terms`: those of the sample, exchanged for room for others;
+  // `last`: the row before, which stays where a sample is refused.
+  void advance(const Sample& sample, double*& terms, const double* last, double* out) {
+    Health health = 0;
+    if (!accept(sample, health, last, out)) return;
+    std::swap(terms, before_);
+    const double *now = before_, *earlier = terms;
+    const std::size_t joint = channels_.joint(0), sensor = channels_.sensor(0);
+    channels_.balances.begin(now_);
+    channels_.filters.begin(now_);
+    const bool complete = read(sample, now, health);
+    // As long as all signals are there at all samples, nothing needs to be kept by channel.
+    const bool steady = steady_ && complete && now_.in_reach(now_.before);
+    if (!steady) book(health);
+    channels_.balances.balance();
+    if (!steady) channels_.balances.blank();
+    projections_.project(earlier, now, channels_.balances.e(sensor));
+    compare(channels_.balances.e(joint));
+    if (!steady) channels_.decide(now_);
+    channels_.filters.run();
+    writer_.write(channels_, now_, steady, now, health, out);
   }
 
-  void write_health(Health health) { output_[row_.health()] = static_cast<double>(health); }
-
-  void write(Health health) {
-    compose_segments();
-    bool settled = true;
-    for (int j = 0; j < row_.joints; ++j) settled = write_joint(j) && settled;
-    for (int s = 0; s < row_.sensors; ++s) write_sensor(s);
-    for (int g = 0; g < row_.segments; ++g) settled = write_segment(g) && settled;
-    write_health(health | (settled ? 0 : kSettling));
-  }
-
-  bool write_joint(int j) {
-    const JointChannel& c = joint_channels_[j];
-    double* out = output_.data();
-    out[row_.tau_ext() + j] = c.external.present ? c.external.value : kNaN;
-    out[row_.segment_torque() + j] = c.own.present ? c.own.value : kNaN;
-    out[row_.parity() + j] = c.parity.present ? c.parity.value : kNaN;
-    out[row_.joint_innovation() + j] = c.balance.fresh ? c.balance.e : kNaN;
-    const bool settled = c.external.settled(now_, bandwidths_);
-    out[row_.joint_settled() + j] = settled ? 1.0 : 0.0;
-    return settled || !c.external.present;
-  }
-
-  void compose_segments() {
-    for (int g = 0; g < row_.segments; ++g) {
-      const Segment& segment = layout_.segments[g];
-      segment_present_[g] = segment_channels_[g].filter.present;
-      segment_wrench_[g] = segment_channels_[g].filter.value;
-      if (method_ == Method::segment || !segment_present_[g]) continue;
-      segment_wrench_[g] = paper_wrench(segment.sensor);  // (18)
-      for (int t : segment.successors)
-        segment_wrench_[g] = segment_wrench_[g] - paper_wrench(t);
+  // Is the sample one to go on with? If not, the row is written.
+  bool accept(const Sample& sample, Health& health, const double* last, double* out) {
+    const Clock::Verdict verdict = clock_.take(sample.time, health);
+    if (verdict == Clock::Verdict::refused) {
+      if (last != out) std::copy_n(last, output_.size(), out);
+      writer_.write_health(health, out);
+      return false;
     }
-  }
-
-  Spatial paper_wrench(int s) const {
-    return wrench_to_parent(tree_.state(sensors_[s].node).pose, sensor_channels_[s].local.value);
-  }
-
-  // Sum of the segments outboard of sensor s; false if one of them is not known.
-  bool sum_segments(int s, Spatial& sum) const {
-    const int g = layout_.segment_of_sensor[s];
-    if (!segment_present_[g]) return false;
-    sum = sum + segment_wrench_[g];
-    for (int t : layout_.segments[g].successors) {
-      if (!sum_segments(t, sum)) return false;
+    if (verdict == Clock::Verdict::set_back) forget();
+    const Health state = judge_state(sample);
+    health |= state;
+    if ((state & (kMissing | kNonFinite)) != 0) {
+      writer_.write_nothing(health | (started_ ? 0 : kSettling), out);
+      return false;
     }
+    started_ = true;
+    now_ = {sample.time, now_.time, clock_.max_gap()};
     return true;
   }
 
-  void write_sensor(int s) {
-    const SensorChannel& c = sensor_channels_[s];
-    double* out = output_.data() + row_.sensor_wrench() + 6 * s;
-    Spatial wrench = c.local.value;
-    if (sensors_[s].six_axis() && method_ == Method::segment) {
-      Spatial world;
-      if (!sum_segments(s, world)) world = c.total.value;
-      wrench = wrench_to_child(tree_.state(sensors_[s].node).pose, world);
+  Health judge_state(const Sample& sample) const {
+    constexpr double tolerance = 0.01;  // rad or m: encoders and hard stops differ by less
+    bool outside = false;
+    for (int j = 0; j < row_.joints; ++j) {
+      outside |= sample.q[j] < joints_[j].lower - tolerance;
+      outside |= sample.q[j] > joints_[j].upper + tolerance;
     }
-    write_wrench(out, wrench, c.usable);
-    for (int i = 0; i < 6; ++i) {
-      if (!sensors_[s].axes[i]) out[i] = kNaN;
+    return judge_all(sample.q, row_.joints) | judge_all(sample.qd, row_.joints) |
+           (outside ? kModelLimit : 0);
+  }
+
+  // Fills the rows of the balances; returns whether all signals are usable.
+  bool read(const Sample& sample, const double* terms, Health& health) {
+    Balances& balances = channels_.balances;
+    const TermsLayout& at = terms_.at();
+    std::copy_n(terms + at.joint_momentum(), at.joints, balances.p(channels_.joint(0)));
+    bool complete = torques_.read(sample.tau, sample.qd, terms + at.joint_bias(),
+                                  balances.u(channels_.joint(0)), health);
+    for (std::size_t s = 0; s < at.sensors; ++s) {
+      Health own = 0;
+      read_sensor(s, sample.wrench + 6 * s, terms + at.sensor(s), own);
+      sensor_present_[s] = (own & (kMissing | kNonFinite)) == 0;
+      complete &= sensor_present_[s] != 0;
+      health |= own;
+    }
+    for (int g = 0; g < row_.segments; ++g) {
+      if (layout_.segments[g].sensor >= 0) read_segment(g);
+    }
+    return complete;
+  }
+
+  void read_sensor(std::size_t s, const double* logged, const double* terms, Health& health) {
+    const SensorRow& sensor = sensors_[s];
+    Balances& balances = channels_.balances;
+    const Pose pose = load_pose(terms + TermsLayout::kPose);
+    const Spatial reading = read_wrench(
+        sensor, pose.R, load_rotation(terms + TermsLayout::kLogRotation), logged, health);
+    const Spatial weight =
+        sensor.gravity_compensated ? Spatial{} : load(terms + TermsLayout::kWeight);
+    std::copy_n(terms + TermsLayout::kMomentum, 6, balances.p(channels_.sensor(s)));
+    store(wrench_to_parent(pose, reading) + weight, balances.u(channels_.sensor(s)));
+    if (channels_.kind(s) != Channels::SensorFilter::local) return;
+    std::copy_n(terms + TermsLayout::kLocalMomentum, 6, balances.p(channels_.local(s)));
+    store(reading - load(terms + TermsLayout::kLocalBias), balances.u(channels_.local(s)));
+  }
+
+  // A segment's momentum and load: those of its sensor without those of the next ones outboard.
+  void read_segment(std::size_t g) {
+    const Segment& segment = layout_.segments[g];
+    Balances& balances = channels_.balances;
+    double *p = balances.p(channels_.segment(g)), *u = balances.u(channels_.segment(g));
+    std::copy_n(balances.p(channels_.sensor(segment.sensor)), 6, p);
+    std::copy_n(balances.u(channels_.sensor(segment.sensor)), 6, u);
+    for (int t : segment.successors) {
+      const double *pt = balances.p(channels_.sensor(t)), *ut = balances.u(channels_.sensor(t));
+      for (int i = 0; i < 6; ++i) p[i] -= pt[i];
+      for (int i = 0; i < 6; ++i) u[i] -= ut[i];
     }
   }
 
-  bool write_segment(int g) {
-    const SegmentChannel& c = segment_channels_[g];
-    double* out = output_.data();
-    write_wrench(out + row_.segment_wrench() + 6 * g, segment_wrench_[g], segment_present_[g]);
-    write_wrench(out + row_.segment_innovation() + 6 * g, c.balance.e, c.balance.fresh);
-    const bool settled = c.filter.settled(now_, bandwidths_);
-    out[row_.segment_settled() + g] = settled ? 1.0 : 0.0;
-    return settled || !c.filter.present;
+  // Not the usual step: who has values, since when, and who not.
+  void book(Health& health) {
+    if (steady_) {
+      channels_.balances.catch_up(now_);
+      channels_.filters.catch_up(now_);
+    }
+    for (std::size_t s = 0; s < sensors_.size(); ++s) {
+      const bool lost = !now_.in_reach(channels_.balances.group(channels_.sensor(s)).time);
+      if (!sensor_present_[s] && lost) health |= kSensorExcluded;
+    }
+    steady_ = channels_.book(torques_.present(), sensor_present_, now_);
   }
 
-  static void write_wrench(double* out, const Spatial& w, bool known) {
-    if (known) {
-      store(w, out);
-    } else {
-      std::fill_n(out, 6, kNaN);
+  // The inputs of all filters, from the innovations of all balances.
+  void compare(double* e) {
+    Filters& filters = channels_.filters;
+    const double* projected = projections_.values();
+    for (std::size_t j : sources_) e[j] = sum(layout_.source_sensors[j]);
+    double* external = filters.input(channels_.external(0));
+    double *own = filters.input(channels_.own(0)), *parity = filters.input(channels_.parity(0));
+    for (std::size_t j = 0; j < joints_.size(); ++j) {
+      external[j] = e[j];
+      own[j] = e[j] - projected[outboard_[j]];
+      parity[j] = e[j] - projected[inboard_[j]];
+    }
+    for (std::size_t j : forks_) own[j] = e[j] - sum(layout_.outboard_sensors[j]);
+    std::copy_n(channels_.balances.e(channels_.segment(0)), 6 * row_.segments,
+                filters.input(channels_.segment_filter(0)));
+    for (std::size_t s = 0; s < sensors_.size(); ++s) {
+      const Channels::SensorFilter kind = channels_.kind(s);
+      if (kind == Channels::SensorFilter::none) continue;
+      const bool local = kind == Channels::SensorFilter::local;
+      std::copy_n(channels_.balances.e(local ? channels_.local(s) : channels_.sensor(s)), 6,
+                  filters.input(channels_.sensor_filter(s)));
     }
   }
 
-  Tree tree_;
-  std::vector<JointRow> joints_;
-  std::vector<SensorRow> sensors_;
-  Layout layout_;
-  RowLayout row_;
-  Method method_;
-  Bandwidths bandwidths_;
-  std::vector<JointChannel> joint_channels_;
-  std::vector<SensorChannel> sensor_channels_;
-  std::vector<SegmentChannel> segment_channels_;
+  double sum(const std::vector<Projection>& pairs) const {
+    double total = 0.0;
+    for (const Projection& pair : pairs) total += projections_.values()[projections_.at(pair)];
+    return total;
+  }
+
+  const Tree tree_;
+  const std::vector<JointRow> joints_;
+  const std::vector<SensorRow> sensors_;
+  const Layout layout_;
+  Channels channels_;
+  Terms<double> terms_;
+  Terms<Lanes> packed_;
+  Projections projections_;
+  JointReadings torques_;
+  const RowLayout row_;
+  RowWriter writer_;
+  std::vector<double> frames_;  // terms of the sample before and of those at work
+  std::array<double*, kLanes> ahead_{};
+  double* before_ = nullptr;
+  std::vector<Lanes> packed_q_;  // positions, then velocities
+  std::vector<char> sensor_present_;
+  std::vector<std::size_t> sources_, forks_;  // joints read from sensors; with several outboard
+  std::vector<std::size_t> outboard_, inboard_;   // per joint: where its projections stand
   std::vector<double> output_;
-  std::vector<Spatial> segment_wrench_ = std::vector<Spatial>(layout_.segments.size());
-  std::vector<char> segment_present_ = std::vector<char>(layout_.segments.size(), 0);
+  Clock clock_;
   Instant now_;
-  double period_ = 0.0;  // typical interval between samples [s]
-  bool started_ = false, timed_ = false;
+  bool started_ = false, steady_ = false;
 };
 
 }  // namespace touchline

@@ -9,7 +9,6 @@
 
 #include "touchline/health.hpp"
 #include "touchline/spatial.hpp"
-#include "touchline/tree.hpp"
 
 namespace touchline {
 
@@ -51,40 +50,36 @@ struct SensorRow {
   }
 };
 
-// Torque of joint j that is not friction [Nm], from the logged number.
-inline double read_torque(const JointRow& joint, double logged, double qd, Health& health) {
-  const double reading = joint.gain * logged;
-  if (std::fabs(reading) >= joint.range) health |= kSaturated;
-  double friction = joint.viscous * qd;
-  if (joint.coulomb != 0.0) friction += joint.coulomb * std::tanh(qd / joint.coulomb_width);
-  return joint.sign * reading - joint.bias - friction;
+// Health of `count` numbers that should have been measured.
+inline Health judge_all(const double* values, int count) {
+  bool good = true;
+  for (int i = 0; i < count; ++i) good &= std::fabs(values[i]) < kAbsurd;
+  if (good) return 0;
+  Health health = 0;
+  for (int i = 0; i < count; ++i) health |= judge(values[i]);
+  return health;
 }
 
 // The wrench on the outboard body in the sensor frame, from six logged numbers; `health` tells of
-// those among the sensor's own axes that cannot be used.
-inline Spatial read_wrench(const SensorRow& sensor, const Tree& tree, const double* logged,
-                           Health& health) {
+// those among the sensor's own axes that cannot be used. `R_world_sensor` and `R_world_log`: of
+// the sensor frame and, for a `turned` sensor, of the axes of the log.
+inline Spatial read_wrench(const SensorRow& sensor, const Mat3& R_world_sensor,
+                           const Mat3& R_world_log, const double* logged, Health& health) {
   double w[6];
-  for (int i = 0; i < 6; ++i) {
-    if (sensor.axes[i]) health |= judge(logged[i]);
-    w[i] = sensor.axes[i] ? logged[i] : 0.0;
-  }
-  Spatial wrench{{w[0], w[1], w[2]}, {w[3], w[4], w[5]}};
+  for (int i = 0; i < 6; ++i) w[i] = sensor.axes[i] ? logged[i] : 0.0;
+  health |= judge_all(w, 6);
   if (sensor.turned) {
-    const Mat3& R_world_sensor = tree.state(sensor.node).pose.R;
-    const Mat3 R_world_log = sensor.log_node < 0
-                                 ? sensor.R_node_log
-                                 : tree.state(sensor.log_node).pose.R * sensor.R_node_log;
-    wrench.linear = transposed_times(R_world_sensor, R_world_log * wrench.linear);
-    wrench.angular = transposed_times(R_world_sensor, R_world_log * wrench.angular);
+    const Spatial turned = load(w);
+    store({transposed_times(R_world_sensor, R_world_log * turned.linear),
+           transposed_times(R_world_sensor, R_world_log * turned.angular)}, w);
   }
-  double* parts[6] = {&wrench.linear.x,  &wrench.linear.y,  &wrench.linear.z,
-                      &wrench.angular.x, &wrench.angular.y, &wrench.angular.z};
+  bool saturated = false;
   for (int i = 0; i < 6; ++i) {
-    if (std::fabs(*parts[i]) >= sensor.range[i]) health |= kSaturated;
-    *parts[i] = sensor.axes[i] ? sensor.sign * *parts[i] - sensor.bias[i] : 0.0;
+    saturated |= std::fabs(w[i]) >= sensor.range[i];
+    w[i] = sensor.axes[i] ? sensor.sign * w[i] - sensor.bias[i] : 0.0;
   }
-  return wrench;
+  if (saturated) health |= kSaturated;
+  return load(w);
 }
 
 }  // namespace touchline

@@ -1,62 +1,95 @@
 // SPDX-License-Identifier: Apache-2.0
 // Spatial algebra: 3-vectors, rotations, twists and wrenches ([linear; angular] and
-// [force; moment], both about one stated point).
+// [force; moment], both about one stated point). T is double, or several samples side by side.
 #pragma once
 
 #include <cmath>
 
 namespace touchline {
 
-struct Vec3 {
-  double x = 0.0, y = 0.0, z = 0.0;
+template <class T>
+struct BasicVec3 {
+  T x{}, y{}, z{};
+
+  BasicVec3& operator+=(const BasicVec3& b) { return x += b.x, y += b.y, z += b.z, *this; }
+  BasicVec3& operator-=(const BasicVec3& b) { return x -= b.x, y -= b.y, z -= b.z, *this; }
 };
 
-inline Vec3 operator+(const Vec3& a, const Vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-inline Vec3 operator-(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-inline Vec3 operator*(double s, const Vec3& a) { return {s * a.x, s * a.y, s * a.z}; }
-inline double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline Vec3 cross(const Vec3& a, const Vec3& b) {
+template <class A, class B>
+using Product = decltype(A{} * B{});
+
+template <class T>
+BasicVec3<T> operator+(const BasicVec3<T>& a, const BasicVec3<T>& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+template <class T>
+BasicVec3<T> operator-(const BasicVec3<T>& a, const BasicVec3<T>& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+template <class A, class B>
+BasicVec3<Product<A, B>> operator*(const A& s, const BasicVec3<B>& a) {
+  return {s * a.x, s * a.y, s * a.z};
+}
+template <class A, class B>
+Product<A, B> dot(const BasicVec3<A>& a, const BasicVec3<B>& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+template <class A, class B>
+BasicVec3<Product<A, B>> cross(const BasicVec3<A>& a, const BasicVec3<B>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
 // A rotation or an inertia, by columns.
-struct Mat3 {
-  Vec3 x{1.0, 0.0, 0.0}, y{0.0, 1.0, 0.0}, z{0.0, 0.0, 1.0};
+template <class T>
+struct BasicMat3 {
+  BasicVec3<T> x, y, z;
 };
 
-inline Vec3 operator*(const Mat3& m, const Vec3& v) { return v.x * m.x + v.y * m.y + v.z * m.z; }
-inline Mat3 operator*(const Mat3& a, const Mat3& b) { return {a * b.x, a * b.y, a * b.z}; }
+template <class A, class B>
+BasicVec3<Product<A, B>> operator*(const BasicMat3<A>& m, const BasicVec3<B>& v) {
+  return {m.x.x * v.x + m.y.x * v.y + m.z.x * v.z, m.x.y * v.x + m.y.y * v.y + m.z.y * v.z,
+          m.x.z * v.x + m.y.z * v.y + m.z.z * v.z};
+}
+template <class A, class B>
+BasicMat3<Product<A, B>> operator*(const BasicMat3<A>& a, const BasicMat3<B>& b) {
+  return {a * b.x, a * b.y, a * b.z};
+}
 // m^T v without forming the transpose.
-inline Vec3 transposed_times(const Mat3& m, const Vec3& v) {
+template <class A, class B>
+BasicVec3<Product<A, B>> transposed_times(const BasicMat3<A>& m, const BasicVec3<B>& v) {
   return {dot(m.x, v), dot(m.y, v), dot(m.z, v)};
+}
+
+// A twist [v; w], a momentum [l; k] or a wrench [f; m].
+template <class T>
+struct BasicSpatial {
+  BasicVec3<T> linear, angular;
+};
+
+template <class T>
+BasicSpatial<T> operator+(const BasicSpatial<T>& a, const BasicSpatial<T>& b) {
+  return {a.linear + b.linear, a.angular + b.angular};
+}
+template <class T>
+BasicSpatial<T> operator-(const BasicSpatial<T>& a, const BasicSpatial<T>& b) {
+  return {a.linear - b.linear, a.angular - b.angular};
+}
+
+using Vec3 = BasicVec3<double>;
+using Mat3 = BasicMat3<double>;
+using Spatial = BasicSpatial<double>;
+
+template <class T>
+BasicMat3<T> identity() {
+  const T zero{}, one = zero + 1.0;
+  return {{one, zero, zero}, {zero, one, zero}, {zero, zero, one}};
 }
 
 // Pose of a frame B in A: x_A = R x_B + p.
 struct Pose {
-  Mat3 R;
+  Mat3 R = identity<double>();
   Vec3 p;
 };
-
-// A twist [v; w], a momentum [l; k] or a wrench [f; m].
-struct Spatial {
-  Vec3 linear, angular;
-};
-
-inline Spatial operator+(const Spatial& a, const Spatial& b) {
-  return {a.linear + b.linear, a.angular + b.angular};
-}
-inline Spatial operator-(const Spatial& a, const Spatial& b) {
-  return {a.linear - b.linear, a.angular - b.angular};
-}
-inline Spatial operator*(double s, const Spatial& a) { return {s * a.linear, s * a.angular}; }
-inline double dot(const Spatial& a, const Spatial& b) {
-  return dot(a.linear, b.linear) + dot(a.angular, b.angular);
-}
-
-// v x* H for a twist v and a momentum or wrench H.
-inline Spatial cross_force(const Spatial& v, const Spatial& H) {
-  return {cross(v.angular, H.linear), cross(v.linear, H.linear) + cross(v.angular, H.angular)};
-}
 
 // A wrench from frame B to A, with the pose of B in A.
 inline Spatial wrench_to_parent(const Pose& X, const Spatial& w) {
@@ -69,14 +102,20 @@ inline Spatial wrench_to_child(const Pose& X, const Spatial& w) {
           transposed_times(X.R, w.angular - cross(X.p, w.linear))};
 }
 
-inline bool is_finite(const Spatial& a) {
-  return std::isfinite(dot(a, a));
+inline Vec3 load_vector(const double* in) { return {in[0], in[1], in[2]}; }
+inline Mat3 load_rotation(const double* in) {
+  return {load_vector(in), load_vector(in + 3), load_vector(in + 6)};
 }
+inline Pose load_pose(const double* in) { return {load_rotation(in), load_vector(in + 9)}; }
+inline Spatial load(const double* in) { return {{in[0], in[1], in[2]}, {in[3], in[4], in[5]}}; }
 
 inline void store(const Spatial& a, double* out) {
-  const double values[6] = {a.linear.x,  a.linear.y,  a.linear.z,
-                            a.angular.x, a.angular.y, a.angular.z};
-  for (int i = 0; i < 6; ++i) out[i] = values[i];
+  out[0] = a.linear.x;
+  out[1] = a.linear.y;
+  out[2] = a.linear.z;
+  out[3] = a.angular.x;
+  out[4] = a.angular.y;
+  out[5] = a.angular.z;
 }
 
 }  // namespace touchline

@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // The robot as a tree of rigid bodies, and the O(n) recursion over it: one forward pass for poses
-// and twists, one backward pass for the momentum and the weight of everything outboard.
+// and velocities, one backward pass for the momentum of everything outboard.
 //
-// All quantities stand in world axes about the world origin, so a subtree is a plain sum.
+// All vectors stand in world axes. Velocities, momenta and first moments of a node are about the
+// origin of that node's own frame: the shortest formulas for joint rows.
 #pragma once
 
-#include <cmath>
 #include <cstddef>
+#include <stdexcept>
+#include <utility>
 #include <vector>
 
+#include "touchline/lanes.hpp"
+#include "touchline/sincos.hpp"
 #include "touchline/spatial.hpp"
 
 namespace touchline {
@@ -28,84 +32,175 @@ struct Node {
   double offset = 0.0;
 };
 
+template <class T>
 struct NodeState {
-  Pose pose;          // of the node's frame in world
-  Spatial twist;      // of the body
-  Spatial subspace;   // S times multiplier: the twist per unit of q[coordinate]
-  Spatial momentum;   // of the body and all outboard of it
-  double mass = 0.0;  // of the body and all outboard of it, and its first moment
-  Vec3 first_moment;
+  BasicMat3<T> R;          // of the node's frame in world
+  BasicVec3<T> p;          // its origin
+  BasicVec3<T> arm;        // from the parent's origin to it
+  BasicVec3<T> velocity;   // of the body at the origin
+  BasicVec3<T> angular;    // velocity
+  BasicVec3<T> linear_momentum, angular_momentum;  // of the body and all outboard of it
+  BasicVec3<T> first_moment;                       // likewise
+};
+
+// The states of all nodes at one instant, or at several side by side.
+template <class T>
+struct TreeState {
+  std::vector<NodeState<T>> nodes;           // the world, then one per node
+  std::vector<T> positions, sines, cosines;  // of the moving nodes, in their order
+
+  const NodeState<T>& node(int i) const { return nodes[i + 1]; }
+  NodeState<T>& node(int i) { return nodes[i + 1]; }
 };
 
 class Tree {
  public:
-  Tree(std::vector<Node> nodes, const Vec3& gravity)
-      : nodes_(std::move(nodes)), states_(nodes_.size()), gravity_(gravity) {}
+  Tree(std::vector<Node> nodes, const Vec3& gravity);
 
-  void update(const double* q, const double* qd) {
-    for (std::size_t i = 0; i < nodes_.size(); ++i) forward(i, q, qd);
-    for (std::size_t i = nodes_.size(); i-- > 0;) {
-      if (nodes_[i].parent >= 0) accumulate(states_[nodes_[i].parent], states_[i]);
-    }
-  }
+  // Room for `sweep`; the nodes that cannot move get their poses here, once and for all.
+  template <class T>
+  TreeState<T> make_state() const;
+
+  // Brings all states to joint positions q and velocities qd.
+  template <class T>
+  void sweep(const T* q, const T* qd, TreeState<T>& state) const;
 
   const std::vector<Node>& nodes() const { return nodes_; }
-  const NodeState& state(int node) const { return states_[node]; }
-
-  // The wrench of gravity on the node's body and all outboard of it.
-  Spatial gravity_wrench(int node) const {
-    const NodeState& s = states_[node];
-    return {s.mass * gravity_, cross(s.first_moment, gravity_)};
-  }
+  const Vec3& gravity() const { return gravity_; }
+  double mass_outboard(int node) const { return constants_[node].mass_outboard; }
 
  private:
-  void forward(std::size_t i, const double* q, const double* qd) {
-    static const NodeState world{};
-    const Node& node = nodes_[i];
-    NodeState& s = states_[i];
-    const NodeState& parent = node.parent >= 0 ? states_[node.parent] : world;
-    s.pose.R = parent.pose.R * node.placement.R;
-    s.pose.p = parent.pose.R * node.placement.p + parent.pose.p;
-    s.twist = parent.twist;
-    if (node.kind != NodeKind::fixed) move(node, s, q[node.coordinate], qd[node.coordinate]);
-    add_body(node, s);
-  }
+  // What follows from a node's inertia, about the origin of its frame.
+  struct Constants {
+    Vec3 first_moment;
+    Mat3 inertia;
+    double mass_outboard;  // of the body and all outboard of it
+  };
 
-  static void move(const Node& node, NodeState& s, double q, double qd) {
-    const double position = node.multiplier * q + node.offset;
-    const Vec3 axis = node.multiplier * s.pose.R.z;
-    if (node.kind == NodeKind::revolute) {
-      const double c = std::cos(position), n = std::sin(position);
-      const Vec3 x = s.pose.R.x, y = s.pose.R.y;
-      s.pose.R.x = c * x + n * y;
-      s.pose.R.y = c * y - n * x;
-      s.subspace = {cross(s.pose.p, axis), axis};
-    } else {
-      s.pose.p = s.pose.p + position * s.pose.R.z;
-      s.subspace = {axis, {}};
-    }
-    s.twist = s.twist + qd * s.subspace;
-  }
-
-  static void add_body(const Node& node, NodeState& s) {
-    const Vec3 com = s.pose.R * node.com + s.pose.p;
-    const Vec3& w = s.twist.angular;
-    s.momentum.linear = node.mass * (s.twist.linear + cross(w, com));
-    s.momentum.angular = s.pose.R * (node.inertia * transposed_times(s.pose.R, w)) +
-                         cross(com, s.momentum.linear);
-    s.mass = node.mass;
-    s.first_moment = node.mass * com;
-  }
-
-  static void accumulate(NodeState& parent, const NodeState& child) {
-    parent.momentum = parent.momentum + child.momentum;
-    parent.mass += child.mass;
-    parent.first_moment = parent.first_moment + child.first_moment;
-  }
+  bool can_move(int i) const;
+  template <class T>
+  void place(int i, TreeState<T>& state) const;
+  template <class T>
+  void move(std::size_t m, T qd, TreeState<T>& state) const;
+  template <class T>
+  void add_body(int i, NodeState<T>& s) const;
+  template <class T>
+  void pass_inboard(int i, TreeState<T>& state) const;
 
   std::vector<Node> nodes_;
-  std::vector<NodeState> states_;
+  std::vector<Constants> constants_;
+  std::vector<int> resting_, carried_;  // nodes without and with a joint inboard of them
+  std::vector<int> moving_;             // nodes with a joint of their own
   Vec3 gravity_;
 };
+
+inline Tree::Tree(std::vector<Node> nodes, const Vec3& gravity)
+    : nodes_(std::move(nodes)), gravity_(gravity) {
+  for (int i = 0; i < static_cast<int>(nodes_.size()); ++i) {
+    const Node& node = nodes_[i];
+    if (node.parent >= i) throw std::invalid_argument("a parent must come first");
+    const Vec3& c = node.com;
+    const double m = node.mass, cc = dot(c, c);
+    const Mat3 about_origin{node.inertia.x + m * (Vec3{cc, 0.0, 0.0} - c.x * c),
+                            node.inertia.y + m * (Vec3{0.0, cc, 0.0} - c.y * c),
+                            node.inertia.z + m * (Vec3{0.0, 0.0, cc} - c.z * c)};
+    constants_.push_back({m * c, about_origin, m});
+    (can_move(i) ? carried_ : resting_).push_back(i);
+    if (node.kind != NodeKind::fixed) moving_.push_back(i);
+  }
+  for (std::size_t i = nodes_.size(); i-- > 0;) {
+    const int parent = nodes_[i].parent;
+    if (parent >= 0) constants_[parent].mass_outboard += constants_[i].mass_outboard;
+  }
+}
+
+inline bool Tree::can_move(int i) const {
+  for (; i >= 0; i = nodes_[i].parent) {
+    if (nodes_[i].kind != NodeKind::fixed) return true;
+  }
+  return false;
+}
+
+template <class T>
+TreeState<T> Tree::make_state() const {
+  TreeState<T> state;
+  state.nodes.resize(nodes_.size() + 1);
+  state.nodes[0].R = identity<T>();
+  for (auto* of : {&state.positions, &state.sines, &state.cosines}) of->resize(moving_.size());
+  for (int i : resting_) place(i, state);
+  return state;
+}
+
+template <class T>
+void Tree::sweep(const T* q, const T* qd, TreeState<T>& state) const {
+  for (std::size_t m = 0; m < moving_.size(); ++m) {
+    const Node& node = nodes_[moving_[m]];
+    state.positions[m] = node.multiplier * q[node.coordinate] + node.offset;
+  }
+  sincos(state.positions.data(), moving_.size(), state.sines.data(), state.cosines.data());
+  for (int i : resting_) {
+    NodeState<T>& s = state.node(i);
+    s.linear_momentum = s.angular_momentum = {};
+    s.first_moment = s.R * constants_[i].first_moment;
+  }
+  std::size_t m = 0;
+  for (int i : carried_) {
+    place(i, state);
+    if (nodes_[i].kind != NodeKind::fixed) move(m++, qd[nodes_[i].coordinate], state);
+    add_body(i, state.node(i));
+  }
+  for (std::size_t i = nodes_.size(); i-- > 0;) pass_inboard(static_cast<int>(i), state);
+}
+
+// Pose and velocity, as if the node's own joint stood still at zero.
+template <class T>
+void Tree::place(int i, TreeState<T>& state) const {
+  const Node& node = nodes_[i];
+  const NodeState<T>& parent = state.node(node.parent);
+  NodeState<T>& s = state.node(i);
+  s.R = parent.R * node.placement.R;
+  s.arm = parent.R * node.placement.p;
+  s.p = parent.p + s.arm;
+  s.angular = parent.angular;
+  s.velocity = parent.velocity + cross(parent.angular, s.arm);
+}
+
+template <class T>
+void Tree::move(std::size_t m, T qd, TreeState<T>& state) const {
+  const Node& node = nodes_[moving_[m]];
+  NodeState<T>& s = state.node(moving_[m]);
+  const BasicVec3<T> rate = (node.multiplier * qd) * s.R.z;
+  if (node.kind == NodeKind::revolute) {
+    const T sine = state.sines[m], cosine = state.cosines[m];
+    const BasicVec3<T> x = s.R.x, y = s.R.y;
+    s.R.x = cosine * x + sine * y;
+    s.R.y = cosine * y - sine * x;
+    s.angular += rate;
+  } else {
+    const BasicVec3<T> shift = state.positions[m] * s.R.z;
+    s.arm += shift;
+    s.p += shift;
+    s.velocity += cross(s.angular, shift) + rate;
+  }
+}
+
+template <class T>
+void Tree::add_body(int i, NodeState<T>& s) const {
+  const Constants& body = constants_[i];
+  const BasicVec3<T> h = s.R * body.first_moment;
+  s.first_moment = h;
+  s.linear_momentum = nodes_[i].mass * s.velocity + cross(s.angular, h);
+  s.angular_momentum =
+      s.R * (body.inertia * transposed_times(s.R, s.angular)) + cross(h, s.velocity);
+}
+
+template <class T>
+void Tree::pass_inboard(int i, TreeState<T>& state) const {
+  const NodeState<T>& s = state.node(i);
+  NodeState<T>& parent = state.node(nodes_[i].parent);
+  parent.linear_momentum += s.linear_momentum;
+  parent.angular_momentum += s.angular_momentum + cross(s.arm, s.linear_momentum);
+  parent.first_moment += s.first_moment + constants_[i].mass_outboard * s.arm;
+}
 
 }  // namespace touchline

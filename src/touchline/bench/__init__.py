@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Benchmarks: speed and accuracy beside the peers."""
+"""Speed and accuracy, side by side with the peers that are installed."""

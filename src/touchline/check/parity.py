@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.model.robot import AXES, Robot
+from touchline.model.description import AXES
+from touchline.model.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from touchline.check.findings import Findings
 from touchline.estimation.samples import Samples
-from touchline.model.robot import AXES, Robot
+from touchline.model.description import AXES
+from touchline.model.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -58,7 +58,7 @@ class Bag:
                 self._readers = [_opened(Reader(self.path))]
                 self._warn_of_journal(sorted(self.path.glob("*.db3")))
                 return
-            except Exception as error:  # noqa: BLE001 - the package raises many kinds
+            except Exception as error:  # the package raises many kinds
                 self.warnings.append(f"{self.path}: {_first_line(error)}; reading its files alone")
         files = self._files()
         self._readers = [reader for file in files if (reader := self._open_file(file))]
@@ -80,7 +80,7 @@ class Bag:
 
         try:
             return _opened(Reader(file))
-        except Exception as error:  # noqa: BLE001 - the package raises many kinds
+        except Exception as error:  # the package raises many kinds
             problem = _first_line(error)
         if (reader := _mend(file)) is not None:
             count = reader.metadata.message_count
@@ -117,7 +117,7 @@ class Bag:
                 for connection, received, data in read(wanted):
                     self.done += 1
                     yield connection.topic, received, data
-            except Exception as error:  # noqa: BLE001 - damaged bytes can fail in any way
+            except Exception as error:  # damaged bytes can fail in any way
                 text = (
                     f"{reader.path}: damaged after {self.done} messages ({_first_line(error)}); "
                     "those before are used"
@@ -147,7 +147,7 @@ def _mend(file: Path) -> Any:
             reader: Any = _opened(McapReader(mended))
         else:
             reader = SalvagedSqlite(file)
-    except Exception:  # noqa: BLE001 - damaged bytes can fail in any way
+    except Exception:  # damaged bytes can fail in any way
         return None
     if reader.metadata.message_count:
         return reader

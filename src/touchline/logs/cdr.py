@@ -160,15 +160,15 @@ class Decoder:
             at = np.flatnonzero(sizes == size)
             if self._fast:
                 at = self._decode_equal(messages, at, int(size), result)
-            for index in at:
-                self._decode_one(messages[index], int(index), result)
+            for index in at.tolist():
+                self._decode_one(messages[index], index, result)
         return result
 
     def _decode_equal(
         self, messages: Sequence[bytes], at: np.ndarray, size: int, result: Decoded
     ) -> np.ndarray:
         """Decode messages of one size; returns those that fit no layout."""
-        joined = b"".join([messages[i] for i in at])
+        joined = b"".join([messages[int(i)] for i in at])
         table = np.frombuffer(joined, np.uint8).reshape(len(at), size)
         layouts = self._layouts.setdefault(size, [])
         known = 0
@@ -224,7 +224,7 @@ class Decoder:
         """The general way, one message at a time."""
         try:
             read = self._deserialize(message)
-        except Exception:  # noqa: BLE001 - damaged bytes can fail in any way
+        except Exception:  # damaged bytes can fail in any way
             self.undecodable += 1
             return
         stamp = read.header.stamp

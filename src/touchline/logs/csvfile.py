@@ -77,6 +77,7 @@ class CsvSource:
         found = next(blocks, empty)
         blocks.close()
         self.close()
+        self._stream = None
         return take(found, 0, HEAD_ROWS)
 
     def blocks(self) -> Iterator[Block]:
@@ -103,6 +104,9 @@ class CsvSource:
                 yield block
         except pa.ArrowInvalid as error:
             raise InputError(self._diagnose() or f"{self.path}: {error}") from error
+        if not rows:
+            damage = f" ({stream.damage})" if stream.damage else ""
+            raise InputError(f"{self.path}: no rows below the header{damage}")
         if not quiet:
             self._report_cut(stream, rows)
 
@@ -172,7 +176,7 @@ class CsvSource:
 
     def progress(self) -> float:
         """Fraction of the file's bytes read."""
-        return self._stream.fraction() if self._stream else 0.0
+        return self._stream.fraction if self._stream else 0.0
 
     def close(self) -> None:
         """Release the file."""

@@ -5,7 +5,7 @@ import gzip
 import io
 import zlib
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 _PIECE = 1 << 20
 
@@ -16,7 +16,7 @@ class WholeLines(io.RawIOBase):
     Attributes:
         damage: why the file ended early, or None.
         partial: True when a cut-off last line was dropped.
-        lines: number of lines handed out so far.
+        fraction: of the file's bytes that have been taken in, 0 to 1.
     """
 
     def __init__(self, path: Path, delimiter: bytes = b",", fields: int = 0):
@@ -31,7 +31,7 @@ class WholeLines(io.RawIOBase):
         self._pending, self._ended = b"", False
         self.damage: str | None = None
         self.partial = False
-        self.lines = 0
+        self.fraction = 0.0
 
     def readable(self) -> bool:
         """Always."""
@@ -40,29 +40,34 @@ class WholeLines(io.RawIOBase):
     def read(self, size: int = -1, /) -> bytes:
         """At most `size` bytes that end at the end of a line, unless a line is longer."""
         wanted = _PIECE if size is None or size < 0 else size
-        while not self._ended and len(self._pending) < wanted and b"\n" not in self._pending:
-            self._fill()
+        self._fill(wanted)
         head = self._pending[:wanted]
         cut = head.rfind(b"\n") + 1 or len(head)
-        result, self._pending = self._pending[:cut], self._pending[cut:]
-        self.lines += result.count(b"\n")
+        result, self._pending = head[:cut], self._pending[cut:]
         return result
 
-    def readinto(self, buffer, /) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
+    def readinto(self, buffer: Any, /) -> int:
         """As `read`, into a buffer."""
         piece = self.read(len(buffer))
         buffer[: len(piece)] = piece
         return len(piece)
 
-    def _fill(self) -> None:
-        try:
-            piece = self._text.read1(_PIECE)  # pyright: ignore[reportAttributeAccessIssue]
-        except (EOFError, zlib.error, gzip.BadGzipFile) as error:
-            self.damage, piece = str(error), b""
-        self._pending += piece
-        if not piece:
-            self._ended = True
-            self._judge_last_line()
+    def _fill(self, wanted: int) -> None:
+        """Bring the pending bytes to the wanted number, or to the end of the file."""
+        pieces, held = [self._pending], len(self._pending)
+        while held < wanted and not self._ended:
+            try:
+                piece = self._text.read1(_PIECE)  # pyright: ignore[reportAttributeAccessIssue]
+            except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+                self.damage, piece = str(error), b""
+            self._ended = not piece
+            self.fraction = self._raw.tell() / self.size if self.size else 1.0
+            pieces.append(piece)
+            held += len(piece)
+        if len(pieces) > 1:
+            self._pending = b"".join(pieces)
+            if self._ended:
+                self._judge_last_line()
 
     def _judge_last_line(self) -> None:
         """Keep an unterminated last line only where it may be whole."""
@@ -72,10 +77,6 @@ class WholeLines(io.RawIOBase):
         if last.strip() and not whole:
             self._pending = self._pending[:start]
             self.partial = True
-
-    def fraction(self) -> float:
-        """Fraction of the file's bytes that have been taken in."""
-        return self._raw.tell() / self.size if self.size else 1.0
 
     def close(self) -> None:
         """Close the file."""

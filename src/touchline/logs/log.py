@@ -58,7 +58,10 @@ class Log:
 
         Raises:
             InputError: the log is damaged or holds something that is no number.
+            ValueError: `rows` is not positive.
         """
+        if rows < 1:
+            raise ValueError(f"chunks of {rows} rows")
         for window in windows(self._source.blocks(), rows, self._preparation.halo):
             yield self._preparation.samples(window)
 
@@ -129,6 +132,6 @@ def read_log(path: Path | str, description: RobotDescription) -> Samples:
         chunks = list(log.chunks())
     if not chunks:
         empty = {n: np.empty((0, *shape)) for n, shape in signal_shapes(description).items()}
-        return Samples(**empty)
+        return Samples(**empty, row=0)
     names = ("time", "q", "qd", "tau", "wrench")
-    return Samples(**{n: np.concatenate([getattr(c, n) for c in chunks]) for n in names})
+    return Samples(**{n: np.concatenate([getattr(c, n) for c in chunks]) for n in names}, row=0)

@@ -3,6 +3,7 @@
 
 import io
 from pathlib import Path
+from typing import Any
 
 MAGIC = b"\x89MCAP0\r\n"
 # A footer record that points at no summary: readers then scan the records.
@@ -64,7 +65,7 @@ class _Mended(io.RawIOBase):
         self._at = max(base + offset, 0)
         return self._at
 
-    def readinto(self, buffer, /) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
+    def readinto(self, buffer: Any, /) -> int:
         if self._at < self._length:
             self._file.seek(self._at)
             piece = self._file.read(min(len(buffer), self._length - self._at))

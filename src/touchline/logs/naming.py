@@ -29,7 +29,6 @@ from touchline.errors import InputError
 from touchline.logs.suggest import unknown
 from touchline.model.description import RobotDescription
 
-AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 JOINT_SIGNALS = ("q", "qd", "tau")
 LOG_KEYS = ("time", *JOINT_SIGNALS, "sensors", "topics", "joint_names")
 

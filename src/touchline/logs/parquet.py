@@ -27,7 +27,8 @@ class ParquetSource:
         """Open the file and find its columns.
 
         Raises:
-            InputError: no Parquet file, one cut off before its footer, or columns are missing.
+            InputError: no Parquet file, one cut off before its footer, no rows, or columns are
+                missing.
         """
         import pyarrow as pa
         import pyarrow.parquet as pq
@@ -35,7 +36,9 @@ class ParquetSource:
         self.path = path
         try:
             # Without pre-buffering a huge row group is read page by page.
-            self._file = pq.ParquetFile(path, pre_buffer=False, buffer_size=1 << 20)
+            self._file = pq.ParquetFile(
+                path, pre_buffer=False, buffer_size=1 << 20, page_checksum_verification=True
+            )
         except (pa.ArrowException, OSError) as error:
             raise InputError(
                 f"{path}: not a readable Parquet file; a file cut off before its footer cannot "
@@ -48,6 +51,8 @@ class ParquetSource:
         try:
             self._selection = select_columns(description, naming, list(self.columns), str(path))
             self._check_types()
+            if not self._file.metadata.num_rows:
+                raise InputError(f"{path}: the table has no rows")
         except InputError:
             self.close()
             raise

@@ -11,11 +11,11 @@ from touchline.logs.align import REACH_PERIODS, find_bracket
 from touchline.logs.bagfile import Bag
 from touchline.logs.blocks import Block, Window, take, windows
 from touchline.logs.cdr import JOINT_STATE, WRENCH_STAMPED, Decoder
-from touchline.logs.naming import AXES, Naming
+from touchline.logs.naming import Naming
 from touchline.logs.source import HEAD_ROWS
 from touchline.logs.survey import Channel, Survey
 from touchline.logs.topics import choose_topics
-from touchline.model.description import RobotDescription
+from touchline.model.description import AXES, RobotDescription
 
 _BATCH = 8192
 # A wrench and the joint state it belongs to are received within this time of each other [s].

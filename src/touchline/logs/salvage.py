@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads a damaged sqlite3 recording message by message, without its index, up to the damage."""
+"""Reads a damaged sqlite3 recording message by message, without its index, up to the damage.
+
+A table whose upper pages are damaged cannot be read in this way.
+"""
 
 import sqlite3
 from collections.abc import Collection, Iterator

@@ -23,14 +23,20 @@ class Source(Protocol):
         delayed_wrenches: True where `blocks` leaves the sensors' delays to the reader.
     """
 
-    rows: int | None
-    duration: float | None
     columns: tuple[str, ...]
     topics: dict[str, str]
     metadata: dict[str, Any]
-    warnings: list[str]
     without_velocity: tuple[int, ...]
     delayed_wrenches: bool
+
+    @property
+    def rows(self) -> int | None: ...  # noqa: D102
+
+    @property
+    def duration(self) -> float | None: ...  # noqa: D102
+
+    @property
+    def warnings(self) -> list[str]: ...  # noqa: D102
 
     def head(self) -> Block:
         """The first rows, at most `HEAD_ROWS`."""

@@ -8,9 +8,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from touchline.logs.naming import AXES
+from touchline.errors import InputError
 from touchline.logs.parquet import METADATA_KEY
-from touchline.model.description import RobotDescription
+from touchline.model.description import AXES, RobotDescription
 
 
 class SamplesLike(Protocol):
@@ -54,7 +54,7 @@ def write_table(
         extra: further columns such as `truth.contact.0.x`, each (N,).
 
     Raises:
-        ValueError: another ending, or metadata for a CSV file.
+        InputError: another ending, or metadata for a CSV file.
     """
     import pyarrow as pa
 
@@ -65,20 +65,18 @@ def write_table(
         _write_parquet(path, table, metadata or {})
     elif path.name.endswith((".csv", ".csv.gz")):
         if metadata:
-            raise ValueError(f"{path}: only Parquet keeps metadata")
+            raise InputError(f"{path}: only Parquet keeps metadata")
         _write_csv(path, table)
     else:
-        raise ValueError(f"{path}: a table's name ends in .parquet, .csv or .csv.gz")
+        raise InputError(f"{path}: a table's name ends in .parquet, .csv or .csv.gz")
 
 
 def _write_parquet(path: Path, table: Any, metadata: Mapping[str, Any]) -> None:
     import pyarrow.parquet as pq
 
     table = table.replace_schema_metadata({METADATA_KEY: json.dumps(dict(metadata))})
-    words = [f.name for f in table.schema if not f.type.bit_width == 64]
-    pq.write_table(
-        table, path, row_group_size=1 << 17, compression="lz4", use_dictionary=words or False
-    )
+    options: dict[str, Any] = {"compression": "lz4", "use_dictionary": False}
+    pq.write_table(table, path, row_group_size=1 << 17, write_page_checksum=True, **options)
 
 
 def _write_csv(path: Path, table: Any) -> None:

@@ -6,20 +6,43 @@ After a crash `pyarrow.parquet.read_table("NAME.parts")` reads what was finished
 progress has a name with an underscore in front, which readers of data sets skip.
 """
 
+import json
 import shutil
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
 
-from touchline.logs.naming import AXES
+from touchline.errors import InputError
+from touchline.logs.parquet import METADATA_KEY
+from touchline.model.description import AXES
 
 PART_ROWS = 1 << 18
 PART_SECONDS = 5.0
 _GROUP_ROWS = 1 << 17
+_RESULTS = ("estimates", "contacts")
+_DOCUMENTS = ("events.json", "report.html")
+
+
+def remove_results(directory: Path | str) -> None:
+    """Remove the results of an earlier run, so that a new one is never mixed with it."""
+    for name in _RESULTS:
+        _remove_table(Path(directory) / f"{name}.parquet")
+    for name in _DOCUMENTS:
+        (Path(directory) / name).unlink(missing_ok=True)
+
+
+def _remove_table(path: Path) -> None:
+    path.unlink(missing_ok=True)
+    _unfinished(path).unlink(missing_ok=True)
+    shutil.rmtree(path.with_suffix(".parts"), ignore_errors=True)
+
+
+def _unfinished(path: Path) -> Path:
+    return path.with_name(f"_{path.name}")
 
 
 class TableWriter:
@@ -29,34 +52,40 @@ class TableWriter:
     stay, so that a table that is not complete never looks like one.
     """
 
-    def __init__(self, path: Path | str, schema: Mapping[str, Any]):
+    def __init__(
+        self,
+        path: Path | str,
+        schema: Mapping[str, Any],
+        metadata: Mapping[str, Any] | None = None,
+    ):
         """Remove an old table at `path` and begin a new one.
 
         Args:
             path: of the Parquet file; its directory is made.
             schema: column name -> numpy dtype or "str".
+            metadata: JSON values kept in the file, as `Log.metadata` returns them.
+
+        Raises:
+            InputError: nothing can be written there.
         """
         import pyarrow as pa
 
         self.path = Path(path)
         self.parts = self.path.with_suffix(".parts")
-        self._schema = pa.schema([(name, _arrow_type(kind)) for name, kind in schema.items()])
-        self._clear()
-        self._count = 0
+        fields = [(name, _arrow_type(kind)) for name, kind in schema.items()]
+        kept = {METADATA_KEY: json.dumps(dict(metadata))} if metadata else None
+        self._schema = pa.schema(fields, metadata=kept)
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            _remove_table(self.path)
+        except OSError as error:
+            raise InputError(f"{self.path}: cannot be written: {error.strerror}") from error
+        self._count = 0  # closed parts
         self._rows = 0
+        self._waiting: list[Any] = []  # batches that make no row group yet
+        self._waiting_rows = 0
         self._writer: Any = None
         self._part_rows, self._part_began = 0, 0.0
-
-    def _clear(self) -> None:
-        """Nothing of an old run may stay beside the new one."""
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        self.path.unlink(missing_ok=True)
-        self._merged.unlink(missing_ok=True)
-        shutil.rmtree(self.parts, ignore_errors=True)
-
-    @property
-    def _merged(self) -> Path:
-        return self.path.with_name(f"_{self.path.name}")
 
     @property
     def rows(self) -> int:
@@ -90,22 +119,35 @@ class TableWriter:
             self._append(batch)
 
     def _append(self, batch: Any) -> None:
-        if self._writer is None:
-            self.parts.mkdir(exist_ok=True)
-            self._writer = _parquet_writer(self._part(self._count, False), self._schema)
-            self._part_rows, self._part_began = 0, time.monotonic()
-        self._writer.write_batch(batch)
+        if not self._part_rows:
+            self._part_began = time.monotonic()
+        self._waiting.append(batch)
+        self._waiting_rows += batch.num_rows
         self._part_rows += batch.num_rows
         self._rows += batch.num_rows
         if self._part_rows >= PART_ROWS or time.monotonic() - self._part_began >= PART_SECONDS:
             self._close_part()
+        elif self._waiting_rows >= _GROUP_ROWS:
+            self._write_group()
+
+    def _write_group(self) -> None:
+        import pyarrow as pa
+
+        if self._writer is None:
+            self.parts.mkdir(exist_ok=True)
+            self._writer = _parquet_writer(self._part(self._count, False), self._schema)
+        self._writer.write_table(pa.Table.from_batches(self._waiting), row_group_size=_GROUP_ROWS)
+        self._waiting, self._waiting_rows = [], 0
 
     def _close_part(self) -> None:
-        if self._writer is not None:
-            self._writer.close()
-            self._writer = None
-            self._part(self._count, False).rename(self._part(self._count, True))
-            self._count += 1
+        if not self._part_rows:
+            return
+        if self._waiting:
+            self._write_group()
+        self._writer.close()
+        self._writer, self._part_rows = None, 0
+        self._part(self._count, False).rename(self._part(self._count, True))
+        self._count += 1
 
     def close(self) -> None:
         """Turn the parts into the table."""
@@ -117,14 +159,27 @@ class TableWriter:
         shutil.rmtree(self.parts, ignore_errors=True)
 
     def _merge(self) -> None:
+        import pyarrow as pa
+
+        with _parquet_writer(_unfinished(self.path), self._schema) as writer:
+            held: list[Any] = []
+            for group in self._groups():
+                held.append(group)
+                if sum(table.num_rows for table in held) >= _GROUP_ROWS:
+                    writer.write_table(pa.concat_tables(held), row_group_size=_GROUP_ROWS)
+                    held = []
+            if held:
+                writer.write_table(pa.concat_tables(held), row_group_size=_GROUP_ROWS)
+        _unfinished(self.path).rename(self.path)
+
+    def _groups(self) -> Iterator[Any]:
+        """The row groups of all parts."""
         import pyarrow.parquet as pq
 
-        with _parquet_writer(self._merged, self._schema) as writer:
-            for number in range(self._count):
-                with pq.ParquetFile(self._part(number, True), pre_buffer=False) as part:
-                    for group in range(part.num_row_groups):
-                        writer.write_table(part.read_row_group(group), row_group_size=_GROUP_ROWS)
-        self._merged.rename(self.path)
+        for number in range(self._count):
+            with pq.ParquetFile(self._part(number, True), pre_buffer=False) as part:
+                for group in range(part.num_row_groups):
+                    yield part.read_row_group(group)
 
     def __enter__(self) -> Self:
         return self
@@ -152,8 +207,10 @@ def _parquet_writer(path: Path, schema: Any) -> Any:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    words = [field.name for field in schema if pa.types.is_string(field.type)]
-    return pq.ParquetWriter(path, schema, compression="lz4", use_dictionary=words or False)
+    words: Any = [field.name for field in schema if pa.types.is_string(field.type)] or False
+    return pq.ParquetWriter(
+        path, schema, compression="lz4", use_dictionary=words, write_page_checksum=True
+    )
 
 
 class EstimateWriter:

@@ -2,7 +2,6 @@
 """What a description changes of its model: link corrections, loads, gravity."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -30,7 +29,7 @@ def apply_corrections(mechanism: Mechanism, description: RobotDescription) -> Me
     if description.gravity is not None:
         gravity = np.array(description.gravity)
     changed = replace(mechanism, links=links, gravity=gravity)
-    return replace(changed, warnings=_warnings(mechanism, changed, description.path))
+    return replace(changed, warnings=_warnings(mechanism, changed, description))
 
 
 def _changed(link: Link, correction: LinkCorrection | None, loads: tuple[Load, ...]) -> Link:
@@ -59,9 +58,11 @@ def load_inertia(load: Load) -> Inertia:
     return Inertia(load.mass, np.array(load.com), inertia_matrix(load.inertia))
 
 
-def _warnings(before: Mechanism, after: Mechanism, path: Path | None) -> tuple[str, ...]:
+def _warnings(
+    before: Mechanism, after: Mechanism, description: RobotDescription
+) -> tuple[str, ...]:
     """Drop the model's warnings about masses that are mended, add those about new ones."""
-    old, new = set(inertia_warnings(before)), list(inertia_warnings(after))
-    mended = old - set(new)
-    kept = [line for line in before.warnings if not line.endswith(tuple(mended) or ("\0",))]
-    return (*kept, *(f"{path}: {line}" for line in new if line not in old))
+    old, new = set(inertia_warnings(before)), list(inertia_warnings(after, description.locked))
+    mended = tuple(f": {line}" for line in old.difference(new))
+    kept = [line for line in before.warnings if not line.endswith(mended)]
+    return (*kept, *(f"{description.path}: {line}" for line in new if line not in old))

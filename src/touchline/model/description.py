@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 Vector = tuple[float, ...]
+AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class SensorDescription:
     link: str
     xyz: Vector = (0.0, 0.0, 0.0)
     rpy: Vector = (0.0, 0.0, 0.0)
-    axes: tuple[str, ...] = ("fx", "fy", "fz", "mx", "my", "mz")
+    axes: tuple[str, ...] = AXES
     polarity: str = "outboard"
     frame: str = "sensor"
     compensated: str = "none"

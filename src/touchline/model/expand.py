@@ -4,11 +4,10 @@
 from typing import Any
 
 from touchline.model import values
-from touchline.model.description import DetectionDescription, Noise, Vector
+from touchline.model.description import AXES, DetectionDescription, Noise, Vector
 from touchline.model.names import RESERVED_SENSORS
 from touchline.model.schema import SensorEntry
 from touchline.model.suggest import unknown
-from touchline.model.values import AXES
 
 DEFAULT_NOISE = {"q": 0.0, "qd": 2e-4, "tau": 0.05}
 DEFAULT_SENSOR_NOISE = (0.05, 0.05, 0.05, 0.01, 0.01, 0.01)
@@ -50,9 +49,8 @@ class Expander:
         """Return K [rad/s] per joint and per sensor."""
         where = "observer.bandwidth"
         if not isinstance(given, dict):
-            return self._per_joint(where, given, values.positive), dict.fromkeys(
-                self.sensor_names, given
-            )
+            sensors = {name: float(given) for name in self.sensor_names}
+            return self._per_joint(where, given, values.positive), sensors
         for key in given:
             if key not in ("joints", *self.sensor_names):
                 known = ("joints", *self.sensor_names)

@@ -3,6 +3,7 @@
 
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,7 +72,7 @@ def read_mesh(path: Path) -> Triangles:
         raise MeshError(problem)
     import trimesh
 
-    options = {"skip_materials": True} if path.suffix.lower() == ".obj" else {}
+    options: dict[str, Any] = {"skip_materials": True} if path.suffix.lower() == ".obj" else {}
     try:
         mesh = trimesh.load(path, force="mesh", process=False, **options)
         vertices, faces = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)  # type: ignore[union-attr]

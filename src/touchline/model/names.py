@@ -32,9 +32,10 @@ class Names:
 def names_in(data: dict[Any, Any]) -> Names:
     """Return every name that stands in the raw data, readable item or not."""
     joints, locked = data.get("joints"), data.get("locked")
+    locked = list(locked) if isinstance(locked, dict) else locked
     return Names(
         None if joints is None else _names(joints),
-        list(locked) if isinstance(locked, dict) else [],
+        _names(locked),
         _names(data.get("force_torque_sensors")),
     )
 

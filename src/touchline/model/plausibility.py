@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is suspicious about a mechanism but no reason to refuse it."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from touchline.model.mechanism import Inertia, Link, Mechanism
+from touchline.model.mechanism import Inertia, Joint, Link, Mechanism
 from touchline.model.topology import outboard_links
 
 
@@ -19,16 +19,24 @@ def mechanism_warnings(mechanism: Mechanism, path: Path) -> Mechanism:
     )
 
 
-def inertia_warnings(mechanism: Mechanism) -> Iterator[str]:
-    """Yield a line for each link with an impossible inertia, each moving body without mass."""
+def inertia_warnings(mechanism: Mechanism, locked: Collection[str] = ()) -> Iterator[str]:
+    """Yield a line for each link with an impossible inertia, each moving body without mass.
+
+    Joints in `locked`, and those that follow one of them, do not move.
+    """
+
+    def still(joint: Joint) -> bool:
+        master = joint.mimic.joint if joint.mimic else joint.name
+        return joint.kind == "fixed" or master in locked
+
     for link in mechanism.links.values():
         problem = inertia_problem(link.inertia)
         if problem:
             yield f"link '{link.name}': {problem}"
     for joint in mechanism.joints.values():
-        if joint.kind == "fixed" or mechanism.links[joint.child].virtual:
+        if still(joint) or mechanism.links[joint.child].virtual:
             continue
-        body = outboard_links(mechanism, joint.child, lambda inner: inner.kind == "fixed")
+        body = outboard_links(mechanism, joint.child, still)
         if not any(mechanism.links[name].inertia.mass > 0 for name in body):
             what = "has no mass (with all that is fixed to it)"
             yield f"link '{joint.child}': moves with joint '{joint.name}' but {what}"

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from touchline import _core
 from touchline.errors import InputError
-from touchline.model.description import JointDescription, RobotDescription, SensorDescription
+from touchline.model.description import RobotDescription
 from touchline.model.mechanism import Mechanism
+from touchline.model.native import native_observer
 from touchline.model.suggest import did_you_mean
 from touchline.model.tree import Node, Place, TreeBuilder
 
 Array = NDArray[np.float64]
-AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 
 
 @dataclass(frozen=True)
@@ -177,16 +177,7 @@ class Robot:
         bandwidth: float | None = None,
     ) -> _core.Observer:
         """A new native observer for this robot; `bandwidth` [rad/s] overrides the description's."""
-        joints = [self._joint_row(i, bandwidth) for i in range(len(self.description.joints))]
-        sensors = [self._sensor_row(i, bandwidth) for i in range(len(self.description.sensors))]
-        return _core.Observer(
-            [_native_node(node) for node in self.nodes],
-            self.gravity.tolist(),
-            joints,
-            sensors,
-            getattr(_core.Method, method),
-            getattr(_core.Discretization, discretization),
-        )
+        return native_observer(self, method, discretization, bandwidth)
 
     @cached_property
     def _kernel(self) -> _core.Observer:
@@ -196,62 +187,6 @@ class Robot:
         six_axis = {s.name for s in self.description.sensors if len(s.axes) == 6}
         names = [self.nodes[i].sensor for i in self._path(node)]
         return next((str(name) for name in reversed(names) if name in six_axis), "root")
-
-    def _joint_row(self, index: int, bandwidth: float | None) -> _core.JointRow:
-        joint: JointDescription = self.description.joints[index]
-        row = _core.JointRow()
-        kind = "from_sensors" if joint.torque == "from" else joint.torque
-        row.torque = getattr(_core.Torque, kind)
-        row.compensated = getattr(_core.Compensated, joint.compensated)
-        row.sign, row.gain, row.bias, row.range = joint.sign, joint.gain, joint.bias, joint.range
-        row.rotor_inertia = joint.rotor_inertia
-        row.coulomb = joint.friction.coulomb
-        row.viscous = joint.friction.viscous
-        row.coulomb_width = joint.friction.coulomb_width
-        model = self.mechanism.joints[joint.name]
-        row.lower, row.upper = model.lower, model.upper
-        row.bandwidth = bandwidth or self.description.bandwidth_joints[index]
-        moved = [i for i, node in enumerate(self.nodes) if node.coordinate == index]
-        row.nodes = sorted(moved, key=lambda i: self.nodes[i].joint != joint.name)
-        row.sources = [self.sensor_names.index(name) for name in joint.sources]
-        return row
-
-    def _sensor_row(self, index: int, bandwidth: float | None) -> _core.SensorRow:
-        sensor: SensorDescription = self.description.sensors[index]
-        row = _core.SensorRow()
-        row.node = next(i for i, node in enumerate(self.nodes) if node.sensor == sensor.name)
-        row.set_axes([axis in sensor.axes for axis in AXES])
-        row.sign = 1.0 if sensor.polarity == "outboard" else -1.0
-        row.gravity_compensated = sensor.compensated == "gravity"
-        row.set_bias(list(sensor.bias))
-        row.set_range(list(sensor.range))
-        row.bandwidth = bandwidth or self.description.bandwidth_sensors[sensor.name]
-        if sensor.frame != "sensor":
-            row.turned = True
-            if sensor.frame == "world":
-                row.log_node = -1
-                row.set_log_rotation(np.eye(3).ravel().tolist())
-            else:
-                place = self.places[sensor.frame]
-                row.log_node = place.node
-                row.set_log_rotation(place.T_node_link[:3, :3].ravel().tolist())
-        return row
-
-
-def _native_node(node: Node) -> _core.Node:
-    T, body = node.T_parent_node, node.inertia
-    return _core.node(
-        node.parent,
-        getattr(_core.NodeKind, node.kind),
-        T[:3, :3].ravel().tolist(),
-        T[:3, 3].tolist(),
-        body.mass,
-        body.com.tolist(),
-        body.inertia.ravel().tolist(),
-        node.coordinate,
-        node.multiplier,
-        node.offset,
-    )
 
 
 def load_robot(robot: str | Path) -> Robot:

@@ -252,8 +252,8 @@ def structure(data: dict[Any, Any]) -> tuple[RobotFile, list[str]]:
 
 def spell(where: Where) -> str:
     """Return a place in the file as `joints[2].torque`."""
-    parts = (f"[{part}]" if type(part) is int else f".{part}" for part in where)
-    return "".join(parts).removeprefix(".")
+    inner = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in where[1:])
+    return f"{where[0]}{''.join(inner)}"
 
 
 def _faults(error: BaseException, where: Where) -> Iterator[tuple[Where, str]]:

@@ -17,7 +17,7 @@ from touchline.model.plausibility import mechanism_warnings
 from touchline.model.suggest import did_you_mean
 from touchline.model.topology import find_root, resolve_mimics
 from touchline.model.urdf_elements import Reader, named
-from touchline.model.yaml_file import read_text
+from touchline.model.yaml_file import read_bytes
 
 KINDS = {name: name for name in ("revolute", "prismatic", "fixed")} | {"continuous": "revolute"}
 MANY_DOF = ("floating", "planar")
@@ -60,7 +60,7 @@ def parse_xml(path: Path) -> Element:
         InputError: the file cannot be read, or line and column of the first error in it.
     """
     try:
-        return ElementTree.fromstring(read_text(path))
+        return ElementTree.fromstring(read_bytes(path))
     except ElementTree.ParseError as error:
         line, column = error.position
         what = str(error).split(":")[0]

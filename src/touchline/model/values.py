@@ -13,14 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from touchline.model.description import Vector
+from touchline.model.description import AXES, Vector
 from touchline.model.mechanism import Inertia
 from touchline.model.plausibility import inertia_problem
 from touchline.model.suggest import not_allowed
 from touchline.model.transforms import inertia_matrix
 from touchline.model.yaml_file import kind_of
 
-AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 TORQUES = ("sensor", "motor", "none")
 
 Hook = Callable[..., Any]
@@ -38,22 +37,26 @@ def number(value: Any, _: Any = None) -> float:
     """Return a finite number."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"{show(value)} is not a number")
-    if not abs(value) < math.inf:
-        raise ValueError(f"{value} is not a finite number")
-    return float(value)
+    try:
+        read = float(value)
+    except OverflowError:  # an integer of more than 308 digits
+        read = math.inf
+    if not abs(read) < math.inf:
+        raise ValueError(f"{show(value)} is not a finite number")
+    return read
 
 
 def non_negative(value: Any, _: Any = None) -> float:
     """Return a finite number that is not negative."""
     if number(value) < 0:
-        raise ValueError(f"{value} is negative; allowed: 0 or more")
+        raise ValueError(f"{show(value)} is negative; allowed: 0 or more")
     return float(value)
 
 
 def positive(value: Any, _: Any = None) -> float:
     """Return a finite number above 0."""
     if number(value) <= 0:
-        raise ValueError(f"{value} is not allowed; allowed: more than 0")
+        raise ValueError(f"{show(value)} is not allowed; allowed: more than 0")
     return float(value)
 
 

@@ -22,9 +22,11 @@ class Yaml12Loader(yaml.SafeLoader):
     yaml_implicit_resolvers: dict[str, list[Any]] = {}
 
 
-def _construct_int(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int:
+def _construct_int(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int | float:
     text = loader.construct_scalar(node).lower()
-    return int(text, 0) if text.lstrip("+-").startswith(("0o", "0x")) else int(text)
+    if text.lstrip("+-").startswith(("0o", "0x")):
+        return int(text, 0)
+    return int(text) if len(text) < 400 else float(text)  # Python refuses very long integers
 
 
 def _construct_float(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> float:
@@ -82,11 +84,17 @@ def read_yaml(path: Path) -> dict[Any, Any]:
 def read_text(path: Path) -> str:
     """Read a UTF-8 text file; every failure is an InputError that names the file."""
     try:
-        return path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
+        return read_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not a text file (byte {error.start} is not UTF-8)") from None
+
+
+def read_bytes(path: Path) -> bytes:
+    """Read a file; every failure is an InputError that names it."""
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
 

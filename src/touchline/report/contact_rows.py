@@ -8,7 +8,7 @@ import numpy as np
 from touchline.contact.detector import Detection
 from touchline.contact.event import Event
 from touchline.estimation.observer import Estimate
-from touchline.logs.naming import AXES
+from touchline.model.description import AXES
 from touchline.model.robot import Robot
 
 POSITION = ("x", "y", "z")

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+# pyright: reportMissingImports=false
+"""iDynTree's wrench estimator on the same robot. Needs `pip install idyntree`.
+
+It separates the wrenches of the parts between its F/T sensors as the extended observer does, but
+needs the joints' accelerations and the links in contact, and does not filter.
+"""
+
+import tempfile
+from pathlib import Path
+
+import idyntree.swig as idyntree
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.bench.urdf import robot_urdf, sensor_link
+from touchline.model.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class IdyntreeEstimator:
+    """`ExtWrenchesAndJointTorquesEstimator` with one unknown wrench per part.
+
+    Args:
+        robot: the robot; each of its sensors begins a part, whose first link is in contact.
+
+    Raises:
+        RuntimeError: if iDynTree refuses the model.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self.estimator = idyntree.ExtWrenchesAndJointTorquesEstimator()
+        names = idyntree.StringVector()
+        for name in robot.joint_names:
+            names.push_back(name)
+        with tempfile.TemporaryDirectory() as folder:  # it reads files only
+            path = Path(folder) / "robot.urdf"
+            path.write_text(robot_urdf(robot), encoding="utf-8")
+            load = self.estimator.loadModelAndSensorsFromFileWithSpecifiedDOFs
+            if not load(str(path), names):
+                raise RuntimeError("iDynTree refuses the model")
+        model, sensors = self.estimator.model(), self.estimator.sensors()
+        self.links = [sensor_link(name) for name in robot.sensor_names]
+        self.unknowns = idyntree.LinkUnknownWrenchContacts(model)
+        for link in ("world", *self.links):
+            contact = idyntree.UnknownWrenchContact()
+            contact.unknownType = idyntree.FULL_WRENCH
+            contact.contactPoint.zero()
+            index = model.getFrameIndex(link)
+            self.unknowns.addNewContactInFrame(model, index, contact)
+        self.base = model.getFrameIndex("world")
+        self.link_index = [model.getLinkIndex(link) for link in self.links]
+        ft = idyntree.SIX_AXIS_FORCE_TORQUE
+        self.sensor_index = [sensors.getSensorIndex(ft, name) for name in robot.sensor_names]
+        if min(self.sensor_index + self.link_index) < 0:
+            raise RuntimeError("iDynTree does not find the robot's sensors in the model")
+        self.readings = idyntree.SensorsMeasurements(sensors)
+        self.wrenches = idyntree.LinkContactWrenches(model)
+        self.torques = idyntree.JointDOFsDoubleArray(model)
+        self.gravity = idyntree.Vector3.FromPython(robot.gravity)
+
+    def convert(self, q: Array, qd: Array, qdd: Array, wrench: Array) -> tuple:
+        """One sample in iDynTree's own types."""
+        return (
+            idyntree.JointPosDoubleArray.FromPython(q),
+            idyntree.JointDOFsDoubleArray.FromPython(qd),
+            idyntree.JointDOFsDoubleArray.FromPython(qdd),
+            [_wrench(row) for row in wrench],
+        )
+
+    def estimate(self, q: object, qd: object, qdd: object, wrenches: list) -> None:
+        """The estimation alone, on converted input; results stay in iDynTree's types."""
+        self.estimator.updateKinematicsFromFixedBase(q, qd, qdd, self.base, self.gravity)
+        for index, wrench in zip(self.sensor_index, wrenches, strict=True):
+            self.readings.setMeasurement(idyntree.SIX_AXIS_FORCE_TORQUE, index, wrench)
+        self.estimator.estimateExtWrenchesAndJointTorques(
+            self.unknowns, self.readings, self.wrenches, self.torques
+        )
+
+    def update(self, q: Array, qd: Array, qdd: Array, wrench: Array) -> list[Array]:
+        """One sample, numpy in and out: the wrench on each part, in its sensor's frame."""
+        self.estimate(*self.convert(q, qd, qdd, wrench))
+        contact = self.wrenches.contactWrench
+        return [contact(link, 0).contactWrench.toNumPy() for link in self.link_index]
+
+
+def _wrench(values: Array) -> object:
+    wrench = idyntree.Wrench()
+    for i in range(6):
+        wrench.setVal(i, float(values[i]))
+    return wrench

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A robot in the words of the native core."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from touchline import _core
+from touchline.model.description import AXES
+from touchline.model.tree import Node
+
+if TYPE_CHECKING:
+    from touchline.model.robot import Robot
+
+
+def native_observer(
+    robot: Robot, method: str, discretization: str, bandwidth: float | None
+) -> _core.Observer:
+    """A native observer; `bandwidth` [rad/s] overrides the description's."""
+    return _core.Observer(
+        [_node(node) for node in robot.nodes],
+        robot.gravity.tolist(),
+        [_joint_row(robot, i, bandwidth) for i in range(len(robot.joint_names))],
+        [_sensor_row(robot, i, bandwidth) for i in range(len(robot.sensor_names))],
+        getattr(_core.Method, method),
+        getattr(_core.Discretization, discretization),
+    )
+
+
+def _node(node: Node) -> _core.Node:
+    T, body = node.T_parent_node, node.inertia
+    return _core.node(
+        node.parent,
+        getattr(_core.NodeKind, node.kind),
+        T[:3, :3].ravel().tolist(),
+        T[:3, 3].tolist(),
+        body.mass,
+        body.com.tolist(),
+        body.inertia.ravel().tolist(),
+        node.coordinate,
+        node.multiplier,
+        node.offset,
+    )
+
+
+def _joint_row(robot: Robot, index: int, bandwidth: float | None) -> _core.JointRow:
+    joint = robot.description.joints[index]
+    row = _core.JointRow()
+    row.torque = getattr(_core.Torque, {"from": "from_sensors"}.get(joint.torque, joint.torque))
+    row.compensated = getattr(_core.Compensated, joint.compensated)
+    row.sign, row.gain, row.bias, row.range = joint.sign, joint.gain, joint.bias, joint.range
+    row.rotor_inertia = joint.rotor_inertia
+    row.coulomb = joint.friction.coulomb
+    row.viscous = joint.friction.viscous
+    row.coulomb_width = joint.friction.coulomb_width
+    model = robot.mechanism.joints[joint.name]
+    row.lower, row.upper = model.lower, model.upper
+    row.bandwidth = bandwidth or robot.description.bandwidth_joints[index]
+    moved = [i for i, node in enumerate(robot.nodes) if node.coordinate == index]
+    row.nodes = sorted(moved, key=lambda i: robot.nodes[i].joint != joint.name)
+    row.sources = [robot.sensor_names.index(name) for name in joint.sources]
+    return row
+
+
+def _sensor_row(robot: Robot, index: int, bandwidth: float | None) -> _core.SensorRow:
+    sensor = robot.description.sensors[index]
+    row = _core.SensorRow()
+    row.node = next(i for i, node in enumerate(robot.nodes) if node.sensor == sensor.name)
+    row.set_axes([axis in sensor.axes for axis in AXES])
+    row.sign = 1.0 if sensor.polarity == "outboard" else -1.0
+    row.gravity_compensated = sensor.compensated == "gravity"
+    row.set_bias(list(sensor.bias))
+    row.set_range(list(sensor.range))
+    row.bandwidth = bandwidth or robot.description.bandwidth_sensors[sensor.name]
+    if sensor.frame != "sensor":
+        row.turned = True
+        row.log_node, R_node_log = -1, np.eye(3)
+        if sensor.frame != "world":
+            place = robot.places[sensor.frame]
+            row.log_node, R_node_log = place.node, place.T_node_link[:3, :3]
+        row.set_log_rotation(R_node_log.ravel().tolist())
+    return row

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs a plant with its controller and contacts, and records ideal readings and the truth.
+
+Inputs are held over each physics step, so readings jump where a step begins. A recorded reading is
+the mean of its values just before and just after that jump: then the trapezoid rule over the
+samples is right to second order, and nothing is late by half a step.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.simulation.contacts import Touch
+from touchline.simulation.control import Controller
+from touchline.simulation.plant import Plant
+from touchline.simulation.readings import Readings
+from touchline.simulation.truth import Truth, TruthRecorder
+
+Array = NDArray[np.float64]
+
+
+class Contacts(Protocol):
+    """Whatever touches the robot; the number of its slots never changes."""
+
+    physical: bool  # forces follow from the physics and not from a script
+
+    def __len__(self) -> int: ...
+
+    def apply(self, plant: Plant) -> bool:
+        """Sets the inputs of the plant's present time; returns whether any changed."""
+        ...
+
+    def touches(self, plant: Plant) -> list[Touch]:
+        """What acts at the plant's present state and inputs, one per slot."""
+        ...
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Rates [Hz] that divide that of the physics; `control` None: the physics' own."""
+
+    log: float = 1000.0
+    control: float | None = None
+
+    def strides(self, physics: float) -> tuple[int, int]:
+        """Physics steps per sample of the log, and per step of the controller.
+
+        Raises:
+            ValueError: a rate does not divide the physics'.
+        """
+        control = self.control or physics
+        strides = []
+        for name, rate in (("log", self.log), ("control", control)):
+            stride = round(physics / rate) if rate > 0 else 0
+            if stride < 1 or abs(stride * rate - physics) > 1e-6 * physics:
+                raise ValueError(f"{name} rate {rate:g} Hz does not divide physics' {physics:g} Hz")
+            strides.append(stride)
+        return strides[0], strides[1]
+
+
+def run(
+    plant: Plant,
+    controller: Controller,
+    contacts: Sequence[Contacts] = (),
+    seconds: float = 1.0,
+    rates: Rates | None = None,
+) -> tuple[Readings, Truth]:
+    """Simulates from the plant's present state on.
+
+    Args:
+        plant: after `reset`; the log begins one of its periods later.
+        controller: of the motors.
+        contacts: scripted forces and colliding bodies; their slots follow each other.
+        seconds: from the first sample to the last.
+        rates: of log and controller; default: 1 kHz, and the physics' own.
+
+    Returns:
+        Ideal readings and the truth, `seconds * log rate + 1` samples.
+    """
+    log_stride, control_stride = (rates or Rates()).strides(plant.rate)
+    rows = 1 + round(seconds * plant.rate / log_stride)
+    stepper = _Stepper(plant, contacts, rows, log_stride)
+    command = np.zeros(len(plant.robot.joint_names))
+    for step in range(rows * log_stride + 1):
+        plant.evaluate()
+        row = step // log_stride - 1 if step % log_stride == 0 else -1
+        if step:
+            stepper.end_step(row)
+        if step % control_stride == 0:
+            command = controller.torque(plant)
+        stepper.begin_step(row, command)
+        if step < rows * log_stride:
+            plant.integrate()
+    return stepper.readings, stepper.truth.truth
+
+
+class _Stepper:
+    """One physics step after the other, with what is recorded at its two ends."""
+
+    def __init__(self, plant: Plant, contacts: Sequence[Contacts], rows: int, stride: int) -> None:
+        self._plant, self._contacts = plant, contacts
+        self._physical = any(contact.physical for contact in contacts)
+        self.readings = Readings.empty(plant, rows)
+        slots = sum(len(contact) for contact in contacts)
+        self.truth = TruthRecorder(tuple(plant.bodies), slots, rows, stride)
+
+    def _touches(self) -> list[Touch]:
+        return [touch for contact in self._contacts for touch in contact.touches(self._plant)]
+
+    def end_step(self, row: int) -> None:
+        """At the new state, with the inputs that led to it still set; `row` < 0: not logged."""
+        if row >= 0 or self._physical:
+            self._plant.accelerate()
+        self._ending = self._touches()
+        self.truth.add(self._ending)
+        if row >= 0:
+            self.truth.close(row)
+            self._before = self._plant.read()
+
+    def begin_step(self, row: int, command: Array) -> None:
+        """At the same state, with the new inputs and accelerations; `row` < 0: not logged."""
+        plant = self._plant
+        changed = plant.command(command)
+        for contact in self._contacts:
+            changed = contact.apply(plant) or changed
+        if changed or row < 0:
+            plant.accelerate()
+        beginning = self._touches()
+        self.truth.add(beginning)
+        if row >= 0:
+            after = plant.read() if changed else self._before
+            self.readings.put(row, plant, self._before, after)
+            self.truth.put(row, self._ending, beginning)
