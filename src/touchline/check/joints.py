@@ -30,11 +30,12 @@ CLEARER = 0.3  # another joint explains a torque column so much better
 
 @dataclass(frozen=True)
 class TorqueFit:
-    """reading = factor * expected + offset; `error` of the factor, `varied`: offset was fitted."""
+    """reading = factor * expected + offset, with 1 sigma errors; `varied`: offset was fitted."""
 
     factor: float
     error: float
     offset: float
+    offset_error: float
     scatter: float
     varied: bool
 
@@ -117,15 +118,15 @@ def fit_torque(windows: Windows, j: int) -> TorqueFit | None:
     level = max(float(np.abs(np.median(expected))), TELLING)
     varied = float(np.std(expected)) > 0.1 * level
     columns = [expected, np.ones(len(expected))] if varied else [expected]
-    if varied and (np.abs(qd) > MOVED).mean() > 0.2:
+    if varied and min((qd > MOVED).mean(), (qd < -MOVED).mean()) > 0.1:
         columns += [np.tanh(qd / MOVED), qd]  # friction that the description does not know
     line: Line | None = robust_line(np.column_stack(columns), reading)
     if line is None:
         ratio = float(np.median(reading) / np.median(expected))
-        return TorqueFit(ratio, np.inf, 0.0, scatter_of(reading), False)
-    offset = float(line.coefficients[1]) if varied else 0.0
-    factor, error = float(line.coefficients[0]), float(line.errors[0])
-    return TorqueFit(factor, error, offset, line.scatter, varied)
+        return TorqueFit(ratio, np.inf, 0.0, np.inf, scatter_of(reading), False)
+    offset, error = (line.coefficients[1], line.errors[1]) if varied else (0.0, np.inf)
+    factor = float(line.coefficients[0]), float(line.errors[0])
+    return TorqueFit(*factor, float(offset), float(error), line.scatter, varied)
 
 
 def _note_fit(name: str, fit: TorqueFit, findings: Findings) -> None:
@@ -151,10 +152,10 @@ def _judge(name: str, fit: TorqueFit, size: float, limit: float, findings: Findi
         findings.find(f"{start}: opposite sign; set the other sign ({name}: sign)")
     elif abs(fit.factor - 1) > GAIN_OFF and abs(fit.factor - 1) * size > max(limit, TELLING):
         findings.find(f"{start}: check gain, unit, and the masses outboard of it")
-    if fit.varied and abs(fit.offset) > limit:
+    if abs(fit.offset) > limit and fit.offset_error < 0.3 * abs(fit.offset):
         findings.find(
-            f"torque of {name} has an offset of {fit.offset:+.2f} Nm, more than its contact "
-            f"threshold {limit:.2f}: set bias"
+            f"torque of {name} has an offset of {fit.offset:+.2f} Nm that the description does "
+            f"not know, more than its contact threshold {limit:.2f}: set bias"
         )
 
 

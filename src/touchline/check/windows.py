@@ -2,8 +2,7 @@
 """What the sensors say and what the model expects, averaged over short pieces of a recording.
 
 An observer without lag that is told of no torque and no wrench takes all that moves and holds the
-arm for external: its residuals are the readings to be expected while nothing touches, with the
-description's bias, friction and rotor inertia in them.
+arm for external: its residuals are the readings to be expected while nothing touches.
 """
 
 from dataclasses import dataclass, replace
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from touchline.estimation.observer import Observer
 from touchline.estimation.samples import Samples
+from touchline.model.description import Friction
 from touchline.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ class Windows:
         q: (W, n) positions.
         qd: (W, n) velocities as logged.
         slope: (W, n) velocities from the positions.
-        torque: (W, n) as logged, times sign and gain of the description.
+        torque: (W, n) as the description reads the log: sign, gain, bias and friction applied.
         expected_torque: (W, n) without contact.
         wrench: (W, k, 6) as logged.
         expected_wrench: (W, k, 6) on the outboard side, in the sensor's frame, without contact.
@@ -57,8 +57,6 @@ class WindowMaker:
         self._rows = max(ROWS, round(SECONDS / period))
         self._period, self._last = period, np.nan
         self._models = [_expecting(robot, compensated) for compensated in ("none", "gravity")]
-        joints = robot.description.joints
-        self._gain = np.array([joint.sign * joint.gain for joint in joints])
         self._parts: list[dict[str, Array]] = []
         self._count, self._every = 0, 1
 
@@ -72,7 +70,7 @@ class WindowMaker:
         signals = {
             "q": part.q,
             "qd": part.qd,
-            "torque": self._gain * part.tau,
+            "torque": _read_torques(self._robot, part),
             "expected_torque": whole.tau_ext,
             "wrench": part.wrench,
             "expected_wrench": whole.sensor_wrench,
@@ -121,8 +119,19 @@ def _expecting(robot: Robot, compensated: str) -> Observer:
         replace(s, compensated=compensated, bias=(0.0,) * 6, polarity="outboard", frame="sensor")
         for s in description.sensors
     )
-    bare = Robot(replace(description, sensors=sensors), robot.mechanism)
+    joints = tuple(replace(j, bias=0.0, friction=Friction()) for j in description.joints)
+    bare = Robot(replace(description, sensors=sensors, joints=joints), robot.mechanism)
     return Observer(bare, bandwidth=1e9, method="paper", discretization="exponential")
+
+
+def _read_torques(robot: Robot, part: Samples) -> Array:
+    torques = part.tau.copy()
+    for j, joint in enumerate(robot.description.joints):
+        qd, friction = part.qd[:, j], joint.friction
+        torques[:, j] = joint.sign * joint.gain * part.tau[:, j] - joint.bias
+        torques[:, j] -= friction.coulomb * np.tanh(qd / friction.coulomb_width)
+        torques[:, j] -= friction.viscous * qd
+    return torques
 
 
 def _mean(values: Array, count: int, rows: int) -> Array:
