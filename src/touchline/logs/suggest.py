@@ -7,7 +7,9 @@ from difflib import get_close_matches
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """`; did you mean X?`, or nothing where no known name is close."""
-    close = get_close_matches(name, list(known), n=1, cutoff=0.7)
+    known = list(known)
+    close = [word for word in known if word.lower() == name.lower()]
+    close = close or get_close_matches(name, known, n=1, cutoff=0.7)
     return f"; did you mean {close[0]!r}?" if close else ""
 
 
