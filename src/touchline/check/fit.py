@@ -67,9 +67,10 @@ def robust_line(X: Array, y: Array, rounds: int = 30) -> Line | None:
     if len(y) < max(3, 2 * X.shape[1]):
         return None
     weight = np.ones(len(y))
+    beta, spread = np.zeros(X.shape[1]), 0.0
     for turn in range(rounds):
         root = np.sqrt(weight)[:, None]
-        beta = np.linalg.lstsq(X * root, y * root[:, 0], rcond=None)[0]
+        beta = np.asarray(np.linalg.lstsq(X * root, y * root[:, 0], rcond=None)[0], dtype=float)
         rest = y - X @ beta
         spread = max(scatter_of(rest), 1e-9 * (1.0 + float(np.abs(y).max())))
         if turn < 5:  # first the kinder weights of Huber, which do not fix on a wrong line
