@@ -8,7 +8,9 @@ from typing import Any
 
 def did_you_mean(word: Any, allowed: Iterable[str]) -> str:
     """Return ` (did you mean 'X'?)` for the closest allowed word, or nothing."""
-    close = get_close_matches(str(word), list(allowed), n=1)
+    allowed = list(allowed)
+    close = [name for name in allowed if name.lower() == str(word).lower()]
+    close = close or get_close_matches(str(word), allowed, n=1)
     return f" (did you mean '{close[0]}'?)" if close else ""
 
 
