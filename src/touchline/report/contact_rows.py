@@ -5,11 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from touchline.contact.detector import Detection
-from touchline.contact.event import Event
+from touchline.contact.table import ContactTable
 from touchline.estimation.observer import Estimate
 from touchline.model.description import AXES
-from touchline.model.robot import Robot
 
 POSITION = ("x", "y", "z")
 COVARIANCE = ("pxx", "pxy", "pxz", "pyy", "pyz", "pzz")
@@ -20,48 +18,19 @@ CONTACT_SCHEMA: dict[str, Any] = (
 )
 
 
-class ContactRows:
-    """Finds, part by part, the samples at which a segment is touched.
+def contact_rows(time: np.ndarray, estimate: Estimate, table: ContactTable) -> dict[str, Any]:
+    """The columns of `CONTACT_SCHEMA`.
 
-    Until a contact is located its row holds the segment's wrench, moments about the world origin,
-    and `wrench_only`.
+    The force is that of the contact; the moments are those of the segment's wrench about the world
+    origin.
+
+    Args:
+        time: (N,) [s].
+        estimate: of the same N samples.
+        table: of the contacts in these samples.
     """
-
-    def __init__(self, robot: Robot) -> None:
-        self._segments = robot.segment_names
-        self._begun = np.zeros(len(self._segments), dtype=int)
-        self._active = np.zeros(len(self._segments), dtype=bool)
-
-    def rows(
-        self, time: np.ndarray, estimate: Estimate, detection: Detection, events: list[Event]
-    ) -> dict[str, Any]:
-        """The columns of `CONTACT_SCHEMA` for N samples, `events` being all so far."""
-        active = detection.levels > 0
-        sample, segment = np.nonzero(active)
-        columns = self._empty(len(sample))
-        columns["time"], columns["health"] = time[sample], estimate.health[sample].astype("u4")
-        columns["event"] = self._event_ids(active, events)[sample, segment]
-        columns["segment"] = np.array(self._segments, dtype=object)[segment]
-        wrenches = estimate.segment_wrench[sample, segment]
-        columns |= {axis: wrenches[:, i] for i, axis in enumerate(AXES)}
-        return columns
-
-    def _empty(self, rows: int) -> dict[str, Any]:
-        columns: dict[str, Any] = {
-            name: [None] * rows if kind == "str" else np.full(rows, np.nan)
-            for name, kind in CONTACT_SCHEMA.items()
-        }
-        return columns | {"status": ["wrench_only"] * rows}
-
-    def _event_ids(self, active: np.ndarray, events: list[Event]) -> np.ndarray:
-        """The event of each sample and segment: the n-th rise of a segment is its n-th event."""
-        rises = active & ~np.vstack([self._active, active[:-1]])
-        number = self._begun + np.cumsum(rises, axis=0) - 1
-        ids = np.full(active.shape, -1)
-        for g, name in enumerate(self._segments):
-            own = np.array([event.id for event in events if event.segment == name], dtype=int)
-            where = active[:, g]
-            ids[where, g] = own[number[where, g]]
-        if len(active):
-            self._begun, self._active = self._begun + rises.sum(axis=0), active[-1]
-        return ids
+    sample = table.sample
+    columns: dict[str, Any] = {"time": time[sample], "health": estimate.health[sample].astype("u4")}
+    columns |= table.columns()
+    moments = estimate.segment_wrench[sample, table.segment, 3:]
+    return columns | dict(zip(AXES[3:], moments.T, strict=True))
