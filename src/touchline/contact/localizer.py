@@ -240,9 +240,7 @@ class Localizer:
     def _noise(self, period: float, relative_error: float) -> _core.NoiseFigures:
         noise = self.robot.description.noise
         sensors = [x for name in self.robot.sensor_names for x in noise.sensors[name]]
-        return _core.noise_figures(
-            list(noise.qd), list(noise.tau), sensors, period, relative_error
-        )
+        return _core.noise_figures(list(noise.qd), list(noise.tau), sensors, period, relative_error)
 
 
 def _known(values: Array) -> Array | None:
