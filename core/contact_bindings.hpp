@@ -199,13 +199,15 @@ inline nb::tuple follow(tl::Localizer& l, const In& time, const In& rows, const 
 }
 
 inline tl::NoiseFigures noise(std::vector<double> qd, std::vector<double> tau,
-                              std::vector<double> wrench, double period, double relative) {
+                              std::vector<double> wrench, double period, double wrench_error,
+                              double torque_error) {
   tl::NoiseFigures figures;
   figures.qd = std::move(qd);
   figures.tau = std::move(tau);
   figures.wrench = std::move(wrench);
   figures.period = period;
-  figures.relative = relative;
+  figures.wrench_error = wrench_error;
+  figures.torque_error = torque_error;
   return figures;
 }
 
@@ -222,7 +224,8 @@ inline void bind(nb::module_& m) {
       });
   m.def("mesh", &mesh, "vertices"_a, "faces"_a);
   nb::class_<tl::NoiseFigures>(m, "NoiseFigures");
-  m.def("noise_figures", &noise, "qd"_a, "tau"_a, "wrench"_a, "period"_a, "relative"_a);
+  m.def("noise_figures", &noise, "qd"_a, "tau"_a, "wrench"_a, "period"_a,
+        "wrench_error"_a, "torque_error"_a);
   nb::class_<tl::LocalizerSettings>(m, "LocalizerSettings")
       .def(nb::init<>())
       .def_rw("friction", &tl::LocalizerSettings::friction)

@@ -124,8 +124,10 @@ class Explanations {
   }
 
  private:
-  static constexpr int kMost = 192, kSamples = 128, kStarts = 3;
+  static constexpr int kMost = 192, kSamples = 64, kStarts = 2;
   static constexpr double kRelevant = 25.0;  // of chi2: where a search is worth while
+  static constexpr double kRough = 400.0;    // of chi2: where a start may lead to something
+  static constexpr double kArrived = 2e-4;   // length of a step [m]
   static constexpr double kFar = 0.15;       // from the line: not what it speaks of [m]
   static constexpr double kGrazing = 4.0;  // cost of the cone beyond which a point is moved
   static constexpr double kSame = 5e-3;    // points nearer than this are one [m]
@@ -285,18 +287,20 @@ class Explanations {
     for (int s : *view.surfaces) {
       const SurfacePoint p = surfaces_[s].mesh.nearest_to_line(to_node(line, view.node), kFar);
       if (p.face < 0 || count_ == kMost) continue;
+      // At an edge the normal is that of either side: what counts is the wrench alone.
+      if (fitter_.free_chi2(view.q, to_world(p.point, view.node)) > best_ + kRelevant) continue;
       place(view, s, p.point, p.normal);
-      if (candidates_[count_].fit.chi2 > best_ + kRelevant) continue;
       refine(view, candidates_[count_]);
       keep();
     }
   }
 
-  void place(const View& view, int surface, const Vec3& point, const Vec3& normal) {
+  void place(const View& view, int surface, const Vec3& point, const Vec3& normal,
+             double limit = std::numeric_limits<double>::infinity()) {
     Candidate& k = fresh(view, surface);
     k.point = to_world(point, view.node);
     k.normal = posture_.pose(view.node).R * normal;
-    k.fit = fitter_.fit(view.q, k.point, k.normal);
+    k.fit = fitter_.fit(view.q, k.point, k.normal, limit);
   }
 
   // Without a line: the best of the points spread over each link, each improved.
@@ -306,8 +310,9 @@ class Explanations {
       int found = 0;
       for (const Sample& sample : samples_[s]) {
         if (count_ == kMost) return;
-        place(view, s, sample.point, sample.normal);
-        found = insert(starts, found, candidates_[count_]);
+        place(view, s, sample.point, sample.normal, best_ + kRough);
+        if (candidates_[count_].fit.cost() < best_ + kRough)
+          found = insert(starts, found, candidates_[count_]);
       }
       for (int i = 0; i < found && count_ < kMost; ++i) {
         candidates_[count_] = starts[i];
@@ -337,9 +342,11 @@ class Explanations {
     return found;
   }
 
-  // Moves over the surface downhill: Gauss-Newton steps, then smaller and smaller trials around.
+  // Moves over the surface downhill: Gauss-Newton steps, then, where the friction cone or an edge
+  // stands in the way, smaller and smaller trials around.
   void refine(const View& view, Candidate& k) {
-    for (int i = 0; i < 6; ++i) {
+    bool arrived = false;
+    for (int i = 0; i < 8 && !arrived; ++i) {
       double H[25], g[5];
       fitter_.information(view.q, k.point, k.normal, k.fit.force, H, g);
       if (!cholesky(H, 5)) break;
@@ -348,12 +355,13 @@ class Explanations {
       tangents(k.normal, s, t);
       Vec3 step = g[3] * s + g[4] * t;
       const double length = norm(step);
-      if (length < 1e-5) break;
-      if (length > 0.03) step = (0.03 / length) * step;
-      if (!try_point(view, k, k.point + step)) break;
+      if (length > 0.05) step = (0.05 / length) * step;
+      arrived = length < kArrived;
+      if (!arrived && !try_point(view, k, k.point + step)) break;
     }
+    if (arrived && k.fit.cone < 1.0) return;
     for (double radius = 0.016; radius > 1e-3; radius *= 0.5) {
-      for (int round = 0; round < 4 && better_around(view, k, radius); ++round) {
+      for (int round = 0; round < 3 && better_around(view, k, radius); ++round) {
       }
     }
   }
@@ -373,7 +381,7 @@ class Explanations {
   bool try_point(const View& view, Candidate& k, const Vec3& target) {
     const Pose& X = posture_.pose(view.node);
     const SurfacePoint p =
-        surfaces_[k.surface].mesh.nearest_to_point(transposed_times(X.R, target - X.p), 0.05);
+        surfaces_[k.surface].mesh.nearest_to_point(transposed_times(X.R, target - X.p), 0.06);
     if (p.face < 0) return false;
     const Vec3 point = to_world(p.point, view.node), normal = X.R * p.normal;
     const Fit fit = fitter_.fit(view.q, point, normal);

@@ -111,15 +111,15 @@ class Localizer {
     const double strength = measurement_.strength(g, normalized);
     if (!f.event.begin_sample(strength, time, 0.5 * period_ * bandwidth(g))) return;
     std::copy(q, q + f.q.size(), f.q.begin());
-    f.event.add_status(static_cast<int>(answer_.status));
-    if (answer_.status != Status::located && answer_.status != Status::ambiguous) return;
-    f.event.open();
+    const bool explained =
+        answer_.status == Status::located || answer_.status == Status::ambiguous;
+    if (!f.event.open(static_cast<int>(answer_.status), explained)) return;
     for (int i = 0; i < answer_.count; ++i) {
       const Candidate& k = answer_.candidates[i];
       f.event.add(k.surface, found_.to_node(k.point, node_of(k)), k.weight,
                   k.along[0] + k.along[2], settings_.place_radius);
     }
-    f.event.close(answer_.spread * answer_.spread);
+    f.event.close(explained ? answer_.spread * answer_.spread : kNaN);
   }
 
   // The event on segment g with its places weighed, those of the most probable body first.

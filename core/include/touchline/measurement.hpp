@@ -20,7 +20,8 @@ namespace touchline {
 struct NoiseFigures {
   std::vector<double> qd, tau, wrench;  // n, n, 6 k
   double period = 1e-3;                 // between samples [s]
-  double relative = 0.0;                // error of the model and the gains, as a part of the load
+  // Errors of gains and model, as a part of the load.
+  double wrench_error = 0.0, torque_error = 0.0;
   double force = 2e-3, moment = 5e-4;   // floors [N, Nm]
 };
 
@@ -297,8 +298,8 @@ class Measurement {
     const Spatial w = wrench_to_child(posture_.pose(observer_.sensors()[sensor].node),
                                       {{wrench_[0], wrench_[1], wrench_[2]},
                                        {wrench_[3], wrench_[4], wrench_[5]}});
-    return {{noise_.relative * norm3(w.linear), 0.0, 0.0},
-            {noise_.relative * norm3(w.angular), 0.0, 0.0}};
+    return {{noise_.wrench_error * norm3(w.linear), 0.0, 0.0},
+            {noise_.wrench_error * norm3(w.angular), 0.0, 0.0}};
   }
   static double norm3(const Vec3& v) { return std::sqrt(dot(v, v)); }
 
@@ -332,7 +333,7 @@ class Measurement {
     const int n = layout_.joints, k = layout_.sensors;
     if (r.joint < 0) {
       const Gains g = gains(observer_.sensors()[r.sensor].bandwidth);
-      const double load = noise_.relative * own_[i];
+      const double load = noise_.wrench_error * own_[i];
       const double filtered = g.reading * noise_.wrench[6 * r.sensor + r.axis];
       out[6 * r.sensor + r.axis] = std::sqrt(filtered * filtered + load * load);
       const Spatial axis = axis_in_world(r.sensor, r.axis);
@@ -343,7 +344,7 @@ class Measurement {
     }
     const JointRow& joint = observer_.joints()[r.joint];
     const Gains g = gains(joint.bandwidth);
-    const double load = noise_.relative * own_[i], filtered = g.reading * noise_.tau[r.joint];
+    const double load = noise_.torque_error * own_[i], filtered = g.reading * noise_.tau[r.joint];
     out[6 * k + r.joint] = std::sqrt(filtered * filtered + load * load);
     for (int node : joint.nodes) {
       const Spatial& s = posture_.subspace(node);
