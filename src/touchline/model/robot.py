@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline import _core
 from touchline.model.description import JointDescription, RobotDescription, SensorDescription
 from touchline.model.mechanism import Mechanism
 from touchline.model.tree import Node, Place, TreeBuilder
+from touchline.native import core
 
 Array = NDArray[np.float64]
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -118,21 +118,21 @@ class Robot:
         method: str = "segment",
         discretization: str = "automatic",
         bandwidth: float | None = None,
-    ) -> _core.Observer:
+    ) -> core.Observer:
         """A new native observer for this robot; `bandwidth` [rad/s] overrides the description's."""
         joints = [self._joint_row(i, bandwidth) for i in range(len(self.description.joints))]
         sensors = [self._sensor_row(i, bandwidth) for i in range(len(self.description.sensors))]
-        return _core.Observer(
+        return core.Observer(
             [_native_node(node) for node in self.nodes],
             self.gravity.tolist(),
             joints,
             sensors,
-            getattr(_core.Method, method),
-            getattr(_core.Discretization, discretization),
+            getattr(core.Method, method),
+            getattr(core.Discretization, discretization),
         )
 
     @cached_property
-    def _kernel(self) -> _core.Observer:
+    def _kernel(self) -> core.Observer:
         return self.kernel()
 
     def _segment_of(self, node: int) -> str:
@@ -144,12 +144,12 @@ class Robot:
             node = self.nodes[node].parent
         return "root"
 
-    def _joint_row(self, index: int, bandwidth: float | None) -> _core.JointRow:
+    def _joint_row(self, index: int, bandwidth: float | None) -> core.JointRow:
         joint: JointDescription = self.description.joints[index]
-        row = _core.JointRow()
+        row = core.JointRow()
         kind = "from_sensors" if joint.torque == "from" else joint.torque
-        row.torque = getattr(_core.Torque, kind)
-        row.compensated = getattr(_core.Compensated, joint.compensated)
+        row.torque = getattr(core.Torque, kind)
+        row.compensated = getattr(core.Compensated, joint.compensated)
         row.sign, row.gain, row.bias, row.range = joint.sign, joint.gain, joint.bias, joint.range
         row.rotor_inertia = joint.rotor_inertia
         row.coulomb = joint.friction.coulomb
@@ -163,9 +163,9 @@ class Robot:
         row.sources = [self.sensor_names.index(name) for name in joint.sources]
         return row
 
-    def _sensor_row(self, index: int, bandwidth: float | None) -> _core.SensorRow:
+    def _sensor_row(self, index: int, bandwidth: float | None) -> core.SensorRow:
         sensor: SensorDescription = self.description.sensors[index]
-        row = _core.SensorRow()
+        row = core.SensorRow()
         row.node = next(i for i, node in enumerate(self.nodes) if node.sensor == sensor.name)
         row.set_axes([axis in sensor.axes for axis in AXES])
         row.sign = 1.0 if sensor.polarity == "outboard" else -1.0
@@ -185,11 +185,11 @@ class Robot:
         return row
 
 
-def _native_node(node: Node) -> _core.Node:
+def _native_node(node: Node) -> core.Node:
     T, body = node.T_parent_node, node.inertia
-    return _core.node(
+    return core.node(
         node.parent,
-        getattr(_core.NodeKind, node.kind),
+        getattr(core.NodeKind, node.kind),
         T[:3, :3].ravel().tolist(),
         T[:3, 3].tolist(),
         body.mass,
