@@ -129,7 +129,8 @@ class _Run:
         self._statistics.add(time, estimate, detection)
         self._curves.add(time, estimate, detection)
         self._outputs.estimates(time, estimate)
-        self._outputs.contacts(self._contacts.rows(time, estimate, detection, events))
+        located = getattr(self.pipeline, "contacts", None)
+        self._outputs.contacts(self._contacts.rows(time, estimate, detection, events, located))
         self._outputs.events(events)
 
     def finish(

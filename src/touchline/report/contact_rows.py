@@ -33,18 +33,34 @@ class ContactRows:
         self._active = np.zeros(len(self._segments), dtype=bool)
 
     def rows(
-        self, time: np.ndarray, estimate: Estimate, detection: Detection, events: list[Event]
+        self,
+        time: np.ndarray,
+        estimate: Estimate,
+        detection: Detection,
+        events: list[Event],
+        located: Any = None,
     ) -> dict[str, Any]:
-        """The columns of `CONTACT_SCHEMA` for N samples, `events` being all so far."""
+        """The columns of `CONTACT_SCHEMA` for N samples.
+
+        Args:
+            time: (N,) stamps [s].
+            estimate: of these samples.
+            detection: of these samples.
+            events: all so far.
+            located: where the contacts are, if the pipeline tells: an object with `sample` and
+                `segment` (M,) and `columns()`, which replace those found here.
+        """
         active = detection.levels > 0
         sample, segment = np.nonzero(active)
+        ids = self._event_ids(active, events)[sample, segment]
+        if located is not None:
+            sample, segment = located.sample, located.segment
         columns = self._empty(len(sample))
         columns["time"], columns["health"] = time[sample], estimate.health[sample].astype("u4")
-        columns["event"] = self._event_ids(active, events)[sample, segment]
         columns["segment"] = np.array(self._segments, dtype=object)[segment]
         wrenches = estimate.segment_wrench[sample, segment]
         columns |= {axis: wrenches[:, i] for i, axis in enumerate(AXES)}
-        return columns
+        return columns | ({"event": ids} if located is None else located.columns())
 
     def _empty(self, rows: int) -> dict[str, Any]:
         columns: dict[str, Any] = {
