@@ -16,7 +16,6 @@ from touchline.estimation.observer import METHODS
 from touchline.estimation.samples import Samples
 from touchline.logs import Log, open_log
 from touchline.model.robot import Robot, load_robot
-from touchline.report.contact_rows import ContactRows
 from touchline.report.curves import Curves
 from touchline.report.facts import bandwidth_warnings, bandwidths
 from touchline.report.outputs import REPORT, Outputs, prepare_directory, write_text
@@ -118,20 +117,19 @@ class _Run:
         robot = pipeline.robot
         self._out = out
         self._outputs = Outputs(out, robot)
-        self._contacts = ContactRows(robot)
         self._statistics = Statistics.of(len(robot.joint_names), len(robot.segment_names))
         self._curves = Curves(pipeline, self.period)
 
     def add(self, part: Samples) -> None:
         """Take the next samples."""
-        time, events = part.time, self.pipeline.events
+        time = part.time
         estimate, detection = self.pipeline.run(time, part.q, part.qd, part.tau, part.wrench)
         self._statistics.add(time, estimate, detection)
         self._curves.add(time, estimate, detection)
         self._outputs.estimates(time, estimate)
-        located = getattr(self.pipeline, "contacts", None)
-        self._outputs.contacts(self._contacts.rows(time, estimate, detection, events, located))
-        self._outputs.events(events)
+        if self.pipeline.contacts is not None:
+            self._outputs.contacts(time, estimate, self.pipeline.contacts)
+        self._outputs.events(self.pipeline.events)
 
     def finish(
         self, log: Path, method: str, bandwidth: float | None, warnings: list[str]
