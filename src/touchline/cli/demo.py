@@ -29,23 +29,23 @@ def demo(
     """
     import webbrowser
 
-    from touchline.cli.simulate import write_simulated
     from touchline.errors import InputError
     from touchline.logs import write_table
     from touchline.model.robot import load_robot
     from touchline.report.analysis import analyze
     from touchline.report.comparison import comparison_text
     from touchline.simulation.noise import SensorNoise
-    from touchline.simulation.scenario import SCENARIOS, Run
+    from touchline.simulation.record import simulate_to_log
+    from touchline.simulation.scene import Run
 
     if not 4.0 <= duration <= 600.0:
         raise InputError(f"--duration {duration}: allowed: 4 to 600 s")
     robot = load_robot("sara")
     out.mkdir(parents=True, exist_ok=True)
     print(f"simulating {duration:g} s of the arm being touched (as long on a slow machine) ...")
-    simulated = SCENARIOS["demo"](robot, duration, Run(seed, noise=SensorNoise()))
     log = out / "demo.parquet"
-    write_simulated(log, simulated, robot.description, write_table)
+    settings = Run(seed, noise=SensorNoise())
+    simulate_to_log("demo", robot, log, write_table, settings, {"seconds": duration})
     analysis = analyze(log, "sara", out)
     print(comparison_text(analysis.events, log))
     report = out / "report.html"

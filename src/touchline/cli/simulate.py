@@ -42,36 +42,20 @@ def simulate(
         noise: White noise and quantization of ordinary sensors.
         model_error: 1 sigma of the relative error of the real arm's inertias.
     """
-    import inspect
-
-    from touchline.errors import InputError
     from touchline.logs import write_table
     from touchline.model.robot import load_robot
     from touchline.simulation.noise import SensorNoise
-    from touchline.simulation.scenario import SCENARIOS, Run
-    from touchline.suggest import unknown
+    from touchline.simulation.record import simulate_to_log
+    from touchline.simulation.scene import Run
 
-    if scenario not in SCENARIOS:
-        raise InputError(unknown(scenario, "scenario", SCENARIOS))
-    make = SCENARIOS[scenario]
     given = {"seconds": seconds, "speed": speed, "force": force}
     options = {name: value for name, value in given.items() if value is not None}
-    for name in options:
-        if name not in inspect.signature(make).parameters:
-            raise InputError(f"--{name}: {scenario} has no such setting")
-    sensors = SensorNoise() if noise else None
     model = load_robot(robot)
+    sensors = SensorNoise() if noise else None
     settings = Run(seed, rate, physics, noise=sensors, model_error=model_error)
-    simulated = make(model, settings=settings, **options)
-    write_simulated(out, simulated, model.description, write_table)
-    links = sorted({simulated.truth.links[i] for i in simulated.truth.link.flat if i >= 0})
+    simulated = simulate_to_log(scenario, model, out, write_table, settings, options)
+    truth = simulated.truth
+    links = sorted({truth.links[i] for i in truth.link.flat if i >= 0})
     touched = f"touched: {', '.join(links)}" if links else "nothing touches the arm"
     print(f"{out}: {len(simulated.samples)} samples at {rate:g} Hz of {model.name}; {touched}")
     return 0
-
-
-def write_simulated(out, simulated, description, write_table) -> None:
-    """Writes a simulated log with its truth in the columns `truth.contact.K.*`."""
-    write_table(
-        out, simulated.samples, description, simulated.metadata, simulated.truth.columns()
-    )

@@ -38,8 +38,8 @@ class TrueContact:
 class Comparison:
     """A true contact and the event that found it, or None.
 
-    `position_error` [m] is at the event's `time_of_position`; `force_error` [N] compares the event's
-    force with the truth while it was strong. NaN where there is nothing to compare.
+    `position_error` [m] is at the event's `time_of_position`; `force_error` [N] is that of the
+    event's force against the truth while it was strong. NaN where there is nothing to compare.
     """
 
     truth: TrueContact

@@ -8,11 +8,11 @@ from typing import Any
 
 from touchline.errors import InputError
 from touchline.model.robot import Robot
-from touchline.model.suggest import did_you_mean
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scenario import SCENARIOS
 from touchline.simulation.scene import Run
 from touchline.simulation.truth import Simulated
+from touchline.suggest import did_you_mean
 
 Write = Callable[..., None]  # as `touchline.logs.tables.write_table`
 
