@@ -176,7 +176,7 @@ inline nb::tuple follow(tl::Localizer& l, const In& time, const In& rows, const 
       for (std::size_t g = 0; g < m; ++g) {
         const bool touched = levels.data()[i * m + g] > 0.0;
         const int segment = static_cast<int>(g);
-        if (l.enter(segment, touched)) {
+        if (l.enter(segment, touched, time.data()[i])) {
           ended.insert(ended.end(), {static_cast<double>(i), static_cast<double>(g)});
           push_event(l, segment, ended);
         }
@@ -188,7 +188,8 @@ inline nb::tuple follow(tl::Localizer& l, const In& time, const In& rows, const 
         answers[at] = static_cast<double>(i);
         answers[at + 1] = static_cast<double>(g);
         const double* tests = normalized.data() + i * r;
-        write(l, l.locate(segment, rows.data() + i * width, tests), answers.data() + at + 2);
+        write(l, l.locate_next(segment, rows.data() + i * width, tests, time.data()[i]),
+              answers.data() + at + 2);
         l.remember(segment, tests, time.data()[i], q.data() + i * n);
       }
     }

@@ -4,30 +4,52 @@
 from pathlib import Path
 from typing import Annotated
 
-from tyro.conf import FlagCreatePairsOff, arg
+from tyro.conf import arg
 
 
 def demo(
-    headless: FlagCreatePairsOff[bool] = False,
-    duration: Annotated[float | None, arg(metavar="S")] = None,
-    out: Annotated[Path, arg(metavar="DIR")] = Path("touchline-demo"),
+    headless: bool = False,
+    duration: Annotated[float, arg(metavar="S")] = 12.0,
+    out: Annotated[Path, arg(metavar="DIR")] = Path("out/demo"),
+    seed: int = 1,
 ) -> int:
-    """Analyzes a short simulated recording of an arm that is touched, and opens the report.
+    """Simulates the SARA-class arm being touched, analyzes it, and shows what was felt.
 
-    Example: touchline demo
+    Example: touchline demo --headless --duration 8
 
-    The recording ships with Touchline; it was made by scripts/make_demo_recording.py.
+    The arm moves, is touched near its base, then on the structure, the handle and the tool at
+    once, and on the upper arm. Estimates are compared with the truth of the simulation. Opens the
+    report in a browser.
 
     Args:
-        headless: Print what was found; open no browser.
-        duration: Only the first S seconds of the recording.
-        out: Directory for the results.
+        headless: Print the table of errors only; no browser.
+        duration: Of the simulated recording [s].
+        out: Directory for the log and the results.
+        seed: Of the motion, the places and the noise.
     """
-    from touchline.report.demo import run_demo
+    import webbrowser
 
-    print(run_demo(out, duration))
+    from touchline.errors import InputError
+    from touchline.logs import write_table
+    from touchline.model.robot import load_robot
+    from touchline.report.analysis import analyze
+    from touchline.report.comparison import comparison_text
+    from touchline.simulation.noise import SensorNoise
+    from touchline.simulation.record import simulate_to_log
+    from touchline.simulation.scene import Run
+
+    if not 4.0 <= duration <= 600.0:
+        raise InputError(f"--duration {duration}: allowed: 4 to 600 s")
+    robot = load_robot("sara")
+    out.mkdir(parents=True, exist_ok=True)
+    print(f"simulating {duration:g} s of the arm being touched (as long on a slow machine) ...")
+    log = out / "demo.parquet"
+    settings = Run(seed, noise=SensorNoise())
+    simulate_to_log("demo", robot, log, write_table, settings, {"seconds": duration})
+    analysis = analyze(log, "sara", out)
+    print(comparison_text(analysis.events, log))
+    report = out / "report.html"
+    print(f"report: {report}")
     if not headless:
-        import webbrowser
-
-        webbrowser.open((out / "report.html").resolve().as_uri())
+        webbrowser.open(report.resolve().as_uri())
     return 0

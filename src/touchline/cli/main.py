@@ -9,6 +9,7 @@ from touchline.cli.analyze import analyze
 from touchline.cli.bench import bench
 from touchline.cli.check import check
 from touchline.cli.demo import demo
+from touchline.cli.simulate import simulate
 from touchline.errors import InputError
 from touchline.suggest import did_you_mean
 
@@ -25,6 +26,7 @@ Exit status: 0 done, 1 failure (check: findings), 2 bad input."""
 
 COMMANDS: dict[str, Callable[..., int]] = {
     "demo": demo,
+    "simulate": simulate,
     "analyze": analyze,
     "check": check,
     "bench": bench,
