@@ -208,7 +208,7 @@ class EventRecorder:
     ) -> None:
         active = levels > 0
         edges = np.flatnonzero(np.diff(active.astype(int), prepend=int(g in self._open)))
-        bounds = [0, *edges.tolist(), len(time)]
+        bounds = sorted({0, *edges.tolist(), len(time)})  # an edge may be the first sample
         for start, stop in zip(bounds[:-1], bounds[1:], strict=True):
             if start in edges and not active[start]:
                 self._close(g, float(time[start]), places)

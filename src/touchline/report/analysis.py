@@ -95,10 +95,10 @@ def analyze(
 
 
 def typical_period(time: np.ndarray) -> float:
-    """Median step of time stamps [s] that go forward; 1 ms where there is none."""
+    """Median step of time stamps [s] that go forward, to six digits; 1 ms where there is none."""
     steps = np.diff(time[np.isfinite(time)])
     steps = steps[steps > 0]
-    return float(np.median(steps)) if len(steps) else 1e-3
+    return float(f"{np.median(steps):.6g}") if len(steps) else 1e-3
 
 
 def _check_options(bandwidth: float | None, method: str) -> None:
