@@ -380,7 +380,7 @@ class Measurement {
 
   void subtract_sensor(const Projection& pair, const Gains& g, double* out) {
     const int n = layout_.joints, k = layout_.sensors;
-    const Spatial& s = posture_.subspace(observer_.layout().lines[pair.line].node);
+    const Spatial& s = posture_.subspace(observer_.layout().lines[pair.line]);
     const int node = observer_.sensors()[pair.sensor].node;
     for (int a = 0; a < 6; ++a)
       out[6 * pair.sensor + a] -=

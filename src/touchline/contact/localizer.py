@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from touchline import _core
 from touchline.contact.contact import Candidate
 from touchline.contact.detector import Detection
 from touchline.contact.skin import Skin
 from touchline.contact.thresholds import Thresholds
 from touchline.estimation.observer import Estimate, Observer
+from touchline.native import core
 
 Array = NDArray[np.float64]
 
@@ -104,15 +104,15 @@ class Localizer:
         self.observer, self.robot = observer, observer.robot
         self.skin = skin or Skin(self.robot)
         self._body_names = {body.node: body.name for body in self.robot.bodies}
-        settings = _core.LocalizerSettings()
+        settings = core.LocalizerSettings()
         settings.friction = friction
         settings.first_entry = rule == "paper"
         rows = thresholds.rows if thresholds else ()
-        self.core = _core.Localizer(
+        self.core = core.Localizer(
             observer.kernel,
-            [_core.DetectionRow(**vars(row)) for row in rows],
+            [core.DetectionRow(**vars(row)) for row in rows],
             self._noise(period, wrench_error, torque_error),
-            [_core.LinkSurface(patch.node, patch.mesh) for patch in self.skin.patches],
+            [core.LinkSurface(patch.node, patch.mesh) for patch in self.skin.patches],
             settings,
         )
 
@@ -240,10 +240,10 @@ class Localizer:
             for surface, node, weight, *_, position in ((*part[:3], part[3:]) for part in parts)
         )
 
-    def _noise(self, period: float, wrench_error: float, torque_error: float) -> _core.NoiseFigures:
+    def _noise(self, period: float, wrench_error: float, torque_error: float) -> core.NoiseFigures:
         noise = self.robot.description.noise
         sensors = [x for name in self.robot.sensor_names for x in noise.sensors[name]]
-        return _core.noise_figures(
+        return core.noise_figures(
             list(noise.qd), list(noise.tau), sensors, period, wrench_error, torque_error
         )
 

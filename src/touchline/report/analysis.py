@@ -16,7 +16,6 @@ from touchline.estimation.observer import METHODS
 from touchline.estimation.samples import Samples
 from touchline.logs import Log, open_log
 from touchline.model.robot import Robot, load_robot
-from touchline.report.contact_rows import contact_rows
 from touchline.report.curves import Curves
 from touchline.report.facts import bandwidth_warnings, bandwidths
 from touchline.report.outputs import REPORT, Outputs, prepare_directory, write_text
@@ -96,13 +95,10 @@ def analyze(
 
 
 def typical_period(time: np.ndarray) -> float:
-    """Median step of time stamps [s] that go forward; 1 ms where there is none.
-
-    To five digits: not what the stamps' own rounding makes of it.
-    """
+    """Median step of time stamps [s] that go forward, to six digits; 1 ms where there is none."""
     steps = np.diff(time[np.isfinite(time)])
     steps = steps[steps > 0]
-    return float(f"{np.median(steps):.5g}") if len(steps) else 1e-3
+    return float(f"{np.median(steps):.6g}") if len(steps) else 1e-3
 
 
 def _check_options(bandwidth: float | None, method: str) -> None:
@@ -131,7 +127,8 @@ class _Run:
         self._statistics.add(time, estimate, detection)
         self._curves.add(time, estimate, detection)
         self._outputs.estimates(time, estimate)
-        self._outputs.contacts(contact_rows(time, estimate, self.pipeline.contacts))
+        if self.pipeline.contacts is not None:
+            self._outputs.contacts(time, estimate, self.pipeline.contacts)
         self._outputs.events(self.pipeline.events)
 
     def finish(

@@ -35,10 +35,10 @@ class Readings:
     link_torque: Array
     motor_torque: Array
     wrench: Array
-    gravity_torque: Array | None
-    motion_torque: Array | None
-    weight: Array | None
-    R_log_sensor: Array | None
+    gravity_torque: Array | None = None
+    motion_torque: Array | None = None
+    weight: Array | None = None
+    R_log_sensor: Array | None = None
 
     @classmethod
     def empty(cls, plant: Plant, count: int) -> Self:
