@@ -1,0 +1,286 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of a robot being touched: points, forces and uncertainty drawn on its surface."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.model.robot import Robot
+from touchline.report.render import solids
+from touchline.report.render.camera import Camera, Size
+from touchline.report.render.light import FloorContact, Lights, ShadowMap, shaded
+from touchline.report.render.png import png_bytes
+from touchline.report.render.raster import rasterize, weights
+from touchline.report.render.skin import Piece, Triangles, posed_skin
+
+__all__ = ["Camera", "Mark", "Scene", "png_bytes"]
+
+Array = NDArray[np.float64]
+Single = NDArray[np.float32]
+
+FINE = 2  # samples per pixel, along each side
+NEAREST = 0.02  # m; triangles that come nearer to the camera are not drawn
+SIGMAS = 2.0  # of the drawn ellipsoid
+HIDDEN = 0.30  # opacity of what the arm hides, relative to what it does not
+FORCE_SCALE, SHORTEST, LONGEST = 0.010, 0.09, 0.42  # m/N, m, m, for an arm of 1.5 m
+
+# Okabe and Ito's vermilion and blue: told apart with any colour vision.
+COLOURS = {"estimate": "#d55e00", "truth": "#0072b2"}
+SHELL, TRIM, TINT = "#e9eaec", "#5d646d", "#ffbe73"
+SKY, FLOOR = "#fbfcfd", "#eceff3"
+
+
+def linear(colour: str) -> Array:
+    """A colour (3,) as light, from its name `#rrggbb` in sRGB."""
+    value = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+    return value**2.2
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A contact to draw.
+
+    Attributes:
+        position: (3,) [m] in world.
+        force: (3,) [N] on the robot, in world; None where it is not known.
+        kind: "estimate" or "truth".
+        covariance: (3, 3) [m2] of the position.
+        label: what stands beside the arrow's tail.
+    """
+
+    position: Array
+    force: Array | None
+    kind: str
+    covariance: Array | None
+    label: str
+
+
+class Scene:
+    """A robot at a configuration, and what is to be drawn on it.
+
+    Args:
+        robot: the robot.
+        q: (n,) joint positions [rad or m].
+    """
+
+    def __init__(self, robot: Robot, q: Array) -> None:
+        self.robot = robot
+        self.marks: list[Mark] = []
+        self._tints: dict[str, float] = {}
+        self._skin = posed_skin(robot, np.asarray(q, float))
+        self._surface = Triangles.joined([triangles for _, triangles in self._skin])
+        self._shadows: dict[bytes, ShadowMap] = {}
+
+    @property
+    def pieces(self) -> list[Piece]:
+        """The drawn shapes; `part` of `surface` counts them."""
+        return [piece for piece, _ in self._skin]
+
+    @property
+    def surface(self) -> Triangles:
+        """All triangles of the robot in world."""
+        return self._surface
+
+    @cached_property
+    def extent(self) -> float:
+        """Length [m] of the diagonal of the box around the robot."""
+        if not len(self._surface.corners):
+            return 1.0
+        return float(np.linalg.norm(np.ptp(self._surface.corners, axis=(0, 1))))
+
+    @property
+    def _unit(self) -> float:
+        """Sizes of marks are those for an arm of 1.5 m times this."""
+        return self.extent / 1.5
+
+    def add_contact(
+        self,
+        position: Array,
+        force: Array | None,
+        kind: str = "estimate",
+        covariance: Array | None = None,
+        label: str | None = None,
+    ) -> None:
+        """Draw a contact: its point, its force and how uncertain the point is.
+
+        Args:
+            position: (3,) [m] in world.
+            force: (3,) [N] on the robot, world axes; None draws the point alone.
+            kind: "estimate" or "truth", which have colours of their own.
+            covariance: (3, 3) [m2] of the position, drawn as an ellipsoid of two sigma.
+            label: beside the arrow; by default the force's size.
+
+        Raises:
+            ValueError: an unknown kind.
+        """
+        if kind not in COLOURS:
+            raise ValueError(f"kind '{kind}'; allowed: {', '.join(COLOURS)}")
+        size = None if force is None else float(np.linalg.norm(force))
+        if label is None:
+            label = "" if size is None else f"{size:.1f} N"
+        force = np.asarray(force, float) if size else None
+        self.marks.append(Mark(np.asarray(position, float), force, kind, covariance, label))
+
+    def highlight(self, link: str, strength: float = 1.0) -> None:
+        """Tint a link; `strength` from 0 to 1."""
+        self._tints[link] = strength
+
+    def arrow(self, mark: Mark) -> tuple[Array, Array]:
+        """Tail and tip (3,) [m] of a mark's arrow; the tip is the contact."""
+        if mark.force is None:
+            return mark.position, mark.position
+        size = float(np.linalg.norm(mark.force))
+        length = np.clip(FORCE_SCALE * size, SHORTEST, LONGEST) * self._unit
+        return mark.position - mark.force / size * length, mark.position
+
+    def points(self) -> Array:
+        """Points (N, 3) [m] that a picture should show: the robot and the arrows."""
+        ends = [end for mark in self.marks for end in self.arrow(mark)]
+        return np.vstack([self._surface.corners.reshape(-1, 3), *ends])
+
+    def render(self, camera: Camera, size: Size = (640, 640)) -> NDArray[np.uint8]:
+        """The picture, (H, W, 3) in sRGB, of `size` (width, height) [pixels]."""
+        lights = Lights.of(camera)
+        floor = float(self._surface.corners[..., 2].min())
+        canvas = _Canvas(camera, size)
+        shadow = ShadowMap(self._surface.corners, lights.key)
+        ground = self._ground(camera, size, shadow, lights.key, floor)
+        body = canvas.see(self._surface, self._closed())
+        albedo = self._albedo()[body.part]
+        lit = shadow.lit(body.position, body.normal)
+        colour = shaded(lights, body.normal, albedo, lit)
+        canvas.put(ground, body, colour)
+        canvas.hides(body)
+        for triangles, tint, opacity in self._overlays():
+            seen = canvas.see(triangles)
+            glow = shaded(lights, seen.normal, linear(tint)[None]) * 0.8
+            canvas.put_over(seen, glow + 0.25 * linear(tint).astype(np.float32), opacity)
+        return canvas.image
+
+    def _closed(self) -> NDArray[np.bool_]:
+        closed = np.array([piece.closed for piece in self.pieces], bool)
+        return closed[self._surface.part]
+
+    def _albedo(self) -> Array:
+        colours = []
+        for piece in self.pieces:
+            base = linear(TRIM if piece.trim else SHELL)
+            strength = self._tints.get(piece.link, 0.0) * (0.55 if piece.trim else 1.0)
+            colours.append(base + strength * (linear(TINT) - base))
+        return np.array(colours)
+
+    def _ground(
+        self, camera: Camera, size: Size, shadow: ShadowMap, key: Array, floor: float
+    ) -> Single:
+        """The background (H, W, 3): a calm gradient with the robot's shadow on the floor."""
+        width, height = size
+        fade = np.linspace(0, 1, height)[:, None, None] ** 1.2
+        ground = linear(SKY) * (1 - fade) + linear(FLOOR) * fade
+        ground = np.broadcast_to(ground, (height, width, 3)).reshape(-1, 3).copy()
+        rays = camera.rays(size).reshape(-1, 3)
+        below = np.flatnonzero(rays[:, 2] < -1e-3)
+        points = camera.eye + rays[below] * ((floor - camera.eye[2]) / rays[below, 2])[:, None]
+        near = np.linalg.norm(points - self._surface.corners.mean(axis=(0, 1)), axis=1)
+        below, points = below[near < 3 * self.extent], points[near < 3 * self.extent]
+        dark = 0.34 * shadow.shade_on_floor(points)
+        dark = 1 - (1 - dark) * (1 - 0.45 * FloorContact(self._surface.corners, floor).at(points))
+        ground[below] *= 1 - dark[:, None] * np.array([1.0, 0.97, 0.92])
+        return ground.reshape(height, width, 3).astype(np.float32)
+
+    def _overlays(self) -> list[tuple[Triangles, str, float]]:
+        """What is drawn over the robot: (triangles, colour, opacity), in order."""
+        layers, unit = [], self._unit
+        for mark in self.marks:
+            colour = COLOURS[mark.kind]
+            if mark.covariance is not None:
+                axes = solids.spread(mark.covariance, SIGMAS, 1e-4)
+                layers.append((solids.ellipsoid(mark.position, axes), colour, 0.38))
+            if mark.force is not None and mark.kind == "estimate":
+                along = mark.force / np.linalg.norm(mark.force) * 0.30 * unit
+                line = solids.rod(mark.position - along, mark.position + along, 0.0012 * unit)
+                layers.append((line, colour, 0.6))
+        for mark in self.marks:
+            tail, tip = self.arrow(mark)
+            layers.append((solids.ball(tip, 0.011 * unit), COLOURS[mark.kind], 1.0))
+            if mark.force is not None:
+                layers.append((solids.arrow(tail, tip, 0.006 * unit), COLOURS[mark.kind], 1.0))
+        return layers
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """The samples (N,) of a canvas that show triangles, and what they show."""
+
+    sample: NDArray[np.int64]
+    part: NDArray[np.int64]
+    depth: Single
+    normal: Array
+    position: Array
+
+
+class _Canvas:
+    """An image being drawn, with FINE x FINE samples per pixel."""
+
+    def __init__(self, camera: Camera, size: Size) -> None:
+        self._camera, self._size = camera, size
+        self._fine = (size[0] * FINE, size[1] * FINE)
+        self._depth: Single | None = None
+        self._light: Single = np.zeros((size[0] * size[1], 3), np.float32)
+
+    @property
+    def image(self) -> NDArray[np.uint8]:
+        """(H, W, 3) in sRGB."""
+        encoded = self._light.clip(0, 1) ** np.float32(1 / 2.2) * 255 + 0.5
+        return encoded.astype(np.uint8).reshape(self._size[1], self._size[0], 3)
+
+    def see(self, triangles: Triangles, closed: NDArray[np.bool_] | None = None) -> _Seen:
+        """Which samples show the triangles, nearest first; backs of closed ones are left out."""
+        pixels, depth = self._camera.project(triangles.corners, self._fine)
+        shown = (depth > NEAREST).all(axis=1)
+        if closed is not None:
+            shown &= ~closed | (_turn(pixels) < 0)
+        pixels, nearness = pixels[shown], 1 / depth[shown]
+        hit = rasterize(pixels, nearness, self._fine)
+        y, x = np.divmod(hit.pixel, self._fine[0])
+        share = weights(pixels, nearness, hit.triangle, x + 0.5, y + 0.5)
+        number = np.flatnonzero(shown)[hit.triangle]
+        normal = np.einsum("ni,nij->nj", share, triangles.normals[number])
+        position = np.einsum("ni,nij->nj", share, triangles.corners[number])
+        away = np.einsum("ij,ij->i", normal, position - self._camera.eye) > 0
+        if closed is None or not closed.all():
+            normal[away] *= -1
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        return _Seen(hit.pixel, triangles.part[number], 1 / hit.nearness, normal, position)
+
+    def put(self, ground: Single, seen: _Seen, colour: Single) -> None:
+        """Begin with a background (H, W, 3) and what stands before it."""
+        self._light = ground.reshape(-1, 3).copy()
+        self._blend(seen, colour, np.ones(len(colour), np.float32))
+
+    def hides(self, seen: _Seen) -> None:
+        """What lies behind these samples is drawn fainter from now on."""
+        self._depth = np.full(self._fine[0] * self._fine[1], np.inf, np.float32)
+        self._depth[seen.sample] = seen.depth
+
+    def put_over(self, seen: _Seen, colour: Single, opacity: float) -> None:
+        """Draw over it: fainter where it is hidden."""
+        share = np.full(len(colour), opacity, np.float32)
+        if self._depth is not None:
+            share[self._depth[seen.sample] < seen.depth - 1e-4] *= HIDDEN
+        self._blend(seen, colour, share)
+
+    def _blend(self, seen: _Seen, colour: Single, share: Single) -> None:
+        y, x = np.divmod(seen.sample, self._fine[0])
+        pixel = (y // FINE) * self._size[0] + x // FINE
+        count, scale = len(self._light), 1 / FINE**2
+        cover = np.bincount(pixel, share, count) * scale
+        for i in range(3):
+            added = np.bincount(pixel, share * colour[:, i].clip(0, 1), count) * scale
+            self._light[:, i] = self._light[:, i] * (1 - cover) + added
+
+
+def _turn(corners: Array) -> Array:
+    (x1, y1), (x2, y2) = ((corners[:, i] - corners[:, 0]).T for i in (1, 2))
+    return x1 * y2 - x2 * y1
