@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from touchline.model.robot import Robot
 from touchline.report.render import solids
 from touchline.report.render.camera import Camera, Size
-from touchline.report.render.light import FloorContact, Lights, ShadowMap, shaded
+from touchline.report.render.light import FloorContact, Lights, ShadowMap, doubled, shaded
 from touchline.report.render.png import png_bytes
 from touchline.report.render.raster import rasterize, weights
 from touchline.report.render.skin import Piece, Triangles, posed_skin
@@ -30,6 +30,8 @@ FORCE_SCALE, SHORTEST, LONGEST = 0.010, 0.09, 0.42  # m/N, m, m, for an arm of 1
 COLOURS = {"estimate": "#d55e00", "truth": "#0072b2"}
 SHELL, TRIM, TINT = "#e9eaec", "#5d646d", "#ffbe73"
 SKY, FLOOR = "#fbfcfd", "#eceff3"
+
+ENCODED = (np.linspace(0, 1, 1 << 14) ** (1 / 2.2) * 255 + 0.5).astype(np.uint8)
 
 
 def linear(colour: str) -> Array:
@@ -176,18 +178,17 @@ class Scene:
     ) -> Single:
         """The background (H, W, 3): a calm gradient with the robot's shadow on the floor."""
         width, height = size
-        fade = np.linspace(0, 1, height)[:, None, None] ** 1.2
+        fade = np.linspace(0, 1, height)[:, None] ** 1.2
         ground = linear(SKY) * (1 - fade) + linear(FLOOR) * fade
-        ground = np.broadcast_to(ground, (height, width, 3)).reshape(-1, 3).copy()
-        rays = camera.rays(size).reshape(-1, 3)
+        coarse = ((width + 1) // 2, (height + 1) // 2)  # shadows are soft
+        rays = camera.rays(coarse)
         below = np.flatnonzero(rays[:, 2] < -1e-3)
         points = camera.eye + rays[below] * ((floor - camera.eye[2]) / rays[below, 2])[:, None]
-        near = np.linalg.norm(points - self._surface.corners.mean(axis=(0, 1)), axis=1)
-        below, points = below[near < 3 * self.extent], points[near < 3 * self.extent]
-        dark = 0.34 * shadow.shade_on_floor(points)
-        dark = 1 - (1 - dark) * (1 - 0.45 * FloorContact(self._surface.corners, floor).at(points))
-        ground[below] *= 1 - dark[:, None] * np.array([1.0, 0.97, 0.92])
-        return ground.reshape(height, width, 3).astype(np.float32)
+        foot = FloorContact(self._surface.corners, floor)
+        dark = np.zeros(len(rays), np.float32)
+        dark[below] = 1 - (1 - 0.34 * shadow.shade_on_floor(points)) * (1 - 0.45 * foot.at(points))
+        dark = doubled(dark.reshape(coarse[::-1]))[:height, :width, None]
+        return ground[:, None].astype(np.float32) * (1 - dark * np.float32([1.0, 0.97, 0.92]))
 
     def _overlays(self) -> list[tuple[Triangles, str, float]]:
         """What is drawn over the robot: (triangles, colour, opacity), in order."""
@@ -232,27 +233,29 @@ class _Canvas:
     @property
     def image(self) -> NDArray[np.uint8]:
         """(H, W, 3) in sRGB."""
-        encoded = self._light.clip(0, 1) ** np.float32(1 / 2.2) * 255 + 0.5
-        return encoded.astype(np.uint8).reshape(self._size[1], self._size[0], 3)
+        steps = (self._light.clip(0, 1) * np.float32(len(ENCODED) - 1) + 0.5).astype(np.uint16)
+        return ENCODED[steps].reshape(self._size[1], self._size[0], 3)
 
     def see(self, triangles: Triangles, closed: NDArray[np.bool_] | None = None) -> _Seen:
         """Which samples show the triangles, nearest first; backs of closed ones are left out."""
         pixels, depth = self._camera.project(triangles.corners, self._fine)
-        shown = (depth > NEAREST).all(axis=1)
+        near = np.minimum(np.minimum(depth[:, 0], depth[:, 1]), depth[:, 2])
+        shown = near > NEAREST
         if closed is not None:
             shown &= ~closed | (_turn(pixels) < 0)
         pixels, nearness = pixels[shown], 1 / depth[shown]
         hit = rasterize(pixels, nearness, self._fine)
         y, x = np.divmod(hit.pixel, self._fine[0])
         share = weights(pixels, nearness, hit.triangle, x + 0.5, y + 0.5)
-        number = np.flatnonzero(shown)[hit.triangle]
+        number, depth = np.flatnonzero(shown)[hit.triangle], 1 / hit.nearness
         normal = np.einsum("ni,nij->nj", share, triangles.normals[number])
-        position = np.einsum("ni,nij->nj", share, triangles.corners[number])
-        away = np.einsum("ij,ij->i", normal, position - self._camera.eye) > 0
+        ray = self._camera.rays_at(x, y, self._fine)
+        away = np.einsum("ij,ij->i", normal, ray) > 0
         if closed is None or not closed.all():
             normal[away] *= -1
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        return _Seen(hit.pixel, triangles.part[number], 1 / hit.nearness, normal, position)
+        normal /= np.sqrt(np.einsum("ij,ij->i", normal, normal))[:, None]
+        position = self._camera.eye + ray * depth[:, None]
+        return _Seen(hit.pixel, triangles.part[number], depth, normal, position)
 
     def put(self, ground: Single, seen: _Seen, colour: Single) -> None:
         """Begin with a background (H, W, 3) and what stands before it."""
@@ -274,11 +277,14 @@ class _Canvas:
     def _blend(self, seen: _Seen, colour: Single, share: Single) -> None:
         y, x = np.divmod(seen.sample, self._fine[0])
         pixel = (y // FINE) * self._size[0] + x // FINE
-        count, scale = len(self._light), 1 / FINE**2
-        cover = np.bincount(pixel, share, count) * scale
+        if not len(pixel):
+            return
+        low, high = int(pixel.min()), int(pixel.max()) + 1
+        pixel = pixel - low
+        cover = np.bincount(pixel, share, high - low) / FINE**2
         for i in range(3):
-            added = np.bincount(pixel, share * colour[:, i].clip(0, 1), count) * scale
-            self._light[:, i] = self._light[:, i] * (1 - cover) + added
+            added = np.bincount(pixel, share * colour[:, i].clip(0, 1), high - low) / FINE**2
+            self._light[low:high, i] = self._light[low:high, i] * (1 - cover) + added
 
 
 def _turn(corners: Array) -> Array:

@@ -102,12 +102,17 @@ class Camera:
         return pixels, depth
 
     def rays(self, size: Size) -> Array:
-        """Directions (H, W, 3) in world through the middles of pixels, of unit depth."""
-        width, height = size
-        x = (np.arange(width) + 0.5 - width / 2) / (self.focal * height)
-        y = (np.arange(height) + 0.5 - height / 2) / (self.focal * height)
-        right, down, forward = self.axes
-        return x[None, :, None] * right + y[:, None, None] * down + forward
+        """Directions (H * W, 3) in world through the middles of all pixels, of unit depth."""
+        row, column = np.divmod(np.arange(size[0] * size[1]), size[0])
+        return self.rays_at(column, row, size)
+
+    def rays_at(self, column: NDArray, row: NDArray, size: Size) -> Array:
+        """Directions (N, 3) in world through the middles of pixels, of unit depth."""
+        scale = 1 / (self.focal * size[1])
+        seen = np.ones((len(column), 3))
+        seen[:, 0] = (column + (0.5 - size[0] / 2)) * scale
+        seen[:, 1] = (row + (0.5 - size[1] / 2)) * scale
+        return seen @ self.axes
 
 
 def _axes(forward: Array, up: Vector) -> Array:

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 
 MAP = 512  # pixels across the shadow map
-TAPS = np.array([(x, y) for x in (-2.5, -0.8, 0.8, 2.5) for y in (-2.5, -0.8, 0.8, 2.5)])
+TAPS = [(x, y) for x in (-3, -1, 1, 3) for y in (-3, -1, 1, 3)]  # pixels of it
 SKY, GROUND = (0.56, 0.60, 0.66), (0.40, 0.38, 0.36)
 KEY, FILL, HEAD = (0.86, 0.83, 0.78), (0.16, 0.18, 0.22), (0.16, 0.16, 0.16)
 
@@ -62,26 +62,24 @@ class ShadowMap:
     def lit(self, points: Array, normals: Array) -> Single:
         """Part (N,) of the key light that reaches points of the surface, soft at the borders."""
         step = 1.5 / self._scale
-        seen = (points + normals * step) @ self._axes.T - self._low
-        place, height = seen[:, :2] * self._scale, seen[:, 2] + step
-        total = np.zeros(len(points), np.float32)
-        for tap in TAPS:
-            total += self._height[_cell(place + tap)] < height
-        return total / len(TAPS)
+        faces = np.flatnonzero(normals @ self._axes[2] > 0)
+        seen = (points[faces] + normals[faces] * step) @ self._axes.T - self._low
+        column, row = (seen[:, :2] * self._scale).clip(4, MAP - 5).astype(np.int32).T
+        cell, height = row * MAP + column, (seen[:, 2] + step).astype(np.float32)
+        total = np.zeros(len(faces), np.float32)
+        for x, y in TAPS:
+            total += self._height.take(cell + (y * MAP + x)) < height
+        lit = np.zeros(len(points), np.float32)
+        lit[faces] = total / len(TAPS)
+        return lit
 
-    def shade_on_floor(self, points: Array) -> Single:
+    def shade_on_floor(self, points: Array) -> Array:
         """How much (N,) of the light the triangles keep from points below all of them."""
-        place = (points @ self._axes[:2].T - self._low[:2]) * self._scale
         if self._blurred is None:
-            shaded = (self._height > 0).astype(np.float32).reshape(MAP, MAP)
-            self._blurred = blur(shaded, 5)
-        inside = ((place > 1) & (place < MAP - 1)).all(axis=1)
-        return np.where(inside, bilinear(self._blurred, place), 0).astype(np.float32)
-
-
-def _cell(place: Array) -> NDArray[np.int64]:
-    x, y = place.astype(np.int64).clip(0, MAP - 1).T
-    return y * MAP + x
+            shaded = (self._height > 0).astype(np.float32).reshape(MAP // 2, 2, MAP // 2, 2)
+            self._blurred = blur(shaded.mean(axis=(1, 3)), 2)
+        place = points @ self._axes[:2].T - self._low[:2]
+        return bilinear(self._blurred, place * (self._scale / 2))
 
 
 def bilinear(image: Array | Single, place: Array) -> Array:
@@ -93,6 +91,15 @@ def bilinear(image: Array | Single, place: Array) -> Array:
     u, v = x - j, y - i
     top = image[i, j] * (1 - u) + image[i, j + 1] * u
     return top * (1 - v) + (image[i + 1, j] * (1 - u) + image[i + 1, j + 1] * u) * v
+
+
+def doubled(image: Single) -> Single:
+    """An image (H, W) at twice the size, interpolated linearly."""
+    for _ in range(2):
+        before, after = np.vstack([image[:1], image[:-1]]), np.vstack([image[1:], image[-1:]])
+        pairs = np.stack([0.75 * image + 0.25 * before, 0.75 * image + 0.25 * after], axis=1)
+        image = pairs.reshape(-1, image.shape[1]).T
+    return image
 
 
 def blur(image: Single, radius: int) -> Single:

@@ -35,14 +35,26 @@ def rasterize(corners: Array, nearness: Array, size: tuple[int, int]) -> Raster:
         nearness: (T, 3) > 0 and linear in the image: 1 / depth for a pinhole camera.
         size: width and height [pixels].
     """
-    width, height = size
-    pixel, key = _fragments(corners, nearness, width, height)
-    buffer = np.zeros(width * height, np.uint64)
+    low, window = _window(corners, size)
+    pixel, key = _fragments(corners - low, nearness, *window)
+    buffer = np.zeros(window[0] * window[1], np.uint64)
     np.maximum.at(buffer, pixel, key)
     hit = np.flatnonzero(buffer)
     best = buffer[hit]
     triangle = len(corners) - (best & np.uint64(0xFFFFFFFF)).astype(np.int64)
-    return Raster(hit, triangle, (best >> SHIFT).astype(np.uint32).view(np.float32))
+    row, column = np.divmod(hit, max(window[0], 1))
+    pixel = (row + low[1]) * size[0] + column + low[0]
+    return Raster(pixel, triangle, (best >> SHIFT).astype(np.uint32).view(np.float32))
+
+
+def _window(corners: Array, size: tuple[int, int]) -> tuple[Index, tuple[int, int]]:
+    """Return the first pixel (2,) and the size of the part of an image that triangles touch."""
+    points = corners.reshape(-1, 2)
+    if not len(points):
+        return np.zeros(2, np.int64), (0, 0)
+    low = np.floor(points.min(axis=0).clip(0, size)).astype(np.int64)
+    high = np.ceil(points.max(axis=0).clip(0, size)).astype(np.int64)
+    return low, (int(high[0] - low[0]), int(high[1] - low[1]))
 
 
 def _fragments(
@@ -51,8 +63,8 @@ def _fragments(
     """Return all pixels of all triangles, each with a key that is larger the nearer it is."""
     triangle, row = _rows(corners[:, :, 1], height)
     low, high = _row_ends(corners, triangle, row + 0.5)
-    first = np.ceil(np.maximum(low, 0.0) - 0.5).astype(np.int64).clip(0, width)
-    last = np.ceil(np.minimum(high, width) - 0.5).astype(np.int64).clip(0, width)
+    first = np.ceil(low - 0.5).clip(0, width).astype(np.int64)
+    last = np.ceil(high - 0.5).clip(0, width).astype(np.int64)
     count = np.maximum(last - first, 0)
     along, down = _slopes(corners, nearness)
     x, y = first + 0.5 - corners[triangle, 0, 0], row + 0.5 - corners[triangle, 0, 1]
@@ -68,8 +80,10 @@ def _fragments(
 
 def _rows(y: Array, height: int) -> tuple[Index, Index]:
     """Return (triangle, row) for each row of pixels whose middle a triangle spans."""
-    first = np.ceil(np.maximum(y.min(axis=1), 0.0) - 0.5).astype(np.int64).clip(0, height)
-    last = np.ceil(np.minimum(y.max(axis=1), height) - 0.5).astype(np.int64).clip(0, height)
+    least = np.minimum(np.minimum(y[:, 0], y[:, 1]), y[:, 2])
+    largest = np.maximum(np.maximum(y[:, 0], y[:, 1]), y[:, 2])
+    first = np.ceil(least - 0.5).clip(0, height).astype(np.int64)
+    last = np.ceil(largest - 0.5).clip(0, height).astype(np.int64)
     count = np.maximum(last - first, 0)
     triangle = np.repeat(np.arange(len(y)), count)
     row = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count - first, count)
@@ -88,8 +102,8 @@ def _row_ends(corners: Array, triangle: Index, y: Array) -> tuple[Array, Array]:
     for i in range(3):
         (x0, y0), (x1, y1) = corners[:, i].T, corners[:, (i + 1) % 3].T
         rise = y0 - y1
-        with np.errstate(divide="ignore", invalid="ignore"):
-            slope, offset = -(x1 - x0) / rise, -(x0 * y1 - x1 * y0) / rise
+        level = np.where(rise == 0, np.inf, rise)  # bounds no row; its offset is not used
+        slope, offset = -(x1 - x0) / level, -(x0 * y1 - x1 * y0) / level
         at = slope[triangle] * y + offset[triangle]
         side = (turn * rise)[triangle]
         low = np.where(side > 0, np.maximum(low, at), low)
