@@ -10,8 +10,13 @@
 #include <vector>
 
 #include "arrays.hpp"
+#include "contact_bindings.hpp"
 #include "touchline/detector.hpp"
 #include "touchline/observer.hpp"
+
+// Types for the stub; what is not an array of float64 of the right shape is a TypeError.
+#define TOUCHLINE_ARRAY "numpy.typing.NDArray[numpy.float64]"
+#define TOUCHLINE_SIGNALS "q: object, qd: object, tau: object, wrench: object"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -273,6 +278,7 @@ NB_MODULE(_core, m) {
   bind_enums(m);
   bind_rows(m);
   bind_detector(m);
+  bind_contact(m);
   nb::class_<tl::Observer>(m, "Observer")
       .def("__init__",
            [](tl::Observer* self, std::vector<tl::Node> nodes, const std::vector<double>& gravity,
@@ -281,13 +287,19 @@ NB_MODULE(_core, m) {
              new (self) tl::Observer(tl::Tree(std::move(nodes), vec3(gravity)), std::move(joints),
                                      std::move(sensors), method, discretization);
            })
-      .def("step", &step, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a)
-      .def("update", &update, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a)
-      .def("run", &run, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a)
-      .def("terms", &terms, "q"_a, "qd"_a)
-      .def("poses", &poses, "q"_a)
+      .def("step", &step, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a,
+           nb::sig("def step(self, time: float, " TOUCHLINE_SIGNALS ") -> None"))
+      .def("update", &update, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a,
+           nb::sig("def update(self, time: float, " TOUCHLINE_SIGNALS ") -> " TOUCHLINE_ARRAY))
+      .def("run", &run, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a,
+           nb::sig("def run(self, time: object, " TOUCHLINE_SIGNALS ") -> " TOUCHLINE_ARRAY))
+      .def("terms", &terms, "q"_a, "qd"_a,
+           nb::sig("def terms(self, q: object, qd: object) -> "
+                   "tuple[" TOUCHLINE_ARRAY ", " TOUCHLINE_ARRAY "]"))
+      .def("poses", &poses, "q"_a, nb::sig("def poses(self, q: object) -> " TOUCHLINE_ARRAY))
       .def("reset", &tl::Observer::reset)
-      .def_prop_ro("slices", &row_slices)
+      .def_prop_ro("slices", &row_slices,
+                   nb::sig("def slices(self, /) -> dict[str, tuple[int, int]]"))
       .def_prop_ro("segment_sensors", [](const tl::Observer& o) {
         std::vector<int> sensors;
         for (const tl::Segment& s : o.layout().segments) sensors.push_back(s.sensor);

@@ -107,6 +107,8 @@ class Observer {
   const RowLayout& row_layout() const { return row_; }
   const Layout& layout() const { return layout_; }
   const Tree& tree() const { return tree_; }
+  const std::vector<JointRow>& joints() const { return joints_; }
+  const std::vector<SensorRow>& sensors() const { return sensors_; }
   const std::vector<double>& output() const { return output_; }
   double time() const { return now_.time; }  // of the last accepted sample
   // Of sensor s in world, at the last accepted sample.

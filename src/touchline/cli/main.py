@@ -9,7 +9,7 @@ from touchline.cli.analyze import analyze
 from touchline.cli.bench import bench
 from touchline.cli.check import check
 from touchline.errors import InputError
-from touchline.model.suggest import did_you_mean
+from touchline.suggest import did_you_mean
 
 USAGE = """\
 The sense of touch for a robot arm without a skin: external wrenches and contacts from
