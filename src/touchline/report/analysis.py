@@ -18,6 +18,7 @@ from touchline.logs import Log, open_log
 from touchline.model.robot import Robot, load_robot
 from touchline.report.contact_rows import ContactRows
 from touchline.report.curves import Curves
+from touchline.report.event_pictures import EventPoses
 from touchline.report.facts import bandwidth_warnings, bandwidths
 from touchline.report.outputs import REPORT, Outputs, prepare_directory, write_text
 from touchline.report.statistics import Statistics
@@ -40,6 +41,7 @@ class Analysis:
         statistics: of all samples.
         curves: for plots.
         events: all events.
+        poses: how the robot stood at the first of them.
         warnings: what the user should know.
     """
 
@@ -53,6 +55,7 @@ class Analysis:
     statistics: Statistics
     curves: Curves
     events: list[Event]
+    poses: EventPoses
     warnings: list[str]
 
 
@@ -121,6 +124,7 @@ class _Run:
         self._contacts = ContactRows(robot)
         self._statistics = Statistics.of(len(robot.joint_names), len(robot.segment_names))
         self._curves = Curves(pipeline, self.period)
+        self._poses = EventPoses()
 
     def add(self, part: Samples) -> None:
         """Take the next samples."""
@@ -131,6 +135,7 @@ class _Run:
         self._outputs.estimates(time, estimate)
         self._outputs.contacts(self._contacts.rows(time, estimate, detection, events))
         self._outputs.events(events)
+        self._poses.add(time, part.q, events)
 
     def finish(
         self, log: Path, method: str, bandwidth: float | None, warnings: list[str]
@@ -149,6 +154,7 @@ class _Run:
             statistics=self._statistics,
             curves=self._curves,
             events=events,
+            poses=self._poses,
             warnings=warnings,
         )
 

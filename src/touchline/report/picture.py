@@ -27,8 +27,8 @@ HIDDEN = 0.30  # opacity of what the arm hides, relative to what it does not
 FORCE_SCALE, SHORTEST, LONGEST = 0.010, 0.09, 0.42  # m/N, m, m, for an arm of 1.5 m
 
 # Okabe and Ito's vermilion and blue: told apart with any colour vision.
-COLOURS = {"estimate": "#d55e00", "truth": "#0072b2"}
-SHELL, TRIM, TINT = "#e9eaec", "#5d646d", "#ffbe73"
+COLOURS = {"truth": "#0072b2", "estimate": "#d55e00", "candidate": "#e69f00"}
+SHELL, TRIM, TINT = "#f1f2f4", "#5d646d", "#ffd39e"
 SKY, FLOOR = "#fbfcfd", "#eceff3"
 
 ENCODED = (np.linspace(0, 1, 1 << 14) ** (1 / 2.2) * 255 + 0.5).astype(np.uint8)
@@ -47,9 +47,10 @@ class Mark:
     Attributes:
         position: (3,) [m] in world.
         force: (3,) [N] on the robot, in world; None where it is not known.
-        kind: "estimate" or "truth".
+        kind: one of `COLOURS`.
         covariance: (3, 3) [m2] of the position.
         label: what stands beside the arrow's tail.
+        is_point: whether the point is known; without, the arrow only stands for the force.
     """
 
     position: Array
@@ -57,6 +58,7 @@ class Mark:
     kind: str
     covariance: Array | None
     label: str
+    is_point: bool = True
 
 
 class Scene:
@@ -73,7 +75,6 @@ class Scene:
         self._tints: dict[str, float] = {}
         self._skin = posed_skin(robot, np.asarray(q, float))
         self._surface = Triangles.joined([triangles for _, triangles in self._skin])
-        self._shadows: dict[bytes, ShadowMap] = {}
 
     @property
     def pieces(self) -> list[Piece]:
@@ -92,6 +93,14 @@ class Scene:
             return 1.0
         return float(np.linalg.norm(np.ptp(self._surface.corners, axis=(0, 1))))
 
+    @cached_property
+    def balls(self) -> tuple[Single, Single]:
+        """Middles (T, 3) and radii (T,) [m] of balls around the triangles."""
+        corners = self._surface.corners.astype(np.float32)
+        middle = corners.mean(axis=1)
+        apart = ((corners - middle[:, None]) ** 2).sum(axis=2)
+        return middle, np.sqrt(apart.max(axis=1)) * np.float32(1.001)
+
     @property
     def _unit(self) -> float:
         """Sizes of marks are those for an arm of 1.5 m times this."""
@@ -104,15 +113,17 @@ class Scene:
         kind: str = "estimate",
         covariance: Array | None = None,
         label: str | None = None,
+        is_point: bool = True,
     ) -> None:
         """Draw a contact: its point, its force and how uncertain the point is.
 
         Args:
             position: (3,) [m] in world.
             force: (3,) [N] on the robot, world axes; None draws the point alone.
-            kind: "estimate" or "truth", which have colours of their own.
+            kind: "estimate", "truth" or "candidate", which have colours of their own.
             covariance: (3, 3) [m2] of the position, drawn as an ellipsoid of two sigma.
             label: beside the arrow; by default the force's size.
+            is_point: False draws the force alone: the arrow does not claim to touch there.
 
         Raises:
             ValueError: an unknown kind.
@@ -123,7 +134,8 @@ class Scene:
         if label is None:
             label = "" if size is None else f"{size:.1f} N"
         force = np.asarray(force, float) if size else None
-        self.marks.append(Mark(np.asarray(position, float), force, kind, covariance, label))
+        position = np.asarray(position, float)
+        self.marks.append(Mark(position, force, kind, covariance, label, is_point))
 
     def highlight(self, link: str, strength: float = 1.0) -> None:
         """Tint a link; `strength` from 0 to 1."""
@@ -157,8 +169,8 @@ class Scene:
         canvas.hides(body)
         for triangles, tint, opacity in self._overlays():
             seen = canvas.see(triangles)
-            glow = shaded(lights, seen.normal, linear(tint)[None]) * 0.8
-            canvas.put_over(seen, glow + 0.25 * linear(tint).astype(np.float32), opacity)
+            colour = 0.5 * shaded(lights, seen.normal, linear(tint)[None], 0.6)
+            canvas.put_over(seen, colour + 0.6 * linear(tint).astype(np.float32), opacity)
         return canvas.image
 
     def _closed(self) -> NDArray[np.bool_]:
@@ -193,20 +205,25 @@ class Scene:
     def _overlays(self) -> list[tuple[Triangles, str, float]]:
         """What is drawn over the robot: (triangles, colour, opacity), in order."""
         layers, unit = [], self._unit
-        for mark in self.marks:
+        marks = sorted(self.marks, key=lambda mark: list(COLOURS).index(mark.kind))
+        for mark in marks:
             colour = COLOURS[mark.kind]
             if mark.covariance is not None:
                 axes = solids.spread(mark.covariance, SIGMAS, 1e-4)
                 layers.append((solids.ellipsoid(mark.position, axes), colour, 0.38))
-            if mark.force is not None and mark.kind == "estimate":
-                along = mark.force / np.linalg.norm(mark.force) * 0.30 * unit
-                line = solids.rod(mark.position - along, mark.position + along, 0.0012 * unit)
-                layers.append((line, colour, 0.6))
-        for mark in self.marks:
-            tail, tip = self.arrow(mark)
-            layers.append((solids.ball(tip, 0.011 * unit), COLOURS[mark.kind], 1.0))
+            if mark.force is not None and mark.is_point and mark.kind == "estimate":
+                along = mark.force / np.linalg.norm(mark.force) * 0.4 * unit
+                line = solids.rod(mark.position, mark.position + along, 0.0016 * unit)
+                layers.append((line, colour, 0.8))
+        for mark in marks:
+            # The truth is wider and clear, so that both are seen where they coincide.
+            radius, opacity = (0.0095, 0.9) if mark.kind == "truth" else (0.0065, 1.0)
+            if mark.is_point:
+                ball = solids.ball(mark.position, 1.75 * radius * unit)
+                layers.append((ball, COLOURS[mark.kind], opacity))
             if mark.force is not None:
-                layers.append((solids.arrow(tail, tip, 0.006 * unit), COLOURS[mark.kind], 1.0))
+                arrow = solids.arrow(*self.arrow(mark), radius * unit)
+                layers.append((arrow, COLOURS[mark.kind], opacity))
         return layers
 
 

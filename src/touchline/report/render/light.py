@@ -156,4 +156,4 @@ def shaded(lights: Lights, normals: Array, albedo: Array, lit: Array | float = 1
     half = lights.key + lights.eye
     half /= np.linalg.norm(half)
     gloss = (normals @ half).clip(0) ** 48 * lit * 0.22
-    return (light * albedo * 0.72 + gloss[:, None]).astype(np.float32)
+    return (light * albedo * 0.86 + gloss[:, None]).astype(np.float32)
