@@ -29,7 +29,7 @@ FORCE_SCALE, SHORTEST, LONGEST = 0.010, 0.09, 0.42  # m/N, m, m, for an arm of 1
 # Okabe and Ito's vermilion and blue: told apart with any colour vision.
 COLOURS = {"truth": "#0072b2", "estimate": "#d55e00", "candidate": "#e69f00"}
 SHELL, TRIM, TINT = "#f1f2f4", "#5d646d", "#ffd39e"
-SKY, FLOOR = "#fbfcfd", "#eceff3"
+SKY, FLOOR = "#f8f9fb", "#e4e8ed"
 
 ENCODED = (np.linspace(0, 1, 1 << 14) ** (1 / 2.2) * 255 + 0.5).astype(np.uint8)
 
@@ -71,9 +71,10 @@ class Scene:
 
     def __init__(self, robot: Robot, q: Array) -> None:
         self.robot = robot
+        self.q = np.array(q, float)
         self.marks: list[Mark] = []
         self._tints: dict[str, float] = {}
-        self._skin = posed_skin(robot, np.asarray(q, float))
+        self._skin = posed_skin(robot, self.q)
         self._surface = Triangles.joined([triangles for _, triangles in self._skin])
 
     @property

@@ -29,11 +29,11 @@ class Lights:
     @staticmethod
     def of(camera: Camera) -> "Lights":
         """The key light from above and the left of the camera, the fill from its right."""
-        right, back, up = camera.axes[0], -camera.axes[2], np.array([0.0, 0.0, 1.0])
-        level = np.cross(right, up)
-        key = -0.62 * right - 0.62 * level + 1.0 * up
-        fill = 0.9 * right - 0.4 * level + 0.25 * up
-        return Lights(key / np.linalg.norm(key), fill / np.linalg.norm(fill), back)
+        right, up = camera.axes[0], np.array([0.0, 0.0, 1.0])
+        near = np.cross(right, up)  # level, towards the camera
+        key = -0.75 * right + 0.55 * near + 1.0 * up
+        fill = 0.9 * right + 0.3 * near + 0.1 * up
+        return Lights(key / np.linalg.norm(key), fill / np.linalg.norm(fill), -camera.axes[2])
 
 
 class ShadowMap:
@@ -156,4 +156,4 @@ def shaded(lights: Lights, normals: Array, albedo: Array, lit: Array | float = 1
     half = lights.key + lights.eye
     half /= np.linalg.norm(half)
     gloss = (normals @ half).clip(0) ** 48 * lit * 0.22
-    return (light * albedo * 0.86 + gloss[:, None]).astype(np.float32)
+    return (light * albedo * 0.77 + gloss[:, None]).astype(np.float32)
