@@ -92,7 +92,7 @@ def event_scene(
     position = _position(robot, event, q)
     if position is not None and event.link is not None:
         scene.highlight(event.link)
-        covariance = _disc(robot, event, position, q)
+        covariance = _disc(scene, event, position)
         scene.add_contact(position, event.force, "estimate", covariance)
     else:
         _show_doubt(scene, event)
@@ -107,11 +107,10 @@ def _position(robot: Robot, event: Event, q: Array) -> Array | None:
     return T[:3, :3] @ event.position_link + T[:3, 3]
 
 
-def _disc(robot: Robot, event: Event, position: Array, q: Array) -> Array | None:
+def _disc(scene: Scene, event: Event, position: Array) -> Array | None:
     """A covariance (3, 3) [m2] along the surface with the trace that the event tells."""
     if event.position_std is None or event.link is None:
         return None
-    scene = Scene(robot, q)
     own = np.array([piece.link == event.link for piece in scene.pieces])[scene.surface.part]
     corners = scene.surface.corners[own]
     if not len(corners):
