@@ -108,6 +108,21 @@ class Touch:
     force: Array
     moment: Array
 
+    def wrench(self) -> Array:
+        """The wrench (6,) about the world's origin, world axes [N, Nm]."""
+        out = np.empty(6)
+        out[:3], out[3:] = self.force, cross(self.point, self.force) + self.moment
+        return out
+
+
+NOTHING = np.zeros(3)
+NOTHING.setflags(write=False)
+
+
+def no_touch(link: str) -> Touch:
+    """A slot in which nothing touches."""
+    return Touch(False, link, NOTHING, NOTHING, NOTHING)
+
 
 class ScriptedForces:
     """Applies scripted contacts to a plant, each held over a step."""
@@ -116,25 +131,26 @@ class ScriptedForces:
 
     def __init__(self, contacts: Sequence[ScriptedContact]) -> None:
         self.contacts = tuple(contacts)
-        self._touches: list[Touch] = []
-        self._arms: list[Array] = []
+        self._idle = [no_touch(contact.link) for contact in self.contacts]
+        self._touches = self._idle
+        self._arms: dict[int, Array] = {}  # of active slots, from the centre of mass
 
     def __len__(self) -> int:
         return len(self.contacts)
 
-    def apply(self, plant: Plant) -> None:
+    def apply(self, plant: Plant) -> bool:
         """Sets the forces of the plant's present time; to be called after `evaluate`."""
-        self._touches = [_touch(contact, plant) for contact in self.contacts]
-        applied = plant.data.xfrc_applied
-        applied[:] = 0.0
-        self._arms = []
-        for touch in self._touches:
-            body = plant.bodies[touch.link]
-            arm = touch.point - plant.data.xipos[body]
-            self._arms.append(arm)
-            if touch.active:
-                applied[body, :3] += touch.force
-                applied[body, 3:] += cross(arm, touch.force) + touch.moment
+        acted = bool(self._arms)
+        for slot in self._arms:
+            plant.data.xfrc_applied[plant.bodies[self.contacts[slot].link]] = 0.0
+        self._arms = {}
+        self._touches = list(self._idle)
+        for slot, contact in enumerate(self.contacts):
+            strength = contact.profile.at(plant.time)
+            if strength > 0.0:
+                self._touches[slot] = touch = _touch(contact, strength, plant)
+                self._arms[slot] = _push(plant, touch)
+        return acted or bool(self._arms)
 
     def touches(self, plant: Plant) -> list[Touch]:
         """The forces that act now, be it just after `apply` or at the end of the step.
@@ -142,10 +158,24 @@ class ScriptedForces:
         MuJoCo holds force and moment about the centre of mass over a step, so until the next
         `apply` the point moves with that centre without turning about it.
         """
-        return [
-            Touch(t.active, t.link, plant.data.xipos[plant.bodies[t.link]] + arm, t.force, t.moment)
-            for t, arm in zip(self._touches, self._arms, strict=True)
-        ]
+        if not self._arms:
+            return self._idle
+        now = list(self._idle)
+        for slot, arm in self._arms.items():
+            touch = self._touches[slot]
+            point = plant.data.xipos[plant.bodies[touch.link]] + arm
+            now[slot] = Touch(True, touch.link, point, touch.force, touch.moment)
+        return now
+
+
+def _push(plant: Plant, touch: Touch) -> Array:
+    """Adds a force to a body; returns its point (3,) from the centre of mass [m]."""
+    body = plant.bodies[touch.link]
+    arm = touch.point - plant.data.xipos[body]
+    applied = plant.data.xfrc_applied[body]
+    applied[:3] += touch.force
+    applied[3:] += cross(arm, touch.force) + touch.moment
+    return arm
 
 
 def cross(a: Array, b: Array) -> Array:
@@ -154,13 +184,15 @@ def cross(a: Array, b: Array) -> Array:
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
-def _touch(contact: ScriptedContact, plant: Plant) -> Touch:
+def _touch(contact: ScriptedContact, strength: float, plant: Plant) -> Touch:
     body = plant.bodies[contact.link]
     R = plant.data.xmat[body].reshape(3, 3)
-    strength = contact.profile.at(plant.time)
-    point, force, moment = contact.point, strength * contact.force, strength * contact.moment
+    point, force, moment = (
+        np.asarray(value, float) for value in (contact.point, contact.force, contact.moment)
+    )
+    force, moment = strength * force, strength * moment
     if contact.point_frame == "link":
         point = plant.data.xpos[body] + R @ point
     if contact.force_frame == "link":
         force, moment = R @ force, R @ moment
-    return Touch(strength > 0.0, contact.link, point, force, moment)
+    return Touch(True, contact.link, point, force, moment)

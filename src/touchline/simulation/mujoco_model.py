@@ -7,6 +7,7 @@ between any two of them exists in the simulation.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,10 @@ class PlantModel:
     joints: dict[str, int]
 
 
+def _mujoco() -> Any:  # its stubs lack most names
+    return import_module("mujoco")
+
+
 def build_model(
     robot: Robot,
     step: float,
@@ -56,13 +61,11 @@ def build_model(
     Raises:
         InputError: a moving joint carries no mass.
     """
-    import mujoco
-
     mechanism = mechanism or robot.mechanism
-    spec = mujoco.MjSpec()
+    spec = _mujoco().MjSpec()
     spec.option.timestep = step
     spec.option.gravity = np.asarray(robot.gravity)
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    spec.option.integrator = _mujoco().mjtIntegrator.mjINT_RK4
     spec.compiler.degree = False
     bodies = _add_links(spec, robot, mechanism, armature or {})
     _add_mimics(spec, mechanism, step)
@@ -120,12 +123,10 @@ def _locked_position(joint: Joint, locked: Mapping[str, float]) -> float:
 
 
 def _add_joint(body: Any, joint: Joint, armature: float) -> None:
-    import mujoco
-
-    hinge, slide = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
+    kinds = _mujoco().mjtJoint
     body.add_joint(
         name=f"joint:{joint.name}",
-        type=hinge if joint.kind == "revolute" else slide,
+        type=kinds.mjJNT_HINGE if joint.kind == "revolute" else kinds.mjJNT_SLIDE,
         axis=joint.axis,
         armature=armature,
     )
@@ -133,8 +134,6 @@ def _add_joint(body: Any, joint: Joint, armature: float) -> None:
 
 def _add_mimics(spec: Any, mechanism: Mechanism, step: float) -> None:
     """Each mimicking joint follows its master by as stiff a constraint as the step allows."""
-    import mujoco
-
     present = {joint.name for joint in spec.joints}
     for joint in mechanism.joints.values():
         if joint.mimic is None or f"joint:{joint.name}" not in present:
@@ -142,8 +141,8 @@ def _add_mimics(spec: Any, mechanism: Mechanism, step: float) -> None:
         data = np.zeros(11)
         data[:2] = joint.mimic.offset, joint.mimic.multiplier
         spec.add_equality(
-            type=mujoco.mjtEq.mjEQ_JOINT,
-            objtype=mujoco.mjtObj.mjOBJ_JOINT,
+            type=_mujoco().mjtEq.mjEQ_JOINT,
+            objtype=_mujoco().mjtObj.mjOBJ_JOINT,
             name1=f"joint:{joint.name}",
             name2=f"joint:{joint.mimic.joint}",
             data=data,
@@ -153,22 +152,17 @@ def _add_mimics(spec: Any, mechanism: Mechanism, step: float) -> None:
 
 
 def _add_sensor(spec: Any, body: Any, name: str, T_link_sensor: Array) -> None:
-    import mujoco
-
     site = f"sensor:{name}"
     body.add_site(name=site, pos=T_link_sensor[:3, 3], quat=quaternion(T_link_sensor[:3, :3]))
-    for kind in (mujoco.mjtSensor.mjSENS_FORCE, mujoco.mjtSensor.mjSENS_TORQUE):
-        spec.add_sensor(
-            name=f"{kind.name}:{name}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=site
-        )
+    kinds, on_site = _mujoco().mjtSensor, _mujoco().mjtObj.mjOBJ_SITE
+    for kind in (kinds.mjSENS_FORCE, kinds.mjSENS_TORQUE):
+        spec.add_sensor(name=f"{kind.name}:{name}", type=kind, objtype=on_site, objname=site)
 
 
 def quaternion(R: Array) -> Array:
     """The quaternion (4,) w, x, y, z of a rotation (3, 3)."""
-    import mujoco
-
     out = np.empty(4)
-    mujoco.mju_mat2Quat(out, np.ascontiguousarray(R).ravel())
+    _mujoco().mju_mat2Quat(out, np.ascontiguousarray(R).ravel())
     return out
 
 
@@ -189,14 +183,12 @@ def _add_inertia(body: Any, inertia: Inertia) -> None:
 
 
 def _set_inertias(model: Any, mechanism: Mechanism, bodies: Mapping[str, int]) -> None:
-    import mujoco
-
     for name, body in bodies.items():
         inertia = mechanism.links[name].inertia
         model.body_mass[body] = inertia.mass
         model.body_inertia[body] = _principal(inertia.inertia)[0]
     _refuse_massless(model)
-    mujoco.mj_setConst(model, mujoco.MjData(model))
+    _mujoco().mj_setConst(model, _mujoco().MjData(model))
 
 
 def _refuse_massless(model: Any) -> None:

@@ -11,7 +11,7 @@ from touchline.estimation.samples import Samples
 from touchline.model.mechanism import Inertia, Mechanism
 from touchline.model.robot import Robot
 from touchline.model.transforms import rotation_rpy
-from touchline.simulation.simulator import Readings
+from touchline.simulation.readings import Readings
 
 Array = NDArray[np.float64]
 NOISE_RATE = 1000.0  # Hz at which the sigmas hold; white noise grows with the root of the rate
@@ -154,7 +154,7 @@ def perturbed(mechanism: Mechanism, fraction: float, rng: np.random.Generator) -
 
 def _perturbed_inertia(body: Inertia, fraction: float, rng: np.random.Generator) -> Inertia:
     scale = np.maximum(1.0 + fraction * rng.normal(size=2), 0.1)
-    R = rotation_rpy(fraction * rng.normal(size=3))
+    R = rotation_rpy((fraction * rng.normal(size=3)).tolist())
     shift = fraction * 0.1 * rng.normal(size=3) if body.mass else np.zeros(3)
     # The inertia follows its mass, so that a body stays possible.
     inertia = scale[0] * scale[1] * R @ body.inertia @ R.T

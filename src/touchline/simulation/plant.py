@@ -9,6 +9,8 @@ before and after an input has changed.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +28,8 @@ class Reading:
 
     Attributes:
         link_torque: (n,) torque that passes from the drive into the link [Nm or N].
-        motor_torque: (n,) torque of the motor, before rotor and friction [Nm or N].
+        motor_torque: (n,) torque of the motor, before rotor and friction [Nm or N]; springs and
+            dampers set in the model count as the motor's.
         wrench: (k, 6) on the outboard body, sensor frame [N, Nm].
     """
 
@@ -55,15 +58,13 @@ class Plant:
         armature: Mapping[str, float] | None = None,
         addition: Addition | None = None,
     ) -> None:
-        import mujoco
-
-        self._mj = mujoco
+        self._mj: Any = import_module("mujoco")  # its stubs lack most names
         self.robot, self.rate = robot, rate
         joints = robot.description.joints
         motors = {j.name: j.rotor_inertia for j in joints if j.torque == "motor"}
         built = build_model(robot, 1.0 / rate, mechanism, {**motors, **(armature or {})}, addition)
         self.model, self.bodies = built.model, built.bodies
-        self.data = mujoco.MjData(self.model)
+        self.data = self._mj.MjData(self.model)
         self._dofs = np.array([built.joints[j.name] for j in joints], dtype=int)
         self._set_couplings(built.joints)
         self._site_ids = [self.model.site(f"sensor:{s}").id for s in robot.sensor_names]
@@ -113,10 +114,17 @@ class Plant:
         self._mj.mj_fwdPosition(self.model, self.data)
         self._mj.mj_fwdVelocity(self.model, self.data)
 
-    def command(self, torque: Array) -> None:
-        """Sets the motors' torques (n,) [Nm or N]; motor-side friction is taken off here."""
+    def command(self, torque: Array) -> bool:
+        """Sets the motors' torques (n,) [Nm or N]; motor-side friction is taken off here.
+
+        Returns:
+            Whether anything has changed.
+        """
+        if self._friction is None and np.array_equal(torque, self._motor_torque):
+            return False
         self._motor_torque[:] = torque
         self.data.qfrc_applied[self._dofs] = torque - self.friction_torque()
+        return True
 
     def accelerate(self) -> None:
         """Computes accelerations and contact forces for the inputs that are set."""
@@ -139,7 +147,7 @@ class Plant:
         k = len(self._site_ids)
         return Reading(
             self._P.T @ transmitted,
-            self._motor_torque.copy(),
+            self._motor_torque + d.qfrc_passive[self._dofs],
             d.sensordata[: 6 * k].reshape(k, 6).copy(),
         )
 
@@ -190,9 +198,15 @@ class Plant:
         T[:3, 3] = self.data.xpos[body]
         return T
 
-    def sensor_rotations(self) -> Array:
-        """Axes (k, 3, 3) of the sensors in world at the state."""
-        return self.data.site_xmat[self._site_ids].reshape(-1, 3, 3)
+    def log_rotations(self) -> Array:
+        """Rotations (k, 3, 3) from the sensors' axes to those in which their logs are given."""
+        rotations = self.data.site_xmat[self._site_ids].reshape(-1, 3, 3)
+        for s, sensor in enumerate(self.robot.description.sensors):
+            if sensor.frame == "sensor":
+                rotations[s] = np.eye(3)
+            elif sensor.frame != "world":
+                rotations[s] = self.link_pose(sensor.frame)[:3, :3].T @ rotations[s]
+        return rotations
 
     def sensor_weights(self) -> Array:
         """Gravity's wrench (k, 6) on all that each sensor carries, sensor frame [N, Nm]."""

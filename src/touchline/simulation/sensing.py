@@ -10,7 +10,7 @@ from touchline.estimation.samples import Samples
 from touchline.model.description import AXES, JointDescription, SensorDescription
 from touchline.model.robot import Robot
 from touchline.simulation.noise import SensorNoise
-from touchline.simulation.simulator import Readings
+from touchline.simulation.readings import Readings
 
 Array = NDArray[np.float64]
 
@@ -54,9 +54,9 @@ def _joint_log(joint: JointDescription, j: int, readings: Readings) -> Array:
         friction, qd = joint.friction, readings.qd[:, j]
         shown = readings.link_torque[:, j] + friction.viscous * qd
         shown = shown + friction.coulomb * np.tanh(qd / friction.coulomb_width)
-    if joint.compensated == "gravity":
+    if joint.compensated == "gravity" and readings.gravity_torque is not None:
         shown = shown - readings.gravity_torque[:, j]
-    elif joint.compensated == "model":
+    elif joint.compensated == "model" and readings.motion_torque is not None:
         shown = shown - readings.motion_torque[:, j]
     reading = joint.sign * (shown + joint.bias)
     logged = np.clip(reading, -joint.range, joint.range) / joint.gain
@@ -66,13 +66,13 @@ def _joint_log(joint: JointDescription, j: int, readings: Readings) -> Array:
 def _sensor_log(sensor: SensorDescription, s: int, readings: Readings) -> Array:
     """The wrench (N, 6) as the sensor's log gives it; axes that it lacks are NaN."""
     wrench = readings.wrench[:, s]
-    if sensor.compensated == "gravity":
+    if sensor.compensated == "gravity" and readings.weight is not None:
         wrench = wrench + readings.weight[:, s]
     sign = 1.0 if sensor.polarity == "outboard" else -1.0
     limit = np.asarray(sensor.range)
     shown = np.clip(sign * (wrench + np.asarray(sensor.bias)), -limit, limit)
-    if sensor.frame != "sensor":
-        R = np.swapaxes(readings.R_world_log[:, s], 1, 2) @ readings.R_world_sensor[:, s]
+    if sensor.frame != "sensor" and readings.R_log_sensor is not None:
+        R = readings.R_log_sensor[:, s]
         shown = np.einsum("nij,naj->nai", R, shown.reshape(-1, 2, 3)).reshape(-1, 6)
     shown = delayed(readings.time, shown, sensor.delay)
     shown[:, [axis not in sensor.axes for axis in AXES]] = np.nan

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.estimation.samples import Samples
+from touchline.simulation.contacts import Touch
 
 Array = NDArray[np.float64]
 
@@ -74,6 +75,54 @@ class Simulated:
     samples: Samples
     truth: Truth
     metadata: dict[str, Any] = field(default_factory=dict)
+
+
+class TruthRecorder:
+    """Collects a run's truth: at the log's instants, and the means over the time between."""
+
+    def __init__(self, links: tuple[str, ...], slots: int, rows: int, stride: int) -> None:
+        self._index = {name: i for i, name in enumerate(links)}
+        self._weight = 0.5 / stride
+        none = np.full((rows, slots), -1)
+        three = (rows, slots, 3)
+        self.truth = Truth(
+            links,
+            none,
+            np.full(three, np.nan),
+            np.zeros(three),
+            np.zeros(three),
+            np.zeros((rows, slots, 6)),
+            none.copy(),
+        )
+        self._clear()
+
+    def _clear(self) -> None:
+        slots = self.truth.link.shape[1]
+        self._sum = np.zeros((slots, 6))
+        self._touched = [-1] * slots
+
+    def add(self, touches: list[Touch]) -> None:
+        """What acts at either end of a physics step counts half."""
+        for slot, touch in enumerate(touches):
+            if touch.active:
+                self._sum[slot] += self._weight * touch.wrench()
+                self._touched[slot] = self._index[touch.link]
+
+    def close(self, row: int) -> None:
+        """Stores the means up to a sample; to be called before anything of the next is added."""
+        self.truth.wrench_mean[row], self.truth.link_mean[row] = self._sum, self._touched
+        self._clear()
+
+    def put(self, row: int, before: list[Touch], after: list[Touch]) -> None:
+        """Stores a sample: the mean of just before and just after the inputs have changed."""
+        truth = self.truth
+        for slot, (a, b) in enumerate(zip(before, after, strict=True)):
+            shown = b if b.active or not a.active else a
+            if shown.active:
+                truth.link[row, slot] = self._index[shown.link]
+                truth.point[row, slot] = shown.point
+                truth.force[row, slot] = (a.force + b.force) / 2
+                truth.moment[row, slot] = (a.moment + b.moment) / 2
 
 
 def filter_truth(mean: Array, time: Array, bandwidth: float) -> Array:

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What ideal sensors read over a simulated run."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.simulation.plant import Plant, Reading
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Readings:
+    """N samples of ideal sensors, and what is needed to log them in any convention.
+
+    Attributes:
+        time: (N,) [s].
+        q, qd: (N, n) [rad or m].
+        link_torque, motor_torque: (N, n) [Nm or N]; see `Reading`.
+        wrench: (N, k, 6) on the outboard body, sensor frame [N, Nm].
+        gravity_torque: (N, n) that holds the robot; None where no driver takes it out.
+        motion_torque: (N, n) that moves it as well; None where no driver takes it out.
+        weight: (N, k, 6) gravity's wrench on what the sensor carries, sensor frame; None where no
+            sensor takes it out.
+        R_log_sensor: (N, k, 3, 3) turns sensor axes into those of the log; None if all are the
+            sensors' own.
+    """
+
+    time: Array
+    q: Array
+    qd: Array
+    link_torque: Array
+    motor_torque: Array
+    wrench: Array
+    gravity_torque: Array | None
+    motion_torque: Array | None
+    weight: Array | None
+    R_log_sensor: Array | None
+
+    @classmethod
+    def empty(cls, plant: Plant, count: int) -> Self:
+        """Room for `count` samples of what the plant's description calls for."""
+        description = plant.robot.description
+        n, k = len(description.joints), len(description.sensors)
+        compensated = {joint.compensated for joint in description.joints}
+        weighed = any(sensor.compensated == "gravity" for sensor in description.sensors)
+        turned = any(sensor.frame != "sensor" for sensor in description.sensors)
+        q, qd, link_torque, motor_torque = np.empty((4, count, n))
+        return cls(
+            np.empty(count),
+            q,
+            qd,
+            link_torque,
+            motor_torque,
+            np.empty((count, k, 6)),
+            np.empty((count, n)) if "gravity" in compensated else None,
+            np.empty((count, n)) if "model" in compensated else None,
+            np.empty((count, k, 6)) if weighed else None,
+            np.empty((count, k, 3, 3)) if turned else None,
+        )
+
+    def put(self, row: int, plant: Plant, before: Reading, after: Reading) -> None:
+        """Stores the mean of two readings of the plant's present state."""
+        self.time[row] = round(plant.time * plant.rate) / plant.rate
+        self.q[row], self.qd[row] = plant.q, plant.qd
+        if before is after:
+            self.link_torque[row], self.motor_torque[row] = after.link_torque, after.motor_torque
+            self.wrench[row] = after.wrench
+        else:
+            self.link_torque[row] = (before.link_torque + after.link_torque) / 2
+            self.motor_torque[row] = (before.motor_torque + after.motor_torque) / 2
+            self.wrench[row] = (before.wrench + after.wrench) / 2
+        if self.gravity_torque is not None:
+            self.gravity_torque[row] = plant.gravity_torque()
+        if self.motion_torque is not None:
+            self.motion_torque[row] = plant.motion_torque()
+        if self.weight is not None:
+            self.weight[row] = plant.sensor_weights()
+        if self.R_log_sensor is not None:
+            self.R_log_sensor[row] = plant.log_rotations()
