@@ -8,6 +8,7 @@ from touchline import __version__
 from touchline.cli.analyze import analyze
 from touchline.cli.bench import bench
 from touchline.cli.check import check
+from touchline.cli.reproduce import reproduce
 from touchline.errors import InputError
 from touchline.model.suggest import did_you_mean
 
@@ -22,7 +23,12 @@ usage: touchline COMMAND ...
 `touchline COMMAND --help` explains a command; `touchline --version` names the version.
 Exit status: 0 done, 1 failure (check: findings), 2 bad input."""
 
-COMMANDS: dict[str, Callable[..., int]] = {"analyze": analyze, "check": check, "bench": bench}
+COMMANDS: dict[str, Callable[..., int]] = {
+    "analyze": analyze,
+    "check": check,
+    "bench": bench,
+    "reproduce": reproduce,
+}
 
 EXTRAS = {
     "pyarrow": "logs",
