@@ -1,23 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 // The native core for Python: thin, no logic of its own.
 #include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include <memory>
+#include <algorithm>
 #include <stdexcept>
-#include <string>
+#include <utility>
+#include <vector>
 
+#include "arrays.hpp"
+#include "contact_bindings.hpp"
 #include "touchline/detector.hpp"
 #include "touchline/observer.hpp"
+
+// Types for the stub; what is not an array of float64 of the right shape is a TypeError.
+#define TOUCHLINE_ARRAY "numpy.typing.NDArray[numpy.float64]"
+#define TOUCHLINE_SIGNALS "q: object, qd: object, tau: object, wrench: object"
 
 namespace nb = nanobind;
 using namespace nb::literals;
 namespace tl = touchline;
-
-using In = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
-using Out = nb::ndarray<nb::numpy, double>;
 
 namespace {
 
@@ -32,128 +35,117 @@ tl::Mat3 mat3(const std::vector<double>& m) {
   return {{m[0], m[3], m[6]}, {m[1], m[4], m[7]}, {m[2], m[5], m[8]}};
 }
 
-// A numpy array that owns `size` numbers.
-struct Buffer {
-  std::unique_ptr<double[]> data;
-  explicit Buffer(std::size_t size) : data(new double[size]) {}
-  Out release(std::initializer_list<std::size_t> shape) {
-    double* raw = data.release();
-    nb::capsule owner(raw, [](void* p) noexcept { delete[] static_cast<double*>(p); });
-    return Out(raw, shape, owner);
-  }
+// One sample, checked.
+tl::Sample sample(const tl::Observer& o, double time, nb::handle q, nb::handle qd, nb::handle tau,
+                  nb::handle wrench) {
+  const std::size_t n = o.row_layout().joints, k = o.row_layout().sensors;
+  return {time, arrays::numbers(q, {n}), arrays::numbers(qd, {n}), arrays::numbers(tau, {n}),
+          arrays::numbers(wrench, {k, 6})};
+}
+
+void step(tl::Observer& o, double time, nb::handle q, nb::handle qd, nb::handle tau,
+          nb::handle wrench) {
+  o.step(sample(o, time, q, qd, tau, wrench));
+}
+
+nb::object update(tl::Observer& o, double time, nb::handle q, nb::handle qd, nb::handle tau,
+                  nb::handle wrench) {
+  const double* row = o.step(sample(o, time, q, qd, tau, wrench));
+  arrays::Out out({o.output().size()});
+  std::copy_n(row, o.output().size(), out.data());
+  return out.release();
+}
+
+// N samples: how many, and where the signals of the first stand.
+struct Recording {
+  std::size_t rows;
+  const double* time;
+  tl::Sample first;
 };
 
-void expect(const In& array, std::size_t size, const char* name) {
-  if (array.size() != size)
-    throw std::invalid_argument(std::string(name) + " has " + std::to_string(array.size()) +
-                                " numbers, expected " + std::to_string(size));
-}
-
-void expect_sample(const tl::Observer& o, std::size_t rows, const In& q, const In& qd,
-                   const In& tau, const In& wrench) {
+Recording recording(const tl::Observer& o, nb::handle time, nb::handle q, nb::handle qd,
+                    nb::handle tau, nb::handle wrench) {
   const std::size_t n = o.row_layout().joints, k = o.row_layout().sensors;
-  expect(q, rows * n, "q");
-  expect(qd, rows * n, "qd");
-  expect(tau, rows * n, "tau");
-  expect(wrench, rows * k * 6, "wrench");
+  const std::size_t rows = arrays::length(time);
+  return {rows, arrays::numbers(time, {rows}),
+          {0.0, arrays::numbers(q, {rows, n}), arrays::numbers(qd, {rows, n}),
+           arrays::numbers(tau, {rows, n}), arrays::numbers(wrench, {rows, k, 6})}};
 }
 
-void step(tl::Observer& o, double time, const In& q, const In& qd, const In& tau,
-          const In& wrench) {
-  expect_sample(o, 1, q, qd, tau, wrench);
-  o.step(time, q.data(), qd.data(), tau.data(), wrench.data());
-}
-
-Out update(tl::Observer& o, double time, const In& q, const In& qd, const In& tau,
-           const In& wrench) {
-  step(o, time, q, qd, tau, wrench);
-  const std::size_t width = o.output().size();
-  Buffer row(width);
-  std::copy(o.output().begin(), o.output().end(), row.data.get());
-  return row.release({width});
-}
-
-Out run(tl::Observer& o, const In& time, const In& q, const In& qd, const In& tau,
-        const In& wrench) {
-  const std::size_t rows = time.size();
-  expect_sample(o, rows, q, qd, tau, wrench);
-  const std::size_t width = o.output().size();
-  Buffer out(rows * width);
+nb::object run(tl::Observer& o, nb::handle time, nb::handle q, nb::handle qd, nb::handle tau,
+               nb::handle wrench) {
+  const Recording in = recording(o, time, q, qd, tau, wrench);
+  arrays::Out out({in.rows, o.output().size()});
   {
     nb::gil_scoped_release release;
-    o.run(rows, time.data(), q.data(), qd.data(), tau.data(), wrench.data(), out.data.get());
+    o.run(in.rows, in.time, in.first.q, in.first.qd, in.first.tau, in.first.wrench, out.data());
   }
-  return out.release({rows, width});
+  return out.release();
 }
 
 // One sample through observer and detector: the observer's row, the level of each segment, the
 // normalized rows.
-nb::tuple detect(tl::Observer& o, tl::Detector& d, double time, const In& q, const In& qd,
-                 const In& tau, const In& wrench) {
-  Out row = update(o, time, q, qd, tau, wrench);
-  d.step(row.data());
-  const std::size_t m = d.levels().size(), r = d.rows().size();
-  Buffer levels(m), normalized(r);
-  std::copy(d.levels().begin(), d.levels().end(), levels.data.get());
-  std::copy(d.normalized().begin(), d.normalized().end(), normalized.data.get());
-  return nb::make_tuple(row, levels.release({m}), normalized.release({r}));
+nb::tuple detect(tl::Observer& o, tl::Detector& d, double time, nb::handle q, nb::handle qd,
+                 nb::handle tau, nb::handle wrench) {
+  const double* row = o.step(sample(o, time, q, qd, tau, wrench));
+  d.step(row);
+  arrays::Out out({o.output().size()}), levels({d.levels().size()}), tests({d.rows().size()});
+  std::copy_n(row, o.output().size(), out.data());
+  std::copy(d.levels().begin(), d.levels().end(), levels.data());
+  std::copy(d.normalized().begin(), d.normalized().end(), tests.data());
+  return nb::make_tuple(out.release(), levels.release(), tests.release());
 }
 
-nb::tuple detect_run(tl::Observer& o, tl::Detector& d, const In& time, const In& q, const In& qd,
-                     const In& tau, const In& wrench) {
-  const std::size_t rows = time.size();
-  expect_sample(o, rows, q, qd, tau, wrench);
-  const std::size_t width = o.output().size(), m = d.levels().size(), r = d.rows().size();
-  Buffer out(rows * width), levels(rows * m), normalized(rows * r);
+// The same for N samples.
+nb::tuple detect_run(tl::Observer& o, tl::Detector& d, nb::handle time, nb::handle q,
+                     nb::handle qd, nb::handle tau, nb::handle wrench) {
+  const Recording in = recording(o, time, q, qd, tau, wrench);
+  arrays::Out out({in.rows, o.output().size()}), levels({in.rows, d.levels().size()}),
+      tests({in.rows, d.rows().size()});
   {
     nb::gil_scoped_release release;
-    double* level = levels.data.get();
-    double* x = normalized.data.get();
-    o.run(rows, time.data(), q.data(), qd.data(), tau.data(), wrench.data(), out.data.get(),
-          [&](const double* row) {
-            d.step(row);
-            level = std::copy(d.levels().begin(), d.levels().end(), level);
-            x = std::copy(d.normalized().begin(), d.normalized().end(), x);
-          });
+    double *level = levels.data(), *x = tests.data();
+    o.run(in.rows, in.time, in.first.q, in.first.qd, in.first.tau, in.first.wrench, out.data(), [&](const double* row) {
+      d.step(row);
+      level = std::copy(d.levels().begin(), d.levels().end(), level);
+      x = std::copy(d.normalized().begin(), d.normalized().end(), x);
+    });
   }
-  return nb::make_tuple(out.release({rows, width}), levels.release({rows, m}),
-                        normalized.release({rows, r}));
+  return nb::make_tuple(out.release(), levels.release(), tests.release());
 }
 
 // Momentum and n-bar: joint rows, then six rows per sensor in its own frame.
-nb::tuple terms(tl::Observer& o, const In& q, const In& qd) {
+nb::tuple terms(tl::Observer& o, nb::handle q, nb::handle qd) {
   const tl::RowLayout& layout = o.row_layout();
-  expect(q, layout.joints, "q");
-  expect(qd, layout.joints, "qd");
+  const std::size_t joints = layout.joints, size = joints + 6 * layout.sensors;
+  const double* speeds = arrays::numbers(qd, {joints});
   tl::Terms<double>& model = o.terms();
-  model.sweep(q.data(), qd.data());
-  const std::size_t size = layout.joints + 6 * layout.sensors;
-  Buffer p(size), n(size);
-  for (int j = 0; j < layout.joints; ++j)
-    model.joint_row(j, qd.data()[j], p.data[j], n.data[j]);
+  model.sweep(arrays::numbers(q, {joints}), speeds);
+  arrays::Out p({size}), n({size});
+  for (std::size_t j = 0; j < joints; ++j)
+    model.joint_row(j, speeds[j], p.data()[j], n.data()[j]);
   for (int s = 0; s < layout.sensors; ++s) {
     tl::Spatial momentum, bias;
     model.sensor_row(s, momentum, bias);
-    tl::store(momentum, p.data.get() + layout.joints + 6 * s);
-    tl::store(bias, n.data.get() + layout.joints + 6 * s);
+    tl::store(momentum, p.data() + joints + 6 * s);
+    tl::store(bias, n.data() + joints + 6 * s);
   }
-  return nb::make_tuple(p.release({size}), n.release({size}));
+  return nb::make_tuple(p.release(), n.release());
 }
 
 // Poses (n_nodes, 4, 4) of all nodes in world.
-Out poses(tl::Observer& o, const In& q) {
+nb::object poses(tl::Observer& o, nb::handle q) {
   const std::size_t n = o.row_layout().joints, count = o.tree().nodes().size();
-  expect(q, n, "q");
   const std::vector<double> rest(n, 0.0);
-  o.terms().sweep(q.data(), rest.data());
-  Buffer out(16 * count);
+  o.terms().sweep(arrays::numbers(q, {n}), rest.data());
+  arrays::Out out({count, 4, 4});
   for (std::size_t i = 0; i < count; ++i) {
     const tl::NodeState<double>& X = o.terms().state().node(static_cast<int>(i));
     const double rows[16] = {X.R.x.x, X.R.y.x, X.R.z.x, X.p.x, X.R.x.y, X.R.y.y, X.R.z.y, X.p.y,
                              X.R.x.z, X.R.y.z, X.R.z.z, X.p.z, 0.0,     0.0,     0.0,     1.0};
-    std::copy(rows, rows + 16, out.data.get() + 16 * i);
+    std::copy(rows, rows + 16, out.data() + 16 * i);
   }
-  return out.release({count, 4, 4});
+  return out.release();
 }
 
 nb::dict row_slices(const tl::Observer& o) {
@@ -282,9 +274,11 @@ void bind_detector(nb::module_& m) {
 }
 
 NB_MODULE(_core, m) {
+  arrays::initialize();
   bind_enums(m);
   bind_rows(m);
   bind_detector(m);
+  bind_contact(m);
   nb::class_<tl::Observer>(m, "Observer")
       .def("__init__",
            [](tl::Observer* self, std::vector<tl::Node> nodes, const std::vector<double>& gravity,
@@ -293,22 +287,22 @@ NB_MODULE(_core, m) {
              new (self) tl::Observer(tl::Tree(std::move(nodes), vec3(gravity)), std::move(joints),
                                      std::move(sensors), method, discretization);
            })
-      .def("step", &step, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a)
-      .def("update", &update, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a)
-      .def("run", &run, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a)
-      .def("terms", &terms, "q"_a, "qd"_a)
-      .def("poses", &poses, "q"_a)
+      .def("step", &step, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a,
+           nb::sig("def step(self, time: float, " TOUCHLINE_SIGNALS ") -> None"))
+      .def("update", &update, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a,
+           nb::sig("def update(self, time: float, " TOUCHLINE_SIGNALS ") -> " TOUCHLINE_ARRAY))
+      .def("run", &run, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a,
+           nb::sig("def run(self, time: object, " TOUCHLINE_SIGNALS ") -> " TOUCHLINE_ARRAY))
+      .def("terms", &terms, "q"_a, "qd"_a,
+           nb::sig("def terms(self, q: object, qd: object) -> "
+                   "tuple[" TOUCHLINE_ARRAY ", " TOUCHLINE_ARRAY "]"))
+      .def("poses", &poses, "q"_a, nb::sig("def poses(self, q: object) -> " TOUCHLINE_ARRAY))
       .def("reset", &tl::Observer::reset)
-      .def_prop_ro("slices", &row_slices)
+      .def_prop_ro("slices", &row_slices,
+                   nb::sig("def slices(self, /) -> dict[str, tuple[int, int]]"))
       .def_prop_ro("segment_sensors", [](const tl::Observer& o) {
         std::vector<int> sensors;
         for (const tl::Segment& s : o.layout().segments) sensors.push_back(s.sensor);
         return sensors;
-      })
-      .def_prop_ro(
-          "row",
-          [](tl::Observer& o) {
-            return Out(const_cast<double*>(o.output().data()), {o.output().size()}, nb::handle());
-          },
-          nb::rv_policy::reference_internal);
+      });
 }

@@ -37,9 +37,7 @@ def save_stl(mesh: trimesh.Trimesh, path: Path) -> trimesh.Trimesh:
     """Writes binary STL and returns what a reader gets back."""
     path.parent.mkdir(parents=True, exist_ok=True)
     mesh.export(path, file_type="stl")
-    read = trimesh.load(path, force="mesh")
-    assert isinstance(read, trimesh.Trimesh)
-    return read
+    return trimesh.load_mesh(path)
 
 
 def make(target: Path) -> dict[str, Body]:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Builds the arms that ship with Touchline: shapes, meshes, inertias, model and description files."""
+"""Builds the arms that ship with Touchline: shapes, meshes, inertias and files."""

@@ -87,9 +87,9 @@ def _joint(row: JointRow) -> list[str]:
 
 
 HEADERS = {
-    "sara": "The paper's layout: joint sensors on joints 2 to 5, the others read from base and wrist.",
+    "sara": "The paper's layout: sensors in joints 2 to 5, the others read from base and wrist.",
     "sara-full": "As sara, with a torque sensor in every joint.",
-    "sara-handle-1axis": "As sara, with a one-axis torque sensor (twist about the neck) in the handle.",
+    "sara-handle-1axis": "As sara, but the handle has a one-axis sensor (twist about its neck).",
 }
 SIXAXIS = {  # link, range of forces [N] and moments [Nm]
     "base": ("link0", 1500, 500),

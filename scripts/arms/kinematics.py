@@ -64,7 +64,7 @@ MASSES = {
     "link5": 2.8,
     "link6": 1.9,
     "link7": 1.05,
-    "handle": 0.45,
     "tool": 0.9,
+    "handle": 0.45,
 }
 MOVING = ("link1", "link2", "link3", "link4", "link5", "link6", "link7", "handle")

@@ -8,7 +8,7 @@ curved), rounder triangles, and every vertex back on the exact surface.
 import numpy as np
 import trimesh
 
-from arms.relax import relax
+from arms.relax import Faces, relax
 from arms.sdf import Array, Field, gradient
 
 
@@ -31,18 +31,26 @@ def mesh_field(
         vertices, faces = relax(field, project(field, vertices, 2 * size), faces)
         vertices = project(field, vertices, 2 * size)
         vertices = vertices.astype(np.float32).astype(np.float64)  # what binary STL keeps
-        if is_closed(vertices, faces):
+        if is_closed(vertices, faces) and steepest(field, vertices, faces) > 0.7:
             return trimesh.Trimesh(vertices, faces)
-    raise ValueError("the mesh is not closed and outward; refine the cell or the shape")
+    raise ValueError("the mesh is not closed and sound; refine the cell or the shape")
 
 
-def is_closed(vertices: Array, faces: Array) -> bool:
+def is_closed(vertices: Array, faces: Faces) -> bool:
     """Does every edge join two faces, all facing outwards?"""
     mesh = trimesh.Trimesh(vertices, faces)
     return bool(mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0)
 
 
-def surface_nets(field: Field, low: Array, high: Array, cell: float) -> tuple[Array, Array]:
+def steepest(field: Field, vertices: Array, faces: Faces) -> float:
+    """The least cosine between a triangle's normal and the surface's at its middle."""
+    mesh = trimesh.Trimesh(vertices, faces)
+    normals = gradient(field, mesh.triangles_center)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    return float((normals * mesh.face_normals).sum(axis=1).min())
+
+
+def surface_nets(field: Field, low: Array, high: Array, cell: float) -> tuple[Array, Faces]:
     """Vertices (V, 3) and triangles (F, 3): one vertex per grid cell that the surface crosses."""
     counts = np.ceil((high - low) / cell).astype(int) + 1
     axes = [low[i] + cell * np.arange(counts[i]) for i in range(3)]
@@ -61,7 +69,7 @@ def sample(field: Field, axes: list[Array]) -> Array:
     return values
 
 
-def _cell_vertices(values: Array) -> tuple[Array, Array]:
+def _cell_vertices(values: Array) -> tuple[Array, Faces]:
     """Mean of the edge crossings of each crossed cell, in cells; and cell -> vertex number."""
     shape = np.array(values.shape) - 1
     total, count = np.zeros((*shape, 3)), np.zeros(shape)
@@ -87,7 +95,7 @@ def _cell_vertices(values: Array) -> tuple[Array, Array]:
     return np.argwhere(used) + total[used] / count[used][:, None], index
 
 
-def _crossing_quads(values: Array, index: Array) -> Array:
+def _crossing_quads(values: Array, index: Faces) -> Faces:
     """Two triangles around every grid edge that the surface crosses, oriented outwards."""
     faces = []
     for axis in range(3):
@@ -121,7 +129,7 @@ def project(field: Field, vertices: Array, limit: float, steps: int = 6) -> Arra
     return result
 
 
-def decimate(vertices: Array, faces: Array, triangles: int) -> tuple[Array, Array]:
+def decimate(vertices: Array, faces: Faces, triangles: int) -> tuple[Array, Faces]:
     """Quadric edge collapse to about `triangles` triangles (package fast-simplification)."""
     import fast_simplification
 

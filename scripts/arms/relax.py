@@ -14,9 +14,7 @@ Faces = NDArray[np.int64]
 SLACK = 6e-5  # how far a flipped edge may leave the surface [m]
 
 
-def relax(
-    field: Field, vertices: Array, faces: Faces, passes: int = 12
-) -> tuple[Array, Faces]:
+def relax(field: Field, vertices: Array, faces: Faces, passes: int = 12) -> tuple[Array, Faces]:
     """`vertices` (V, 3) and `faces` (F, 3) with better shaped triangles of the same count."""
     for _ in range(passes):
         for _ in range(4):
@@ -43,7 +41,9 @@ def _flip(field: Field, vertices: Array, faces: Faces) -> tuple[Faces, int]:
         if ring & touched or new in existing:
             continue
         touched |= ring
-        result[left[i]], result[right[i]] = _turned(faces[left[i]], a[i], b[i], c[i], d[i])
+        result[left[i]], result[right[i]] = _turned(
+            faces[left[i]], int(a[i]), int(b[i]), int(c[i]), int(d[i])
+        )
         count += 1
     return result, count
 
@@ -88,7 +88,7 @@ def _turned(face: Faces, a: int, b: int, c: int, d: int) -> tuple[list[int], lis
 
 
 def _slide(field: Field, vertices: Array, faces: Faces, share: float = 0.35) -> Array:
-    """Moves each vertex within its tangent plane towards its neighbours, if the surface is flat there.
+    """Moves each vertex in its tangent plane to the middle of its neighbours where it is flat.
 
     Along a fillet the neighbourhood is curved across and flat along; the move is scaled down by how
     far the normals of the neighbours differ, so that fillets keep their vertices.
@@ -105,4 +105,17 @@ def _slide(field: Field, vertices: Array, faces: Faces, share: float = 0.35) -> 
     move = centre - vertices
     move -= (move * normals).sum(axis=1, keepdims=True) * normals
     weight = share * np.clip((agree - 0.80) / 0.15, 0.0, 1.0)
-    return vertices + weight[:, None] * move
+    moved = vertices + weight[:, None] * move
+    return _undo_folds(normals, vertices, moved, faces)
+
+
+def _undo_folds(normals: Array, before: Array, after: Array, faces: Faces) -> Array:
+    """`after`, but with the corners of triangles that came to lie across the surface put back."""
+    corners = after[faces]
+    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    face /= np.maximum(np.linalg.norm(face, axis=1, keepdims=True), 1e-15)
+    up = normals[faces].mean(axis=1)
+    folded = faces[(face * up).sum(axis=1) < 0.75]
+    result = after.copy()
+    result[folded] = before[folded]
+    return result

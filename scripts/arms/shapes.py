@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The outer shells of the arm, link by link, in link axes (all parallel to world when stretched)."""
+"""The outer shells, link by link, in link axes (parallel to world when stretched)."""
 
 from dataclasses import dataclass
 
@@ -68,15 +68,16 @@ def pitch_to_roll(length: float, pitch: float, width: float, roll: float) -> Fie
 
 
 def swept_by_neighbour(radius: float) -> Field:
-    """Where the other link of a pitch joint turns: its disc, and its bar up to the joint's limits."""
-    disc = rounded_cylinder(1, radius, -1.0, -0.9 * SLIT, 0.001)
+    """Where the other link of a pitch joint turns: its disc, and its bar up to the limits."""
     cos, sin = np.cos(FOLDED), np.sin(FOLDED)
 
-    def bar(points: Array) -> Array:
-        x, y, z = points.T
-        return np.maximum(z * sin - np.abs(x) * cos - radius, y + 0.9 * SLIT)
+    def disc(points: Array) -> Array:
+        return np.hypot(points[:, 0], points[:, 2]) - radius
 
-    return union(0.0, disc, bar)
+    def bar(points: Array) -> Array:
+        return points[:, 2] * sin - np.abs(points[:, 0]) * cos - radius
+
+    return intersection(0.003, union(0.004, disc, bar), half_space(1, -0.9 * SLIT, 1))
 
 
 def roll_to_pitch(length: float, roll: float, pitch: float, width: float) -> Field:
@@ -108,9 +109,9 @@ def base() -> Field:
 def flange() -> Field:
     """Link 7: the short output drum of joint 7 with the collar of the wrist sensor."""
     h = k.ROLL_7_TO_FLANGE
-    drum = rounded_cylinder(2, k.R7, GAP, h - 0.014, 0.004)
+    drum = rounded_cylinder(2, k.R7, GAP, h - 0.018, 0.004)
     waist = rounded_cylinder(2, k.R7 - 0.006, 0.010, h - 0.004, 0.002)
-    plate = rounded_cylinder(2, k.R7 - 0.001, h - 0.012, h - GAP, 0.003)
+    plate = rounded_cylinder(2, k.R7 - 0.001, h - 0.013, h - GAP, 0.003)
     return union(0.002, drum, waist, plate)
 
 
@@ -122,18 +123,16 @@ def tool() -> Field:
     def radius(z: Array) -> Array:
         return 0.0385 + (0.0235 - 0.0385) * taper(z)
 
-    stem = column(radius, 0.020, tip + 0.04)
-    stem = intersection(0.018, stem, half_space(2, tip, 1))
-    root = rounded_cylinder(2, float(radius(np.array(0.020))), 0.006, 0.0205, 0.002)
-    return union(0.005, plate, union(0.0, stem, root))
+    stem = column(radius, 0.0065, tip + 0.04)
+    return union(0.005, plate, intersection(0.018, stem, half_space(2, tip, 1)))
 
 
 def handle() -> Field:
     """The grip: a closed bow on a shoe, on the neck that is its sensor; z points off the arm."""
     neck = rounded_cylinder(2, 0.028, GAP, 0.013, 0.002)
-    shoe = rounded_box((0.0, 0.0, 0.0125), np.array([0.0165, 0.062, 0.0068]), 0.0066)
+    shoe = rounded_box((0.0, 0.0, 0.0125), np.array([0.0165, 0.066, 0.0068]), 0.0066)
     swell = smoothstep(0.030, 0.078)
-    bow = loop_tube(0.061, 0.0135, 0.085, 0.027, lambda z: 0.0095 + 0.0045 * swell(z))
+    bow = loop_tube(0.066, 0.0135, 0.085, 0.027, lambda z: 0.0095 + 0.0045 * swell(z))
     return union(0.006, union(0.004, neck, shoe), bow)
 
 
@@ -145,17 +144,11 @@ def shells() -> dict[str, Shell]:
     l4, l5, l6 = k.ELBOW_TO_ROLL_5, k.ROLL_5_TO_WRIST, k.WRIST_TO_ROLL_7
     return {
         "link0": Shell(base(), (-0.14, -0.13, -0.01), (0.13, 0.13, l1)),
-        "link1": Shell(
-            roll_to_pitch(l1, k.R1, k.P2, k.W2), (-p2, -w2, -0.01), (p2, p2, l1 + p2)
-        ),
+        "link1": Shell(roll_to_pitch(l1, k.R1, k.P2, k.W2), (-p2, -w2, -0.01), (p2, p2, l1 + p2)),
         "link2": Shell(pitch_to_roll(l2, k.P2, k.W2, k.R3), (-p2, -p2, -p2), (p2, w2, l2 + 0.01)),
-        "link3": Shell(
-            roll_to_pitch(l3, k.R3, k.P4, k.W4), (-p4, -w4, -0.01), (p4, p4, l3 + p4)
-        ),
+        "link3": Shell(roll_to_pitch(l3, k.R3, k.P4, k.W4), (-p4, -w4, -0.01), (p4, p4, l3 + p4)),
         "link4": Shell(pitch_to_roll(l4, k.P4, k.W4, k.R5), (-p4, -p4, -p4), (p4, w4, l4 + 0.01)),
-        "link5": Shell(
-            roll_to_pitch(l5, k.R5, k.P6, k.W6), (-p6, -w6, -0.01), (p6, p6, l5 + p6)
-        ),
+        "link5": Shell(roll_to_pitch(l5, k.R5, k.P6, k.W6), (-p6, -w6, -0.01), (p6, p6, l5 + p6)),
         "link6": Shell(pitch_to_roll(l6, k.P6, k.W6, k.R7), (-p6, -p6, -p6), (p6, w6, l6 + 0.01)),
         "link7": Shell(flange(), (-0.06, -0.06, -0.01), (0.06, 0.06, 0.07)),
         "tool": Shell(tool(), (-0.06, -0.06, -0.01), (0.06, 0.06, 0.14)),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parts that are only drawn: end caps of the pitch joints, rings of the roll joints, mounting plate.
+"""Parts that are only drawn: caps and slits of pitch joints, rings of roll joints, the plate.
 
 They stand at most a millimetre proud of the shells, which alone carry contacts.
 """
@@ -40,7 +40,7 @@ def lathe(profile: list[tuple[float, float]], T_link_part: Array) -> trimesh.Tri
 
 
 def cap(radius: float, height: float, side: int) -> trimesh.Trimesh:
-    """A cover on the pitch housing whose face is at `side` * y, `height` above the link's origin."""
+    """A cover on the pitch housing on the `side` of y, `height` above the link's origin."""
     knots = [(0.0, -0.002), (radius, -0.002), (radius, 0.0002), (radius - 0.0012, PROUD)]
     inner = 0.30 * radius
     knots += [(inner + 0.002, PROUD), (inner, 0.0001), (inner - 0.002, PROUD), (0.0, PROUD)]

@@ -279,7 +279,7 @@ def test_several_wrench_topics_need_a_choice(tmp_path):
         (
             ("j1", "jj2"),
             [(1, 2)] * 3,
-            ["no joint 'j2'; did you mean 'jj2'?", "joints of", "j1, jj2"],
+            ["no joint 'j2' (did you mean 'jj2'?)", "joints of", "j1, jj2"],
         ),
         (NAMES, [(1, 2), (1, 2), ()], ["no joint torques", "no efforts"]),
         (NAMES, [(), (1, 2), (1, 2)], ["no positions"]),

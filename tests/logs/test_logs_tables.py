@@ -229,8 +229,8 @@ def test_text_that_is_no_table(tmp_path):
 def test_missing_columns_with_a_hint(tmp_path):
     path = write_csv(tmp_path / "log.csv", "0,1", header="Time,q.J1")
     text = problems(path)
-    assert "missing column 'time'; did you mean 'Time'?" in text
-    assert "missing column 'q.j1'; did you mean 'q.J1'?" in text
+    assert "missing column 'time' (did you mean 'Time'?)" in text
+    assert "missing column 'q.j1' (did you mean 'q.J1'?)" in text
     assert "no joint torques: none of tau.j1, tau.j2 is there" in text
     assert "columns present: Time, q.J1" in text
     assert "qd" not in text

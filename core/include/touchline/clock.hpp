@@ -16,18 +16,15 @@ class Clock {
 
   Verdict take(double time, Health& health) {
     if (!std::isfinite(time)) return refuse(health);
-    const double dt = time - time_;
     if (!running_) {
-      running_ = true;
-    } else if (dt < kShortest && (period_ == 0.0 || dt >= -limit())) {
-      return refuse(health);
-    } else if (dt < 0.0) {
-      *this = Clock{};
       time_ = time;
       running_ = true;
-      health |= kBadTime;
-      return Verdict::set_back;
-    } else if (period_ == 0.0) {
+      return Verdict::accepted;
+    }
+    const double dt = time - time_;
+    if (dt < kShortest) return look_back(time, health);
+    refusals_ = 0;
+    if (period_ == 0.0) {
       period_ = std::min(dt, kLongest);
     } else {
       follow(dt, health);
@@ -43,15 +40,30 @@ class Clock {
   }
 
  private:
-  static constexpr double kGapPeriods = 3.5;  // up to three samples may be lost
+  static constexpr double kGapPeriods = 3.5;  // up to two samples may be lost
   static constexpr double kShortest = 1e-9;   // stamps closer than this [s] are repetitions
   static constexpr double kLongest = 10.0;    // no robot reports less often
+  static constexpr int kPatience = 10;        // stamps
 
   static Verdict refuse(Health& health) {
     health |= kBadTime;
     return Verdict::refused;
   }
   double limit() const { return kGapPeriods * period_; }
+
+  // A stamp that does not go forward: a repetition or some disorder, unless it is far back or goes
+  // on for so long, each stamp after the other, that the clock must have been set back.
+  Verdict look_back(double time, Health& health) {
+    health |= kBadTime;
+    refusals_ = refusals_ > 0 && time >= refused_ + kShortest ? refusals_ + 1 : 1;
+    refused_ = time;
+    const bool far = time - time_ < -std::max(limit(), kShortest);
+    if (!far && refusals_ < kPatience) return Verdict::refused;
+    *this = Clock{};
+    time_ = time;
+    running_ = true;
+    return Verdict::set_back;
+  }
 
   // The period tends to the median whatever the jitter, and soon follows another rate.
   void follow(double dt, Health& health) {
@@ -61,6 +73,8 @@ class Clock {
   }
 
   double time_ = 0.0, period_ = 0.0;  // of the last sample; typical, 0: not known yet
+  double refused_ = 0.0;  // the last stamp that was, and how many in a row
+  int refusals_ = 0;
   bool running_ = false, gap_ = false;
 };
 

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 namespace touchline {
 
@@ -25,6 +27,38 @@ constexpr double kAbsurd = 1e6;
 inline Health judge(double value) {
   if (std::isnan(value)) return kMissing;
   return std::fabs(value) < kAbsurd ? 0 : kNonFinite;
+}
+
+// |v| as a number that grows with it, beyond infinity for NaN: tests on many of them vectorize.
+inline std::uint64_t magnitude(double v) {
+  std::uint64_t bits;
+  std::memcpy(&bits, &v, sizeof bits);
+  return bits & 0x7fffffffffffffffu;
+}
+constexpr std::uint64_t kNoLimit = 0x8000000000000000u;
+
+// Is every |value| below its limit, and none NaN?
+inline bool all_below(const double* __restrict values, const std::uint64_t* __restrict limits,
+                      std::size_t count) {
+  std::uint64_t below = kNoLimit;  // the sign bit stays as long as all differences are negative
+  for (std::size_t i = 0; i < count; ++i) below &= magnitude(values[i]) - limits[i];
+  return below != 0;
+}
+
+// Health of values that should all have been measured.
+inline Health judge_all(const double* values, std::size_t count) {
+  const std::uint64_t limit = magnitude(kAbsurd);
+  std::uint64_t below = kNoLimit;
+  for (std::size_t i = 0; i < count; ++i) below &= magnitude(values[i]) - limit;
+  if (below != 0) return 0;
+  Health health = 0;
+  for (std::size_t i = 0; i < count; ++i) health |= judge(values[i]);
+  return health;
+}
+
+// The limit up to which a reading is surely neither absurd nor at the end of its range.
+inline std::uint64_t safe_limit(double range) {
+  return magnitude(std::fmin(kAbsurd, (1.0 - 1e-9) * range));
 }
 
 }  // namespace touchline

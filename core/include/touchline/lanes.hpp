@@ -9,7 +9,11 @@
 namespace touchline {
 
 #if defined(__GNUC__) || defined(__clang__)
+#if defined(__AVX__)
+constexpr int kLanes = 4;
+#else
 constexpr int kLanes = 2;  // one SSE2 or NEON register, which every x86-64 and AArch64 has
+#endif
 using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
 #else
 constexpr int kLanes = 1;

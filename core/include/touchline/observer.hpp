@@ -45,6 +45,7 @@ class Observer {
         packed_(tree_, layout_, joints_, sensors_, local_rows()),
         projections_(layout_, terms_.at()),
         torques_(joints_),
+        wrenches_(sensors_.begin(), sensors_.end()),
         row_{count(joints_), count(sensors_), count(layout_.segments)},
         writer_(row_, terms_.at(), layout_, sensors_, method),
         frames_((kLanes + 1) * terms_.at().width(), 0.0),
@@ -53,7 +54,12 @@ class Observer {
         output_(row_.width(), kNaN) {
     for (int i = 0; i < kLanes; ++i) ahead_[i] = frames_.data() + i * terms_.at().width();
     before_ = frames_.data() + kLanes * terms_.at().width();
-    for (std::size_t j = 0; j < joints_.size(); ++j) find_projections(j);
+    constexpr double tolerance = 0.01;  // rad or m: encoders and hard stops differ by less
+    for (std::size_t j = 0; j < joints_.size(); ++j) {
+      lower_.push_back(joints_[j].lower - tolerance);
+      upper_.push_back(joints_[j].upper + tolerance);
+      find_projections(j);
+    }
   }
   Observer(const Observer&) = delete;
   Observer& operator=(const Observer&) = delete;
@@ -61,8 +67,11 @@ class Observer {
   // Takes one sample; returns a row of `row_layout().width()` numbers, valid until the next call.
   const double* step(double time, const double* q, const double* qd, const double* tau,
                      const double* wrench) {
-    terms_.evaluate(q, qd, ahead_.data());
-    advance({time, q, qd, tau, wrench}, ahead_[0], output_.data(), output_.data());
+    return step({time, q, qd, tau, wrench});
+  }
+  const double* step(const Sample& sample) {
+    terms_.evaluate(sample.q, sample.qd, ahead_.data());
+    advance(sample, ahead_[0], output_.data(), output_.data());
     return output_.data();
   }
 
@@ -98,6 +107,8 @@ class Observer {
   const RowLayout& row_layout() const { return row_; }
   const Layout& layout() const { return layout_; }
   const Tree& tree() const { return tree_; }
+  const std::vector<JointRow>& joints() const { return joints_; }
+  const std::vector<SensorRow>& sensors() const { return sensors_; }
   const std::vector<double>& output() const { return output_; }
   double time() const { return now_.time; }  // of the last accepted sample
   // Of sensor s in world, at the last accepted sample.
@@ -199,14 +210,12 @@ class Observer {
   }
 
   Health judge_state(const Sample& sample) const {
-    constexpr double tolerance = 0.01;  // rad or m: encoders and hard stops differ by less
-    bool outside = false;
-    for (int j = 0; j < row_.joints; ++j) {
-      outside |= sample.q[j] < joints_[j].lower - tolerance;
-      outside |= sample.q[j] > joints_[j].upper + tolerance;
-    }
-    return judge_all(sample.q, row_.joints) | judge_all(sample.qd, row_.joints) |
-           (outside ? kModelLimit : 0);
+    const Health health = judge_all(sample.q, lower_.size()) | judge_all(sample.qd, lower_.size());
+    if (health != 0) return health;
+    bool inside = true;
+    for (std::size_t j = 0; j < lower_.size(); ++j)
+      inside &= (sample.q[j] >= lower_[j]) & (sample.q[j] <= upper_[j]);
+    return inside ? 0 : kModelLimit;
   }
 
   // Fills the rows of the balances; returns whether all signals are usable.
@@ -230,13 +239,12 @@ class Observer {
   }
 
   void read_sensor(std::size_t s, const double* logged, const double* terms, Health& health) {
-    const SensorRow& sensor = sensors_[s];
     Balances& balances = channels_.balances;
     const Pose pose = load_pose(terms + TermsLayout::kPose);
-    const Spatial reading = read_wrench(
-        sensor, pose.R, load_rotation(terms + TermsLayout::kLogRotation), logged, health);
+    const Spatial reading = wrenches_[s].read(
+        logged, pose.R, load_rotation(terms + TermsLayout::kLogRotation), health);
     const Spatial weight =
-        sensor.gravity_compensated ? Spatial{} : load(terms + TermsLayout::kWeight);
+        sensors_[s].gravity_compensated ? Spatial{} : load(terms + TermsLayout::kWeight);
     std::copy_n(terms + TermsLayout::kMomentum, 6, balances.p(channels_.sensor(s)));
     store(wrench_to_parent(pose, reading) + weight, balances.u(channels_.sensor(s)));
     if (channels_.kind(s) != Channels::SensorFilter::local) return;
@@ -310,6 +318,8 @@ class Observer {
   Terms<Lanes> packed_;
   Projections projections_;
   JointReadings torques_;
+  std::vector<SensorReading> wrenches_;
+  std::vector<double> lower_, upper_;  // limits of the joints, with some tolerance
   const RowLayout row_;
   RowWriter writer_;
   std::vector<double> frames_;  // terms of the sample before and of those at work

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "touchline/balance.hpp"
@@ -16,18 +17,18 @@ namespace touchline {
 // Joint torques: the settings of all joints side by side.
 class JointReadings {
  public:
-  explicit JointReadings(const std::vector<JointRow>& joints) : present_(joints.size(), 0) {
-    for (const JointRow& joint : joints) {
+  explicit JointReadings(const std::vector<JointRow>& joints) : joints_(joints) {
+    for (std::size_t j = 0; j < joints.size(); ++j) {
+      const JointRow& joint = joints[j];
       measured_.push_back(joint.measured());
-      gain_.push_back(joint.gain);
-      sign_.push_back(joint.sign);
-      bias_.push_back(joint.measured() ? joint.bias : kNaN);
-      range_.push_back(joint.range);
+      slope_.push_back(joint.sign * joint.gain);
+      offset_.push_back(joint.measured() ? joint.bias : kNaN);
       viscous_.push_back(joint.viscous);
-      if (joint.coulomb != 0.0) rough_.push_back(gain_.size() - 1);
-      coulomb_.push_back(joint.coulomb);
-      width_.push_back(joint.coulomb_width);
+      if (joint.measured() && joint.coulomb != 0.0) rough_.push_back(j);
+      limits_.push_back(joint.measured() ? safe_limit(joint.range / std::fabs(joint.gain))
+                                         : kNoLimit);
     }
+    present_ = measured_;
   }
 
   // Per joint: was its last torque usable?
@@ -37,31 +38,89 @@ class JointReadings {
   // returns whether all joints that should have one have a usable torque.
   bool read(const double* logged, const double* qd, const double* n_bar, double* u,
             Health& health) {
-    const std::size_t n = gain_.size();
-    bool good = true, saturated = false;
-    for (std::size_t j = 0; j < n; ++j) {
-      const double reading = gain_[j] * logged[j];
-      u[j] = sign_[j] * reading - bias_[j] - viscous_[j] * qd[j] - n_bar[j];
-      saturated |= measured_[j] && std::fabs(reading) >= range_[j];
-      present_[j] = measured_[j] && std::fabs(logged[j]) < kAbsurd;
-      good &= present_[j] == measured_[j];
+    convert(logged, qd, n_bar, u);
+    for (std::size_t j : rough_)
+      u[j] -= joints_[j].coulomb * std::tanh(qd[j] / joints_[j].coulomb_width);
+    if (all_below(logged, limits_.data(), limits_.size())) {
+      if (incomplete_) present_ = measured_;
+      incomplete_ = false;
+    } else {
+      incomplete_ = !judge_each(logged, health);
     }
-    for (std::size_t j : rough_) u[j] -= coulomb_[j] * std::tanh(qd[j] / width_[j]);
-    if (saturated) health |= kSaturated;
-    if (!good) tell(logged, health);
-    return good;
+    return !incomplete_;
   }
 
  private:
-  void tell(const double* logged, Health& health) const {
-    for (std::size_t j = 0; j < measured_.size(); ++j) {
-      if (measured_[j]) health |= judge(logged[j]);
+  void convert(const double* __restrict logged, const double* __restrict qd,
+               const double* __restrict n_bar, double* __restrict u) const {
+    const double *slope = slope_.data(), *offset = offset_.data(), *viscous = viscous_.data();
+    for (std::size_t j = 0; j < slope_.size(); ++j)
+      u[j] = slope[j] * logged[j] - offset[j] - viscous[j] * qd[j] - n_bar[j];
+  }
+
+  bool judge_each(const double* logged, Health& health) {
+    bool complete = true;
+    for (std::size_t j = 0; j < joints_.size(); ++j) {
+      if (!measured_[j]) continue;
+      const Health own = judge(logged[j]);
+      if (std::fabs(joints_[j].gain * logged[j]) >= joints_[j].range) health |= kSaturated;
+      present_[j] = own == 0;
+      complete &= own == 0;
+      health |= own;
+    }
+    return complete;
+  }
+
+  const std::vector<JointRow>& joints_;
+  std::vector<char> measured_, present_;
+  std::vector<double> slope_, offset_, viscous_;
+  std::vector<std::uint64_t> limits_;
+  std::vector<std::size_t> rough_;  // joints with Coulomb friction
+  bool incomplete_ = false;
+};
+
+// The wrench on a sensor's outboard body, in the sensor frame.
+class SensorReading {
+ public:
+  explicit SensorReading(const SensorRow& sensor)
+      : sensor_(sensor), usual_(sensor.six_axis() && !sensor.turned) {
+    for (int i = 0; i < 6; ++i) limits_[i] = safe_limit(sensor.range[i]);
+  }
+
+  // From six logged numbers. `R_world_sensor`, `R_world_log`: of the sensor frame and, for a
+  // turned sensor, of the axes of the log.
+  Spatial read(const double* logged, const Mat3& R_world_sensor, const Mat3& R_world_log,
+               Health& health) const {
+    double w[6];
+    if (usual_ && all_below(logged, limits_, 6)) {
+      for (int i = 0; i < 6; ++i) w[i] = sensor_.sign * logged[i] - sensor_.bias[i];
+    } else {
+      read_each(logged, R_world_sensor, R_world_log, w, health);
+    }
+    return load(w);
+  }
+
+ private:
+  void read_each(const double* logged, const Mat3& R_world_sensor, const Mat3& R_world_log,
+                 double* w, Health& health) const {
+    for (int i = 0; i < 6; ++i) {
+      w[i] = sensor_.axes[i] ? logged[i] : 0.0;
+      health |= judge(w[i]);
+    }
+    if (sensor_.turned) {
+      const Spatial turned = load(w);
+      store({transposed_times(R_world_sensor, R_world_log * turned.linear),
+             transposed_times(R_world_sensor, R_world_log * turned.angular)}, w);
+    }
+    for (int i = 0; i < 6; ++i) {
+      if (std::fabs(w[i]) >= sensor_.range[i]) health |= kSaturated;
+      w[i] = sensor_.axes[i] ? sensor_.sign * w[i] - sensor_.bias[i] : 0.0;
     }
   }
 
-  std::vector<char> measured_, present_;
-  std::vector<double> gain_, sign_, bias_, range_, viscous_, coulomb_, width_;
-  std::vector<std::size_t> rough_;  // joints with Coulomb friction
+  const SensorRow& sensor_;
+  bool usual_;  // all axes, logged in those of the sensor
+  std::uint64_t limits_[6];
 };
 
 }  // namespace touchline

@@ -50,36 +50,4 @@ struct SensorRow {
   }
 };
 
-// Health of `count` numbers that should have been measured.
-inline Health judge_all(const double* values, int count) {
-  bool good = true;
-  for (int i = 0; i < count; ++i) good &= std::fabs(values[i]) < kAbsurd;
-  if (good) return 0;
-  Health health = 0;
-  for (int i = 0; i < count; ++i) health |= judge(values[i]);
-  return health;
-}
-
-// The wrench on the outboard body in the sensor frame, from six logged numbers; `health` tells of
-// those among the sensor's own axes that cannot be used. `R_world_sensor` and `R_world_log`: of
-// the sensor frame and, for a `turned` sensor, of the axes of the log.
-inline Spatial read_wrench(const SensorRow& sensor, const Mat3& R_world_sensor,
-                           const Mat3& R_world_log, const double* logged, Health& health) {
-  double w[6];
-  for (int i = 0; i < 6; ++i) w[i] = sensor.axes[i] ? logged[i] : 0.0;
-  health |= judge_all(w, 6);
-  if (sensor.turned) {
-    const Spatial turned = load(w);
-    store({transposed_times(R_world_sensor, R_world_log * turned.linear),
-           transposed_times(R_world_sensor, R_world_log * turned.angular)}, w);
-  }
-  bool saturated = false;
-  for (int i = 0; i < 6; ++i) {
-    saturated |= std::fabs(w[i]) >= sensor.range[i];
-    w[i] = sensor.axes[i] ? sensor.sign * w[i] - sensor.bias[i] : 0.0;
-  }
-  if (saturated) health |= kSaturated;
-  return load(w);
-}
-
 }  // namespace touchline

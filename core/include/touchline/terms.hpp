@@ -60,13 +60,16 @@ class Terms {
     sweep(q, qd);
     std::size_t line = 0;
     for (std::size_t j = 0; j < joints_.size(); ++j) {
-      T p, n;
-      joint_row(j, qd[j], p, n);
-      if (joints_[j].compensated == Compensated::gravity) n += weight_on(j);
+      T p = joints_[j].rotor_inertia * qd[j], n{};
+      for (int i : joints_[j].nodes) {
+        const Vector a = axis(i);
+        add_row(i, a, p, n);
+        if (joints_[j].compensated == Compensated::gravity) n += weight_on(i, a);
+        put_line(out, line++, i, a);
+      }
       if (joints_[j].compensated == Compensated::model) p = n = T{};
       put(out, at_.joint_momentum() + j, p);
       put(out, at_.joint_bias() + j, n);
-      for (int node : joints_[j].nodes) put_line(out, line++, node);
     }
     for (std::size_t s = 0; s < sensors_.size(); ++s) put_sensor(out, s);
   }
@@ -75,11 +78,7 @@ class Terms {
   void joint_row(std::size_t j, const T& qd, T& p, T& n) const {
     p = joints_[j].rotor_inertia * qd;
     n = T{};
-    for (int i : joints_[j].nodes) {
-      const NodeState<T>& s = state_.node(i);
-      p += dot(axis(i), turns(i) ? s.angular_momentum : s.linear_momentum);
-      n += dot(axis(i), turns(i) ? moment_bias(i) : force_bias(i));
-    }
+    for (int i : joints_[j].nodes) add_row(i, axis(i), p, n);
   }
 
   // Momentum and n-bar of sensor s, in its own frame.
@@ -115,18 +114,32 @@ class Terms {
            weight_moment(i);
   }
 
-  // What gravity exerts along joint j.
-  T weight_on(std::size_t j) const {
-    T sum{};
-    for (int i : joints_[j].nodes) sum += dot(axis(i), turns(i) ? weight_moment(i) : weight(i));
-    return sum;
+  // The part of node i with axis a in its joint's momentum and n-bar.
+  void add_row(int i, const Vector& a, T& p, T& n) const {
+    const NodeState<T>& s = state_.node(i);
+    if (turns(i)) {
+      p += dot(a, s.angular_momentum);
+      n += dot(a, moment_bias(i));
+    } else {
+      p += dot(a, s.linear_momentum);
+      n += dot(a, force_bias(i));
+    }
   }
 
-  void put_line(double* const* out, std::size_t line, int i) const {
+  // What gravity exerts along it.
+  T weight_on(int i, const Vector& a) const {
+    return dot(a, turns(i) ? weight_moment(i) : weight(i));
+  }
+
+  void put_line(double* const* out, std::size_t line, int i, const Vector& a) const {
     const std::size_t linear = at_.subspaces() + line, angular = linear + 3 * at_.lines;
-    const Vector a = axis(i);
-    put(out, linear, turns(i) ? cross(state_.node(i).p, a) : a, at_.lines);
-    put(out, angular, turns(i) ? a : Vector{}, at_.lines);
+    if (turns(i)) {
+      put(out, linear, cross(state_.node(i).p, a), at_.lines);
+      put(out, angular, a, at_.lines);
+    } else {
+      put(out, linear, a, at_.lines);
+      put(out, angular, Vector{}, at_.lines);
+    }
   }
 
   void put_sensor(double* const* out, std::size_t s) const {

@@ -81,7 +81,11 @@ class Tree {
   template <class T>
   void place(int i, TreeState<T>& state) const;
   template <class T>
-  void move(std::size_t m, T qd, TreeState<T>& state) const;
+  void reach(int i, const NodeState<T>& parent, NodeState<T>& s) const;
+  template <class T>
+  void turn(int i, const T& sine, const T& cosine, const T& qd, TreeState<T>& state) const;
+  template <class T>
+  void slide(int i, const T& position, const T& qd, NodeState<T>& s) const;
   template <class T>
   void add_body(int i, NodeState<T>& s) const;
   template <class T>
@@ -132,7 +136,7 @@ TreeState<T> Tree::make_state() const {
 }
 
 template <class T>
-void Tree::sweep(const T* q, const T* qd, TreeState<T>& state) const {
+[[gnu::flatten]] void Tree::sweep(const T* q, const T* qd, TreeState<T>& state) const {
   for (std::size_t m = 0; m < moving_.size(); ++m) {
     const Node& node = nodes_[moving_[m]];
     state.positions[m] = node.multiplier * q[node.coordinate] + node.offset;
@@ -145,43 +149,54 @@ void Tree::sweep(const T* q, const T* qd, TreeState<T>& state) const {
   }
   std::size_t m = 0;
   for (int i : carried_) {
-    place(i, state);
-    if (nodes_[i].kind != NodeKind::fixed) move(m++, qd[nodes_[i].coordinate], state);
-    add_body(i, state.node(i));
+    switch (nodes_[i].kind) {
+      case NodeKind::fixed: place(i, state); break;
+      case NodeKind::revolute: turn(i, state.sines[m], state.cosines[m], qd[nodes_[i].coordinate], state); ++m; break;
+      case NodeKind::prismatic: place(i, state); slide(i, state.positions[m], qd[nodes_[i].coordinate], state.node(i)); ++m; break;
+    }
   }
+  for (int i : carried_) add_body(i, state.node(i));
   for (std::size_t i = nodes_.size(); i-- > 0;) pass_inboard(static_cast<int>(i), state);
 }
 
-// Pose and velocity, as if the node's own joint stood still at zero.
+// Pose and velocity of a fixed node, or as if its joint stood still at zero.
 template <class T>
 void Tree::place(int i, TreeState<T>& state) const {
-  const Node& node = nodes_[i];
-  const NodeState<T>& parent = state.node(node.parent);
+  const NodeState<T>& parent = state.node(nodes_[i].parent);
   NodeState<T>& s = state.node(i);
-  s.R = parent.R * node.placement.R;
-  s.arm = parent.R * node.placement.p;
-  s.p = parent.p + s.arm;
+  s.R = parent.R * nodes_[i].placement.R;
   s.angular = parent.angular;
-  s.velocity = parent.velocity + cross(parent.angular, s.arm);
+  reach(i, parent, s);
 }
 
 template <class T>
-void Tree::move(std::size_t m, T qd, TreeState<T>& state) const {
-  const Node& node = nodes_[moving_[m]];
-  NodeState<T>& s = state.node(moving_[m]);
-  const BasicVec3<T> rate = (node.multiplier * qd) * s.R.z;
-  if (node.kind == NodeKind::revolute) {
-    const T sine = state.sines[m], cosine = state.cosines[m];
-    const BasicVec3<T> x = s.R.x, y = s.R.y;
-    s.R.x = cosine * x + sine * y;
-    s.R.y = cosine * y - sine * x;
-    s.angular += rate;
-  } else {
-    const BasicVec3<T> shift = state.positions[m] * s.R.z;
-    s.arm += shift;
-    s.p += shift;
-    s.velocity += cross(s.angular, shift) + rate;
-  }
+void Tree::reach(int i, const NodeState<T>& parent, NodeState<T>& s) const {
+  const BasicVec3<T> arm = parent.R * nodes_[i].placement.p;
+  s.arm = arm;
+  s.p = parent.p + arm;
+  s.velocity = parent.velocity + cross(parent.angular, arm);
+}
+
+template <class T>
+void Tree::turn(int i, const T& sine, const T& cosine, const T& qd, TreeState<T>& state) const {
+  const NodeState<T>& parent = state.node(nodes_[i].parent);
+  NodeState<T>& s = state.node(i);
+  reach(i, parent, s);
+  const BasicVec3<T> z = parent.R * nodes_[i].placement.R.z;
+  s.R.z = z;
+  s.angular = parent.angular + (nodes_[i].multiplier * qd) * z;
+  const BasicVec3<T> x = parent.R * nodes_[i].placement.R.x;
+  const BasicVec3<T> y = parent.R * nodes_[i].placement.R.y;
+  s.R.x = cosine * x + sine * y;
+  s.R.y = cosine * y - sine * x;
+}
+
+template <class T>
+void Tree::slide(int i, const T& position, const T& qd, NodeState<T>& s) const {
+  const BasicVec3<T> shift = position * s.R.z;
+  s.arm += shift;
+  s.p += shift;
+  s.velocity += cross(s.angular, shift) + (nodes_[i].multiplier * qd) * s.R.z;
 }
 
 template <class T>

@@ -10,7 +10,7 @@ from touchline.cli.bench import bench
 from touchline.cli.check import check
 from touchline.cli.reproduce import reproduce
 from touchline.errors import InputError
-from touchline.model.suggest import did_you_mean
+from touchline.suggest import did_you_mean
 
 USAGE = """\
 The sense of touch for a robot arm without a skin: external wrenches and contacts from

@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.contact.contact import Candidate
 from touchline.contact.detector import Detection, Detector, Level
+from touchline.contact.localizer import EventAnswer, Localizer
 from touchline.estimation.observer import Estimate
 
 Array = NDArray[np.float64]
@@ -29,6 +31,14 @@ class Event:
         force: (3,) [N] in world, mean over the strong samples; None on `root`.
         force_peak: largest force [N]; None on `root`.
         torque_peak: largest external torque [Nm] on `joint`.
+        status: as of a `Contact`, over the event.
+        link: the link that carries the point, of the rigid `body`.
+        body_probability: of that body, 0 to 1.
+        position: (3,) [m] in world at `time_of_position`, from all strong samples.
+        position_link: (3,) [m] the same in the frame of `link`.
+        time_of_position: the last strong sample [s].
+        position_std: root of the trace of its covariance [m].
+        candidates: all explanations, best first, at `time_of_position`.
     """
 
     id: int
@@ -41,29 +51,54 @@ class Event:
     force_peak: float | None = None
     torque_peak: float | None = None
     status: str = "wrench_only"
+    link: str | None = None
+    body: str | None = None
+    body_probability: float | None = None
+    position: Array | None = None
+    position_link: Array | None = None
+    time_of_position: float | None = None
+    position_std: float | None = None
+    candidates: tuple[Candidate, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """The event as in `events.json`."""
-        force = None if self.force is None else [float(x) for x in self.force]
-        unknown = dict.fromkeys(
-            ("link", "body", "body_probability", "position", "position_link"), None
-        )
         return {
             "id": self.id,
             "segment": self.segment,
             "level": self.level,
             "detected": self.detected,
             "cleared": self.cleared,
-            **unknown,
-            "time_of_position": None,
-            "position_std": None,
-            "force": force,
+            "link": self.link,
+            "body": self.body,
+            "body_probability": self.body_probability,
+            "position": _numbers(self.position),
+            "position_link": _numbers(self.position_link),
+            "time_of_position": self.time_of_position,
+            "position_std": self.position_std,
+            "force": _numbers(self.force),
             "force_peak": self.force_peak,
             "torque_peak": self.torque_peak,
             "status": self.status,
             "joint": self.joint,
-            "candidates": [],
+            "candidates": [
+                {
+                    "link": candidate.link,
+                    "body": candidate.body,
+                    "probability": candidate.probability,
+                    "position": _numbers(candidate.position),
+                }
+                for candidate in self.candidates
+            ],
         }
+
+
+def _numbers(values: Array | None) -> list[float] | None:
+    return None if values is None else [float(x) for x in values]
+
+
+def _place(event: Event, answer: EventAnswer) -> None:
+    for name, value in vars(answer).items():
+        setattr(event, name, value)
 
 
 class _Strongest:
@@ -93,9 +128,14 @@ class EventRecorder:
     """Turns levels into events, for a live stream or for a recording read in parts.
 
     `events` are all events so far; those of `open_events()` still last.
+
+    Args:
+        detector: that judges the samples.
+        localizer: that follows the same samples, in the same parts; None: no places.
     """
 
-    def __init__(self, detector: Detector) -> None:
+    def __init__(self, detector: Detector, localizer: Localizer | None = None) -> None:
+        self._localizer = localizer
         self.events: list[Event] = []
         self._robot = detector.observer.robot
         self._rows = detector.thresholds.rows
@@ -105,26 +145,63 @@ class EventRecorder:
         """Events that last, by number of their segment."""
         return {segment: event for segment, (event, _) in self._open.items()}
 
-    def add(self, time: Array, q: Array, estimate: Estimate, detection: Detection) -> None:
-        """Takes N samples: `time` (N,) [s], `q` (N, n), and what was made of them."""
+    def add(
+        self,
+        time: Array,
+        q: Array,
+        estimate: Estimate,
+        detection: Detection,
+        ended: Array | None = None,
+    ) -> NDArray[np.int64]:
+        """Takes N samples: `time` (N,) [s], `q` (N, n), and what was made of them.
+
+        Args:
+            time: (N,) [s].
+            q: (N, n) [rad or m].
+            estimate: of these samples.
+            detection: of these samples.
+            ended: the native events that ended, see `Localizer.follow`.
+
+        Returns:
+            (N, m) the number of the event on each segment, -1 where there is none.
+        """
+        ids = np.full(detection.levels.shape, -1)
         for g in range(len(self._robot.segment_names)):
             levels = detection.levels[:, g]
             if g in self._open or levels.any():
-                self._add_segment(g, levels, time, q, estimate, detection)
+                places = [row[2:] for row in ended if row[1] == g] if ended is not None else []
+                self._add_segment(g, levels, time, q, estimate, detection, ids, places)
+        return ids
+
+    def locate_open(self) -> None:
+        """Brings the places of the events that last up to date."""
+        if self._localizer is None:
+            return
+        for g, (event, _) in self._open.items():
+            _place(event, self._localizer.event(g))
 
     def _add_segment(
-        self, g: int, levels: Array, time: Array, q: Array, estimate: Estimate, detection: Detection
+        self,
+        g: int,
+        levels: Array,
+        time: Array,
+        q: Array,
+        estimate: Estimate,
+        detection: Detection,
+        ids: NDArray[np.int64],
+        places: list[Array],
     ) -> None:
         active = levels > 0
         edges = np.flatnonzero(np.diff(active.astype(int), prepend=int(g in self._open)))
         bounds = [0, *edges.tolist(), len(time)]
         for start, stop in zip(bounds[:-1], bounds[1:], strict=True):
             if start in edges and not active[start]:
-                self._close(g, float(time[start]))
+                self._close(g, float(time[start]), places)
             if start == stop or not active[start]:
                 continue
             if g not in self._open:
                 self._begin(g, float(time[start]))
+            ids[start:stop, g] = self._open[g][0].id
             self._extend(g, slice(start, stop), levels, q, estimate, detection)
 
     def _begin(self, g: int, time: float) -> None:
@@ -132,9 +209,11 @@ class EventRecorder:
         self.events.append(event)
         self._open[g] = (event, _Strongest(len(self._rows) + 3))
 
-    def _close(self, g: int, time: float) -> None:
+    def _close(self, g: int, time: float, places: list[Array]) -> None:
         event, _ = self._open.pop(g)
         event.cleared = time
+        if self._localizer is not None and places:
+            _place(event, self._localizer.event_answer(places.pop(0)))
 
     def _extend(
         self, g: int, part: slice, levels: Array, q: Array, estimate: Estimate, detection: Detection

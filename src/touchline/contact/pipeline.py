@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Observer, detection and (later stages) localization in one object."""
+"""Observer, detection and localization in one object."""
 
 from dataclasses import dataclass
 
@@ -9,10 +9,14 @@ from numpy.typing import ArrayLike, NDArray
 from touchline.contact.contact import Contact
 from touchline.contact.detector import Detection, Detector
 from touchline.contact.event import Event, EventRecorder
+from touchline.contact.localizer import Localizer
+from touchline.contact.table import ContactTable
 from touchline.estimation.observer import Estimate, Observer
 from touchline.model.robot import Robot
 
 Array = NDArray[np.float64]
+
+PENDING = 256  # samples of a live stream that the events may lag behind
 
 
 @dataclass(frozen=True)
@@ -39,7 +43,9 @@ class Pipeline:
         robot: the robot.
         bandwidth: of the observer [rad/s]; default: the description's.
         method: of the observer, "segment" or "paper".
-        period: time between samples [s], for thresholds that follow from the noise.
+        period: time between samples [s], for thresholds and weights that follow from the noise.
+        rule: of the localizer, "likelihood" or "paper" (the first entry of the line).
+        relative_error: of model and gains, as a part of the load, for the localizer.
     """
 
     def __init__(
@@ -48,15 +54,30 @@ class Pipeline:
         bandwidth: float | None = None,
         method: str = "segment",
         period: float = 1e-3,
+        rule: str = "likelihood",
+        relative_error: float = 0.0,
     ) -> None:
         self.robot = robot
         self.observer = Observer(robot, bandwidth, method)
         self.detector = Detector(self.observer, period=period)
-        self.recorder = EventRecorder(self.detector)
+        self.localizer = Localizer(
+            self.observer,
+            self.detector.thresholds,
+            period,
+            rule=rule,
+            relative_error=relative_error,
+        )
+        self.recorder = EventRecorder(self.detector, self.localizer)
+        self.contacts: ContactTable | None = None
+        self._pending: list[tuple] = []
+        self._touched = b""
+        self._idle = np.zeros(len(robot.segment_names)).tobytes()
 
     @property
     def events(self) -> list[Event]:
         """All events so far, in the order of detection; one that lasts has `cleared` None."""
+        self._record()
+        self.recorder.locate_open()
         return self.recorder.events
 
     def update(
@@ -69,11 +90,12 @@ class Pipeline:
     ) -> Result:
         """Takes one sample, as `Observer.update`; a bad one is reported in `health`."""
         estimate, detection = self.detector.update(time, q, qd, tau, wrench)
-        if detection.levels.any() or self.recorder.open_events():
-            many = Detection(detection.levels[None], detection.normalized[None])
-            rows = self.observer.estimate(estimate.rows[None])
-            self.recorder.add(np.array([time]), np.asarray(q, float)[None], rows, many)
-        return Result(estimate, self._contacts(estimate), detection, estimate.health)
+        contacts: list[Contact] = []
+        touched = detection.levels.tobytes()
+        if touched != self._idle or self._touched != self._idle:
+            contacts = self._follow(time, q, qd, estimate, detection, touched)
+        self._touched = touched
+        return Result(estimate, contacts, detection, estimate.health)
 
     def run(
         self,
@@ -83,18 +105,64 @@ class Pipeline:
         tau: ArrayLike | None = None,
         wrench: ArrayLike | None = None,
     ) -> tuple[Estimate, Detection]:
-        """Takes a recording or the next part of one; `events` tells what was found."""
+        """Takes a recording or the next part of one.
+
+        Afterwards `contacts` holds a row for each touched segment and sample of this part, and
+        `events` tells what was found so far.
+        """
+        self._record()
         estimate, detection = self.detector.run(time, q, qd, tau, wrench)
-        stamps = np.asarray(time, dtype=float)
-        self.recorder.add(stamps, np.asarray(q, dtype=float), estimate, detection)
+        stamps, q, qd = (np.asarray(signal, dtype=float) for signal in (time, q, qd))
+        answers, ended = self.localizer.follow(stamps, q, qd, estimate, detection)
+        ids = self.recorder.add(stamps, q, estimate, detection, ended)
+        sample, segment = answers[:, 0].astype(int), answers[:, 1].astype(int)
+        self.contacts = ContactTable(
+            sample, segment, ids[sample, segment], answers[:, 2:], self.localizer
+        )
+        if len(stamps):
+            self._touched = detection.levels[-1].tobytes()
         return estimate, detection
 
-    def _contacts(self, estimate: Estimate) -> list[Contact]:
-        contacts = []
-        for g, event in self.recorder.open_events().items():
-            wrench = None if event.segment == "root" else estimate.segment_wrench[g]
-            force = None if wrench is None else wrench[:3]
-            contacts.append(
-                Contact(event.segment, event.id, event.level, wrench=wrench, force=force)
-            )
-        return contacts
+    def _follow(self, time, q, qd, estimate, detection, touched: bytes) -> list[Contact]:
+        q, qd = np.asarray(q, float), np.asarray(qd, float)
+        stamp = np.array([time], float)
+        answers, ended = self.localizer.follow(stamp, q, qd, estimate, detection)
+        self._pending.append((time, q.copy(), estimate.rows, detection, ended))
+        if touched != self._touched or len(self._pending) >= PENDING:
+            self._record()
+        return [self._contact(row, estimate) for row in answers]
+
+    def _record(self) -> None:
+        """Hands the samples of a live stream on to the events."""
+        if not self._pending:
+            return
+        times, qs, rows, detections, ended = zip(*self._pending, strict=True)
+        self._pending = []
+        levels = np.array([detection.levels for detection in detections])
+        normalized = np.array([detection.normalized for detection in detections])
+        self.recorder.add(
+            np.array(times),
+            np.array(qs),
+            self.observer.estimate(np.array(rows)),
+            Detection(levels, normalized),
+            np.concatenate(ended),
+        )
+
+    def _contact(self, row: Array, estimate: Estimate) -> Contact:
+        g = int(row[1])
+        event = self.recorder.open_events()[g]
+        answer = self.localizer.answer(row[2:])
+        return Contact(
+            event.segment,
+            event.id,
+            event.level,
+            answer.status or "wrench_only",
+            None if event.segment == "root" else estimate.segment_wrench[g],
+            answer.link,
+            answer.body,
+            answer.body_probability,
+            answer.position,
+            answer.force,
+            answer.covariance,
+            answer.candidates,
+        )

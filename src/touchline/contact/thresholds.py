@@ -17,7 +17,7 @@ CONFIGURATIONS = 64  # sampled for the largest effect of velocity noise
 FORCE_FLOOR, MOMENT_FLOOR, TORQUE_FLOOR = 0.5, 0.1, 0.1  # N, Nm, Nm: models are not better
 COLLISION_RATIO = 4.0
 COLLISION_FORCE = 15.0  # N; below it nothing is called a collision unless the user says so
-COLLISION_EFFORT = 0.05  # of a joint's effort limit
+COLLISION_EFFORT = 0.2  # of a joint's effort limit
 
 
 @dataclass(frozen=True)

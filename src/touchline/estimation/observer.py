@@ -32,7 +32,7 @@ class Estimate:
 
     def _wrenches(self, name: str) -> Array:
         part = self._part(name)
-        return part.reshape(*part.shape[:-1], -1, 6)
+        return part.reshape(*part.shape[:-1], part.shape[-1] // 6, 6)
 
     @property
     def tau_ext(self) -> Array:
@@ -143,7 +143,8 @@ class Observer:
         try:
             row = self._update(time, q, qd, tau, wrench)
         except TypeError:  # not arrays of float64 yet
-            row = self._update(float(time), *self.arrays((), q, qd, tau, wrench))
+            stamp = float(_numbers(time, "time", ()))
+            row = self._update(stamp, *self.arrays((), q, qd, tau, wrench))
         return Estimate(row, self._slices)
 
     def run(
@@ -159,7 +160,9 @@ class Observer:
         Raises:
             ValueError: for a wrong shape.
         """
-        stamps = np.ascontiguousarray(time, dtype=float)
+        stamps = _numbers(time, "time", None)
+        if stamps.ndim != 1:
+            raise ValueError(f"time has shape {stamps.shape}, expected (N,)")
         rows = self.kernel.run(stamps, *self.arrays(stamps.shape, q, qd, tau, wrench))
         return Estimate(rows, self._slices)
 
@@ -183,13 +186,21 @@ class Observer:
         for (name, shape), signal in zip(shapes.items(), signals, strict=True):
             full = lead + shape
             if signal is None and name in ("tau", "wrench"):
-                array = np.full(full, np.nan)
+                arrays.append(np.full(full, np.nan))
             else:
-                array = np.ascontiguousarray(signal, dtype=float)
-            if array.shape != full:
-                raise ValueError(f"{name} has shape {array.shape}, expected {full}")
-            arrays.append(array)
+                arrays.append(_numbers(signal, name, full))
         return arrays
+
+
+def _numbers(signal: ArrayLike | None, name: str, shape: tuple[int, ...] | None) -> Array:
+    """The signal as an array of float64, row by row, of the given shape if there is one."""
+    try:
+        array = np.asarray(signal, dtype=float, order="C")
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} is not an array of numbers: {error}") from None
+    if shape is not None and array.shape != shape:
+        raise ValueError(f"{name} has shape {array.shape}, expected {shape}")
+    return array
 
 
 def _require(value: str, allowed: tuple[str, ...], what: str) -> None:

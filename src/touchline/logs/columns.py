@@ -9,8 +9,8 @@ import numpy as np
 from touchline.errors import InputError
 from touchline.logs.blocks import Block
 from touchline.logs.naming import Column, Naming
-from touchline.logs.suggest import did_you_mean, listing
 from touchline.model.description import AXES, RobotDescription
+from touchline.suggest import did_you_mean, listing
 
 MEASURED = ("sensor", "motor")
 

@@ -26,8 +26,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from touchline.errors import InputError
-from touchline.logs.suggest import unknown
 from touchline.model.description import RobotDescription
+from touchline.suggest import unknown
 
 JOINT_SIGNALS = ("q", "qd", "tau")
 LOG_KEYS = ("time", *JOINT_SIGNALS, "sensors", "topics", "joint_names")
@@ -85,7 +85,7 @@ class _Reader:
             return {}
         for name in value:
             if name not in allowed:
-                self.problem(key, unknown("key", str(name), allowed))
+                self.problem(key, unknown(name, "key", allowed))
         return {name: item for name, item in value.items() if name in allowed}
 
     def factor(self, key: str, value: Any) -> float:

@@ -11,8 +11,8 @@ from touchline.logs.align import typical_period
 from touchline.logs.bagfile import Bag
 from touchline.logs.cdr import Decoder
 from touchline.logs.columns import MEASURED
-from touchline.logs.suggest import did_you_mean, listing
 from touchline.model.description import RobotDescription
+from touchline.suggest import did_you_mean, listing
 
 _ENOUGH = 1000
 _PATIENCE = 50_000

@@ -4,8 +4,8 @@
 from touchline.errors import InputError
 from touchline.logs.cdr import JOINT_STATE, WRENCH_STAMPED
 from touchline.logs.naming import Naming
-from touchline.logs.suggest import did_you_mean
 from touchline.model.description import RobotDescription
+from touchline.suggest import did_you_mean
 
 
 def choose_topics(

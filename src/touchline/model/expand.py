@@ -7,7 +7,7 @@ from touchline.model import values
 from touchline.model.description import AXES, DetectionDescription, Noise, Vector
 from touchline.model.names import RESERVED_SENSORS
 from touchline.model.schema import SensorEntry
-from touchline.model.suggest import unknown
+from touchline.suggest import unknown
 
 DEFAULT_NOISE = {"q": 0.0, "qd": 2e-4, "tau": 0.05}
 DEFAULT_SENSOR_NOISE = (0.05, 0.05, 0.05, 0.01, 0.01, 0.01)

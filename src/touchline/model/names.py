@@ -11,8 +11,8 @@ from typing import Any
 
 from touchline.model.mechanism import Mechanism
 from touchline.model.schema import JointEntry, RobotFile, SensorEntry
-from touchline.model.suggest import unknown
 from touchline.model.topology import independent_joints, outboard_links
+from touchline.suggest import unknown
 
 Problem = tuple[str, str]
 RESERVED = ("root",)  # the name of a segment

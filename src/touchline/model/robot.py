@@ -14,8 +14,8 @@ from touchline.errors import InputError
 from touchline.model.description import RobotDescription
 from touchline.model.mechanism import Mechanism
 from touchline.model.native import native_observer
-from touchline.model.suggest import did_you_mean
 from touchline.model.tree import Node, Place, TreeBuilder
+from touchline.suggest import did_you_mean
 
 Array = NDArray[np.float64]
 

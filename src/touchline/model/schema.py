@@ -30,8 +30,8 @@ from touchline.model.description import (
     Load,
     Vector,
 )
-from touchline.model.suggest import did_you_mean
 from touchline.model.values import Hook, Torque, kind_of, show
+from touchline.suggest import did_you_mean
 
 Where = tuple[str | int, ...]
 MISSING = "is missing"

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
 from touchline.model.mechanism import Joint, Mechanism, Mimic
-from touchline.model.suggest import did_you_mean
+from touchline.suggest import did_you_mean
 
 Fault = Callable[[str, str], None]
 

@@ -14,10 +14,10 @@ import numpy as np
 from touchline.errors import InputError
 from touchline.model.mechanism import Array, Joint, Link, Mechanism, Mimic
 from touchline.model.plausibility import mechanism_warnings
-from touchline.model.suggest import did_you_mean
 from touchline.model.topology import find_root, resolve_mimics
 from touchline.model.urdf_elements import Reader, named
 from touchline.model.yaml_file import read_bytes
+from touchline.suggest import did_you_mean
 
 KINDS = {name: name for name in ("revolute", "prismatic", "fixed")} | {"continuous": "revolute"}
 MANY_DOF = ("floating", "planar")

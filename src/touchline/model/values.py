@@ -16,9 +16,9 @@ import numpy as np
 from touchline.model.description import AXES, Vector
 from touchline.model.mechanism import Inertia
 from touchline.model.plausibility import inertia_problem
-from touchline.model.suggest import not_allowed
 from touchline.model.transforms import inertia_matrix
 from touchline.model.yaml_file import kind_of
+from touchline.suggest import not_allowed
 
 TORQUES = ("sensor", "motor", "none")
 

@@ -126,6 +126,13 @@ class Plant:
         self.data.qfrc_applied[self._dofs] = torque - self.friction_torque()
         return True
 
+    def set_springs(self, q: Array, stiffness: Array, damping: Array) -> None:
+        """Springs (n,) [Nm/rad] about `q` (n,) and dampers (n,) [Nm s/rad] in the joints."""
+        m = self.model
+        joints = m.dof_jntid[self._dofs]
+        m.jnt_stiffness[joints], m.dof_damping[self._dofs] = stiffness, damping
+        m.qpos_spring[self._dofs] = q
+
     def accelerate(self) -> None:
         """Computes accelerations and contact forces for the inputs that are set."""
         self._mj.mj_fwdActuation(self.model, self.data)

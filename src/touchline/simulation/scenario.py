@@ -4,112 +4,24 @@
 All take the robot first and share the settings of `Run`; the same seed gives the same numbers.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from touchline.model.robot import Robot
 from touchline.simulation.contacts import Profile, ScriptedContact, ScriptedForces
-from touchline.simulation.control import (
-    ComputedTorque,
-    JointImpedance,
-    Trajectory,
-    hold,
-    sinusoids,
-)
-from touchline.simulation.noise import SensorNoise, perturbed
-from touchline.simulation.plant import Plant
-from touchline.simulation.sensing import sense
-from touchline.simulation.setup import Setup, read_setup
-from touchline.simulation.simulator import Contacts, Rates, run
+from touchline.simulation.control import ComputedTorque, Trajectory, hold
+from touchline.simulation.places import Place, PlaceFinder, weakest_direction
+from touchline.simulation.pushers import CollidingPushers, Pusher
+from touchline.simulation.random_push import random_pushes
+from touchline.simulation.scene import Run, Tracking, impedance, simulate, wandering
+from touchline.simulation.setup import read_setup
+from touchline.simulation.shapes import shapes_for_collisions
+from touchline.simulation.touchable import structure_links
 from touchline.simulation.truth import Simulated
 
 Array = NDArray[np.float64]
-Tracking = ComputedTorque | JointImpedance
-
-
-@dataclass(frozen=True)
-class Run:
-    """Settings of every scenario.
-
-    Attributes:
-        seed: of motions, places and noise.
-        rate: of the log [Hz]; divides `physics`.
-        physics: rate of the physics [Hz].
-        control: rate of the controller [Hz]; default: that of the physics.
-        noise: of the sensors; None: ideal sensors.
-        model_error: 1 sigma of the relative error of the plant's inertias.
-    """
-
-    seed: int = 0
-    rate: float = 1000.0
-    physics: float = 4000.0
-    control: float | None = None
-    noise: SensorNoise | None = None
-    model_error: float = 0.0
-
-
-def simulate(
-    robot: Robot,
-    controller: Tracking,
-    contacts: Sequence[Contacts],
-    seconds: float,
-    settings: Run,
-    **metadata: Any,
-) -> Simulated:
-    """Runs a scenario whose controller follows a trajectory, from that on; its log starts at 0."""
-    rng = np.random.default_rng([settings.seed, 1])
-    plant = make_plant(robot, settings)
-    begin = -1.0 / settings.rate
-    goal = controller.trajectory(begin)
-    plant.reset(goal.q, goal.qd, begin)
-    rates = Rates(settings.rate, settings.control)
-    readings, truth = run(plant, controller, contacts, seconds, rates)
-    samples = sense(robot, readings, settings.noise, rng)
-    return Simulated(samples, truth, describe(robot, settings) | metadata)
-
-
-def make_plant(robot: Robot, settings: Run, **options: Any) -> Plant:
-    """The plant with the settings' rate and errors of the model."""
-    mechanism = robot.mechanism
-    if settings.model_error:
-        rng = np.random.default_rng([settings.seed, 2])
-        mechanism = perturbed(mechanism, settings.model_error, rng)
-    return Plant(robot, settings.physics, mechanism, **options)
-
-
-def describe(robot: Robot, settings: Run) -> dict[str, Any]:
-    """The settings as metadata of a log."""
-    return {
-        "robot": robot.name,
-        "seed": settings.seed,
-        "rate": settings.rate,
-        "physics": settings.physics,
-        "noise": settings.noise is not None,
-        "truth.links": list(robot.mechanism.links),
-    }
-
-
-def impedance(setup: Setup, trajectory: Trajectory) -> Tracking:
-    """Joint impedance with the robot's gains, or computed torque where none are known."""
-    if setup.stiffness is None or setup.damping is None:
-        return ComputedTorque(trajectory)
-    return JointImpedance(trajectory, setup.stiffness, setup.damping)
-
-
-def wandering(setup: Setup, speed: float, rng: np.random.Generator) -> Trajectory:
-    """Sinusoids about the home pose, the fastest joint at `speed` [rad/s] at most."""
-    n = len(setup.home)
-    amplitude = rng.uniform(0.4, 1.0, n) * np.clip(
-        np.minimum(setup.upper - setup.home, setup.home - setup.lower), 0.05, 0.8
-    )
-    peak = np.minimum(rng.uniform(0.5, 1.0, n), 1.0)
-    peak[rng.integers(n)] = 1.0
-    velocity = np.minimum(speed * peak, 0.9 * setup.speed)
-    return sinusoids(setup.home, amplitude, velocity / amplitude, rng.uniform(0, 2 * np.pi, n))
 
 
 def free_motion(
@@ -124,8 +36,7 @@ def free_motion(
         settings: rates, noise, seed.
     """
     settings = settings or Run()
-    setup = read_setup(robot)
-    trajectory = wandering(setup, speed, np.random.default_rng(settings.seed))
+    trajectory = wandering(read_setup(robot), speed, np.random.default_rng(settings.seed))
     controller = ComputedTorque(trajectory)
     return simulate(robot, controller, [], seconds, settings, scenario="free_motion")
 
@@ -137,29 +48,214 @@ def scripted(
     speed: float = 0.0,
     settings: Run | None = None,
     start: Array | None = None,
-    **metadata: Any,
 ) -> Simulated:
-    """Forces at given points of the arm, which stands (`speed` 0) or moves [rad/s].
+    """Forces at given points of the arm.
 
     Args:
         robot: any.
         contacts: one slot of the truth each.
         seconds: duration.
-        speed: of the fastest joint; standing, the arm is held by joint impedance control.
+        speed: of the fastest joint [rad/s]; 0: the arm is held by joint impedance control.
         settings: rates, noise, seed.
-        start: (n,) where a standing arm stands; default: home.
-        metadata: kept with the log.
+        start: (n,) where the arm stands or about which it moves; default: home.
+    """
+    settings = settings or Run()
+    controller = _motion(robot, speed, settings, start)
+    forces = [ScriptedForces(contacts)]
+    return simulate(robot, controller, forces, seconds, settings, scenario="scripted")
+
+
+def three_touches(
+    robot: Robot,
+    speed: float = 0.0,
+    force: float = 20.0,
+    seconds: float = 1.0,
+    settings: Run | None = None,
+) -> Simulated:
+    """Every segment is touched at the same time: structure, handle and end effector of `sara`.
+
+    The forces are constant in world, pass through points fixed on the links, begin at 0.2 s and
+    end 0.1 s before the log does.
+
+    Args:
+        robot: with one six-axis sensor or more.
+        speed: of the fastest joint [rad/s]; 0: the arm is held by joint impedance control.
+        force: of each touch [N].
+        seconds: duration.
+        settings: rates, noise, seed.
+    """
+    segments: dict[str, list[str]] = {}
+    for body in robot.bodies:
+        if body.segment != "root":
+            segments.setdefault(body.segment, []).extend(body.links)
+    groups = list(segments.values())
+    return _touched(robot, groups, speed, force, seconds, settings, "three_touches")
+
+
+def base_touch(
+    robot: Robot,
+    speed: float = 0.0,
+    force: float = 20.0,
+    seconds: float = 1.0,
+    settings: Run | None = None,
+) -> Simulated:
+    """The innermost link of the structure is touched, which no joint torque can show.
+
+    Arguments as in `three_touches`.
+    """
+    innermost = [structure_links(robot)[:1]]
+    return _touched(robot, innermost, speed, force, seconds, settings, "base_touch")
+
+
+def singular_push(
+    robot: Robot, force: float = 20.0, seconds: float = 1.0, settings: Run | None = None
+) -> Simulated:
+    """The stretched arm is pushed in the direction in which it cannot move.
+
+    Arguments as in `three_touches`.
+
+    Raises:
+        InputError: no surface of the structure can be pushed in such a direction.
     """
     settings = settings or Run()
     setup = read_setup(robot)
+    trajectory = hold(setup.stretched)
+    links = structure_links(robot)
+    outer = links[len(links) // 2 :]
+    direction, weakness = weakest_direction(robot, outer[-1], np.zeros(3), setup.stretched)
+    finder = PlaceFinder(robot, trajectory, np.random.default_rng(settings.seed))
+    place = finder.find(outer, 0.0, 0.0, direction=direction)
+    contacts = [ScriptedForces([_contact(place, force, 0.2, seconds - 0.1)])]
+    controller = impedance(setup, trajectory)
+    told = {"scenario": "singular_push", "singular_value_ratio": weakness}
+    return simulate(robot, controller, contacts, seconds, settings, **told)
+
+
+def colliding_pushers(
+    robot: Robot,
+    speed: float = 0.0,
+    force: float = 20.0,
+    hold_time: float = 0.5,
+    settings: Run | None = None,
+) -> Simulated:
+    """A ball is pressed against each segment, one after the other and then together.
+
+    The truth are MuJoCo's own contact forces, friction included.
+
+    Args:
+        robot: with surfaces.
+        speed: of the fastest joint [rad/s], which moves by 1 cm or so; 0: the arm is held.
+        force: of each ball's spring [N].
+        hold_time: with full force [s].
+        settings: rates, noise, seed.
+    """
+    settings = settings or Run()
+    setup = read_setup(robot)
+    trajectory = hold(setup.home)
     if speed:
-        trajectory = wandering(setup, speed, np.random.default_rng(settings.seed))
-        controller: Tracking = ComputedTorque(trajectory)
-    else:
-        trajectory = hold(setup.home if start is None else start)
-        controller = impedance(setup, trajectory)
+        trajectory = wandering(setup, speed, np.random.default_rng(settings.seed), reach=0.02)
+    pushers = _pushers(robot, trajectory, force, hold_time, settings)
+    balls = CollidingPushers(pushers)
+    shapes = shapes_for_collisions(robot.mechanism, {pusher.link for pusher in pushers})
+
+    def add(spec, bodies) -> None:
+        shapes(spec, bodies)
+        balls.add(spec, bodies)
+
+    controller = impedance(setup, trajectory)
+    seconds = max(pusher.start + pusher.duration for pusher in pushers) + 0.2
+    told = {"scenario": "colliding_pushers", "pushers": [pusher.name for pusher in pushers]}
+    return simulate(robot, controller, [balls], seconds, settings, addition=add, **told)
+
+
+def demo(robot: Robot, seconds: float = 20.0, settings: Run | None = None) -> Simulated:
+    """The arm moves slowly, is touched near its base, then at three places at once, and again.
+
+    Args:
+        robot: with one six-axis sensor or more.
+        seconds: duration.
+        settings: rates, noise, seed.
+    """
+    settings = settings or Run()
+    trajectory = wandering(read_setup(robot), 0.35, np.random.default_rng(settings.seed))
+    finder = PlaceFinder(robot, trajectory, np.random.default_rng([settings.seed, 3]))
+    links = structure_links(robot)
+    ends = [body.links for body in robot.bodies if body.segment not in ("root", _structure(robot))]
+    acts = [(links[:1], 0.5), (links[3:6], 3.0), *((e, 3.0) for e in ends), (links[1:3], 6.0)]
+    contacts = []
+    for begin in np.arange(0.5, seconds - 2.0, 8.0):
+        for group, offset in acts:
+            start = float(begin + offset)
+            if start + 1.5 < seconds:
+                place = finder.find(group, start, start + 1.5)
+                force = finder.rng.uniform(10.0, 30.0)
+                contacts.append(_contact(place, force, start, start + 1.5))
+    controller = ComputedTorque(trajectory)
     forces = [ScriptedForces(contacts)]
-    return simulate(robot, controller, forces, seconds, settings, **metadata)
+    return simulate(robot, controller, forces, seconds, settings, scenario="demo")
 
 
-__all__ = ["Profile", "Run", "ScriptedContact", "SensorNoise", "free_motion", "scripted"]
+def _motion(robot: Robot, speed: float, settings: Run, start: Array | None = None) -> Tracking:
+    setup = read_setup(robot)
+    if speed:
+        rng = np.random.default_rng(settings.seed)
+        return ComputedTorque(wandering(setup, speed, rng, center=start))
+    return impedance(setup, hold(setup.home if start is None else start))
+
+
+def _touched(
+    robot: Robot,
+    groups: Sequence[Sequence[str]],
+    speed: float,
+    force: float,
+    seconds: float,
+    settings: Run | None,
+    name: str,
+) -> Simulated:
+    """One scripted touch on each group of links, all at the same time."""
+    settings = settings or Run()
+    controller = _motion(robot, speed, settings)
+    rng = np.random.default_rng([settings.seed, 3])
+    finder = PlaceFinder(robot, controller.trajectory, rng)
+    begin, end = 0.2, seconds - 0.1
+    contacts = [_contact(finder.find(group, begin, end), force, begin, end) for group in groups]
+    forces = [ScriptedForces(contacts)]
+    return simulate(robot, controller, forces, seconds, settings, scenario=name)
+
+
+def _contact(place: Place, force: float, begin: float, end: float) -> ScriptedContact:
+    """A touch that is there from `begin` to `end` [s], with flanks of 50 ms."""
+    profile = Profile(begin, hold=max(end - begin - 0.1, 0.0))
+    return ScriptedContact(place.link, place.at.point, force * place.direction, profile)
+
+
+def _structure(robot: Robot) -> str:
+    return robot.body_of(structure_links(robot)[0]).segment
+
+
+def _pushers(
+    robot: Robot, trajectory: Trajectory, force: float, hold_time: float, settings: Run
+) -> list[Pusher]:
+    rng = np.random.default_rng([settings.seed, 3])
+    finder = PlaceFinder(robot, trajectory, rng)
+    segments = {body.segment: body.links for body in robot.bodies if body.segment != "root"}
+    groups = segments | {_structure(robot): structure_links(robot)[2:]}
+    pushers = []
+    for i, (segment, links) in enumerate(groups.items()):
+        place = finder.find(links, 0.0, 0.0, clearance=0.06)
+        T = robot.T_world_links(trajectory(0.0).q)[place.link]
+        point = T[:3, :3] @ place.at.point + T[:3, 3]
+        start = 0.1 + 0.6 * i
+        pushers.append(Pusher(segment, place.link, point, place.direction, start, hold_time, force))
+    return pushers
+
+
+SCENARIOS: dict[str, Callable[..., Simulated]] = {
+    "free_motion": free_motion,
+    "three_touches": three_touches,
+    "base_touch": base_touch,
+    "singular_push": singular_push,
+    "colliding_pushers": colliding_pushers,
+    "random_pushes": random_pushes,
+    "demo": demo,
+}

@@ -66,17 +66,26 @@
     return list;
   };
   const outline = (column, x, y, width) => {
+    const groups = steps(width);
+    const wide = groups.length > 0 && x(data.width) - x(0) > 3;
     let path = "", up = true, broken = true;
-    for (const [from, to] of steps(width)) {
+    for (const [from, to] of groups) {
       const [low, high] = extremes(column, from, to);
       if (low > high) { broken = true; continue; }
+      if (wide && low !== high) {  // a box: where in it the values lie is not known
+        path += `M${x(from * data.width).toFixed(1)} ${y(low).toFixed(1)}` +
+          `H${x(to * data.width).toFixed(1)}V${y(high).toFixed(1)}` +
+          `H${x(from * data.width).toFixed(1)}Z`;
+        broken = true;
+        continue;
+      }
       const at = x(((from + to) / 2) * data.width).toFixed(1);
       const ends = up ? [low, high] : [high, low];
       path += `${broken ? "M" : "L"}${at} ${y(ends[0]).toFixed(1)}`;
       if (low !== high) { path += `L${at} ${y(ends[1]).toFixed(1)}`; up = !up; }
       broken = false;
     }
-    return path;
+    return { path, wide };
   };
   const band = (panel, x, y, width) => {
     const top = [], bottom = [];
@@ -114,6 +123,13 @@
     node("title", {}, rect).textContent = event.title;
   };
 
+  let clips = 0;
+  const clipTo = (svg, width, height) => {
+    const id = `clip${clips++}`;
+    node("rect", { x: LEFT, y: TOP, width, height }, node("clipPath", { id }, svg));
+    return { "clip-path": `url(#${id})` };
+  };
+
   const drawPanel = (panel, svg) => {
     const width = Math.max(svg.clientWidth, 320), height = 120;
     const x = frame(svg, width, height), [low, high] = range(panel);
@@ -130,13 +146,18 @@
     for (const event of data.events)
       if (panel.segment === null || event.segment === panel.segment)
         shade(svg, x, width, event, TOP, height - TOP - BOTTOM, "");
-    if (panel.band !== null) node("path", { d: band(panel, x, y, inner), class: "band" }, svg);
+    const clipped = clipTo(svg, inner, height - TOP - BOTTOM);
+    if (panel.band !== null)
+      node("path", { d: band(panel, x, y, inner), class: "band", ...clipped }, svg);
     else if (panel.limit !== null)
       node("line", { x1: LEFT, x2: width - RIGHT, y1: y(panel.limit), y2: y(panel.limit),
         class: "limit" }, svg);
     // Drawn last to first: the first curve is the one that matters most.
     panel.curves.map((c, i) => [c, i]).reverse().forEach(([curve, i]) =>
-      node("path", { d: outline(curve.column, x, y, inner), class: `curve s${i}` }, svg));
+{
+      const { path, wide } = outline(curve.column, x, y, inner);
+      node("path", { d: path, class: `curve s${i}${wide ? " boxes" : ""}`, ...clipped }, svg);
+    });
   };
 
   const drawStrip = (svg) => {

@@ -8,8 +8,17 @@ from typing import Any
 
 def did_you_mean(word: Any, allowed: Iterable[str]) -> str:
     """Return ` (did you mean 'X'?)` for the closest allowed word, or nothing."""
-    close = get_close_matches(str(word), list(allowed), n=1)
+    allowed = list(allowed)
+    close = [name for name in allowed if name.lower() == str(word).lower()]
+    close = close or get_close_matches(str(word), allowed, n=1)
     return f" (did you mean '{close[0]}'?)" if close else ""
+
+
+def listing(names: Iterable[str], limit: int = 60) -> str:
+    """Return the names, comma separated, of many only the first."""
+    names = list(names)
+    more = f", ... ({len(names) - limit} more)" if len(names) > limit else ""
+    return (", ".join(names[:limit]) or "none") + more
 
 
 def not_allowed(word: Any, allowed: Iterable[str]) -> str:
@@ -19,7 +28,6 @@ def not_allowed(word: Any, allowed: Iterable[str]) -> str:
 
 
 def unknown(word: Any, kind: str, known: Iterable[str]) -> str:
-    """Return `unknown KIND 'word'; known: a, b, c (did you mean 'a'?)`, of many names only some."""
+    """Return `unknown KIND 'word'; known: a, b, c (did you mean 'a'?)`."""
     known = list(known)
-    shown = ", ".join(known[:20]) + (", ..." if len(known) > 20 else "")
-    return f"unknown {kind} '{word}'; known: {shown or 'none'}{did_you_mean(word, known)}"
+    return f"unknown {kind} '{word}'; known: {listing(known, 20)}{did_you_mean(word, known)}"

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// NumPy arrays in and out, as fast as NumPy allows: a call per sample takes five of them.
+#pragma once
+
+#define NPY_NO_DEPRECATED_API NPY_2_0_API_VERSION
+#define NPY_TARGET_VERSION NPY_2_0_API_VERSION
+#include <nanobind/nanobind.h>
+#include <numpy/arrayobject.h>
+
+#include <cstddef>
+#include <initializer_list>
+
+namespace arrays {
+
+namespace nb = nanobind;
+
+// To be called once, when the module is imported.
+inline void initialize() {
+  if (PyArray_ImportNumPyAPI() < 0) throw nb::python_error();
+}
+
+// The numbers of an array of float64 of exactly this shape, rows one after the other. Anything
+// else is a TypeError: the caller in Python then converts, or tells what is wrong.
+inline const double* numbers(nb::handle object, std::initializer_list<std::size_t> shape) {
+  if (!PyArray_Check(object.ptr())) throw nb::type_error("not an array");
+  PyArrayObject* array = reinterpret_cast<PyArrayObject*>(object.ptr());
+  if (PyArray_TYPE(array) != NPY_DOUBLE || !PyArray_ISCARRAY_RO(array))
+    throw nb::type_error("not an array of float64, row by row");
+  bool same = PyArray_NDIM(array) == static_cast<int>(shape.size());
+  const npy_intp* size = PyArray_DIMS(array);
+  for (const std::size_t wanted : shape) {
+    if (!same) break;
+    same = static_cast<std::size_t>(*size++) == wanted;
+  }
+  if (!same) throw nb::type_error("another shape");
+  return static_cast<const double*>(PyArray_DATA(array));
+}
+
+// The length of an array of float64 with one axis.
+inline std::size_t length(nb::handle object) {
+  if (!PyArray_Check(object.ptr())) throw nb::type_error("not an array");
+  PyArrayObject* array = reinterpret_cast<PyArrayObject*>(object.ptr());
+  return PyArray_NDIM(array) == 1 ? static_cast<std::size_t>(PyArray_DIMS(array)[0]) : 0;
+}
+
+// A new array, not initialized.
+class Out {
+ public:
+  explicit Out(std::initializer_list<std::size_t> shape) {
+    npy_intp dims[4] = {};
+    std::size_t axes = 0;
+    for (const std::size_t size : shape) dims[axes++] = static_cast<npy_intp>(size);
+    object_ = nb::steal(PyArray_SimpleNew(static_cast<int>(axes), dims, NPY_DOUBLE));
+    if (!object_.is_valid()) throw nb::python_error();
+  }
+  double* data() const {
+    return static_cast<double*>(PyArray_DATA(reinterpret_cast<PyArrayObject*>(object_.ptr())));
+  }
+  nb::object release() { return std::move(object_); }
+
+ private:
+  nb::object object_;
+};
+
+}  // namespace arrays

@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: Apache-2.0
+// Meshes and the localizer for Python.
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/vector.h>
+
+#include <cstdint>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+#include "touchline/localizer.hpp"
+
+namespace contact {
+
+namespace nb = nanobind;
+namespace tl = touchline;
+using namespace nb::literals;
+
+using In = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
+using Out = nb::ndarray<nb::numpy, double>;
+using Faces = nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+
+inline Out array(const std::vector<double>& values, std::size_t rows, std::size_t columns) {
+  double* raw = new double[values.size()];
+  std::copy(values.begin(), values.end(), raw);
+  nb::capsule owner(raw, [](void* p) noexcept { delete[] static_cast<double*>(p); });
+  return Out(raw, {rows, columns}, owner);
+}
+
+inline tl::Vec3 vec3(const In& v) {
+  if (v.size() != 3) throw std::invalid_argument("three numbers are needed");
+  return {v.data()[0], v.data()[1], v.data()[2]};
+}
+
+inline tl::ForceLine line(const In& origin, const In& direction) {
+  const tl::Vec3 d = vec3(direction);
+  const double length = tl::norm(d);
+  if (!(length > 0.0)) throw std::invalid_argument("a line needs a direction");
+  return {vec3(origin), (1.0 / length) * d};
+}
+
+inline tl::Mesh mesh(const In& vertices, const Faces& faces) {
+  if (vertices.size() % 3 != 0 || faces.shape(1) != 3)
+    throw std::invalid_argument("vertices and faces have three columns");
+  const std::size_t count = vertices.size() / 3;
+  std::vector<tl::Vec3> points(count);
+  for (std::size_t i = 0; i < count; ++i)
+    points[i] = {vertices.data()[3 * i], vertices.data()[3 * i + 1], vertices.data()[3 * i + 2]};
+  std::vector<std::array<int, 3>> triangles(faces.shape(0));
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    for (int k = 0; k < 3; ++k) {
+      const std::int64_t v = faces.data()[3 * i + k];
+      if (v < 0 || static_cast<std::size_t>(v) >= count)
+        throw std::invalid_argument("a face names a vertex that is not there");
+      triangles[i][k] = static_cast<int>(v);
+    }
+  }
+  return tl::Mesh(points, triangles);
+}
+
+inline void push(std::vector<double>& out, const tl::Vec3& v) {
+  out.insert(out.end(), {v.x, v.y, v.z});
+}
+
+// Rows: t, face, normal.
+inline Out crossings(const tl::Mesh& m, const In& origin, const In& direction) {
+  std::vector<double> out;
+  m.crossings(line(origin, direction), [&](const tl::Crossing& c) {
+    out.insert(out.end(), {c.t, static_cast<double>(c.face)});
+    push(out, c.normal);
+  });
+  return array(out, out.size() / 5, 5);
+}
+
+// One row: distance, face, point, normal.
+inline Out surface_point(const tl::SurfacePoint& p) {
+  std::vector<double> out{p.distance, static_cast<double>(p.face)};
+  push(out, p.point);
+  push(out, p.normal);
+  return array(out, 1, 8);
+}
+
+// An answer as numbers: status, surface, node, body probability, point, force, covariance, pitch,
+// chi2, degrees of freedom, number of candidates, then per candidate surface, node, probability,
+// point.
+constexpr int kHead = 23, kPerCandidate = 6;
+constexpr int kWidth = kHead + kPerCandidate * tl::Answer::kCandidates;
+
+inline void write(const tl::Localizer& l, const tl::Answer& a, double* out) {
+  std::fill(out, out + kWidth, std::nan(""));
+  out[0] = static_cast<double>(a.status);
+  out[22] = a.count;
+  out[1] = out[2] = -1.0;
+  const double force[3] = {a.force.x, a.force.y, a.force.z};
+  std::copy(force, force + 3, out + 7);
+  if (a.count == 0) return;
+  const tl::Candidate& best = a.candidates[0];
+  out[1] = best.surface;
+  out[2] = l.surfaces()[best.surface].node;
+  out[3] = a.body_probability;
+  const double point[3] = {best.point.x, best.point.y, best.point.z};
+  std::copy(point, point + 3, out + 4);
+  std::copy(a.covariance, a.covariance + 9, out + 10);
+  out[19] = a.pitch;
+  out[20] = a.chi2;
+  out[21] = a.degrees;
+  for (int i = 0; i < a.count; ++i) {
+    const tl::Candidate& c = a.candidates[i];
+    double* to = out + kHead + kPerCandidate * i;
+    const double values[6] = {static_cast<double>(c.surface),
+                              static_cast<double>(l.surfaces()[c.surface].node),
+                              c.weight, c.point.x, c.point.y, c.point.z};
+    std::copy(values, values + 6, to);
+  }
+}
+
+inline const double* data_or_null(const std::optional<In>& a) {
+  return a ? a->data() : nullptr;
+}
+
+inline Out locate(tl::Localizer& l, int segment, const In& row, const std::optional<In>& normalized,
+                  const In& q, const std::optional<In>& qd) {
+  l.expect(segment, row.size(), normalized ? normalized->size() : l.tests(), q.size(),
+           qd ? qd->size() : q.size());
+  l.set_state(q.data(), data_or_null(qd));
+  std::vector<double> out(kWidth);
+  write(l, l.locate(segment, row.data(), data_or_null(normalized)), out.data());
+  return array(out, 1, kWidth);
+}
+
+// An event as numbers: status, time of the position, variance of the position, number of places,
+// the joint positions at that time, then per place surface, node, probability, point in the
+// frame of the node; the most probable body's best first.
+inline void push_event(tl::Localizer& l, int g, std::vector<double>& out) {
+  tl::EventPlace& event = l.conclude_event(g);
+  const std::size_t end = out.size() + 4 + l.joints() + kPerCandidate * tl::EventPlace::kPlaces;
+  out.insert(out.end(), {static_cast<double>(l.event_status(g)), event.time(), event.variance(),
+                         static_cast<double>(event.count())});
+  out.insert(out.end(), l.event_q(g).begin(), l.event_q(g).end());
+  for (int i = 0; i < event.count(); ++i) {
+    const tl::Place& p = event.place(i);
+    const tl::LinkSurface& surface = l.surfaces()[p.surface];
+    const tl::Vec3 point = surface.mesh.nearest_to_point(p.point).point;
+    out.insert(out.end(), {static_cast<double>(p.surface), static_cast<double>(surface.node),
+                           p.share, point.x, point.y, point.z});
+  }
+  out.resize(end, std::nan(""));
+}
+
+inline Out event(tl::Localizer& l, int segment) {
+  if (segment < 0 || static_cast<std::size_t>(segment) >= l.segments())
+    throw std::invalid_argument("there is no such segment");
+  std::vector<double> out;
+  push_event(l, segment, out);
+  return array(out, 1, out.size());
+}
+
+// N samples: for each sample and each segment that is touched, its sample, its segment, its answer;
+// and for each event that ends, sample, segment, event.
+inline nb::tuple follow(tl::Localizer& l, const In& time, const In& rows, const In& normalized,
+                        const In& levels, const In& q, const In& qd) {
+  const std::size_t n = l.joints(), m = l.segments(), r = l.tests(), width = l.width();
+  const std::size_t count = time.size();
+  if (rows.size() != count * width || normalized.size() != count * r ||
+      levels.size() != count * m || q.size() != count * n || qd.size() != count * n)
+    throw std::invalid_argument("the arrays do not belong to the same samples");
+  std::vector<double> answers, ended;
+  {
+    nb::gil_scoped_release release;
+    for (std::size_t i = 0; i < count; ++i) {
+      bool ready = false;
+      for (std::size_t g = 0; g < m; ++g) {
+        const bool touched = levels.data()[i * m + g] > 0.0;
+        const int segment = static_cast<int>(g);
+        if (l.enter(segment, touched)) {
+          ended.insert(ended.end(), {static_cast<double>(i), static_cast<double>(g)});
+          push_event(l, segment, ended);
+        }
+        if (!touched) continue;
+        if (!ready) l.set_state(q.data() + i * n, qd.data() + i * n);
+        ready = true;
+        const std::size_t at = answers.size();
+        answers.resize(at + 2 + kWidth);
+        answers[at] = static_cast<double>(i);
+        answers[at + 1] = static_cast<double>(g);
+        const double* tests = normalized.data() + i * r;
+        write(l, l.locate(segment, rows.data() + i * width, tests), answers.data() + at + 2);
+        l.remember(segment, tests, time.data()[i], q.data() + i * n);
+      }
+    }
+  }
+  const std::size_t event_width = 6 + n + kPerCandidate * tl::EventPlace::kPlaces;
+  return nb::make_tuple(array(answers, answers.size() / (2 + kWidth), 2 + kWidth),
+                        array(ended, ended.size() / event_width, event_width));
+}
+
+inline tl::NoiseFigures noise(std::vector<double> qd, std::vector<double> tau,
+                              std::vector<double> wrench, double period, double relative) {
+  tl::NoiseFigures figures;
+  figures.qd = std::move(qd);
+  figures.tau = std::move(tau);
+  figures.wrench = std::move(wrench);
+  figures.period = period;
+  figures.relative = relative;
+  return figures;
+}
+
+inline void bind(nb::module_& m) {
+  nb::class_<tl::Mesh>(m, "Mesh")
+      .def("crossings", &crossings, "origin"_a, "direction"_a)
+      .def("nearest_to_line",
+           [](const tl::Mesh& mesh, const In& origin, const In& direction) {
+             return surface_point(mesh.nearest_to_line(line(origin, direction)));
+           },
+           "origin"_a, "direction"_a)
+      .def("nearest_to_point", [](const tl::Mesh& mesh, const In& point) {
+        return surface_point(mesh.nearest_to_point(vec3(point)));
+      });
+  m.def("mesh", &mesh, "vertices"_a, "faces"_a);
+  nb::class_<tl::NoiseFigures>(m, "NoiseFigures");
+  m.def("noise_figures", &noise, "qd"_a, "tau"_a, "wrench"_a, "period"_a, "relative"_a);
+  nb::class_<tl::LocalizerSettings>(m, "LocalizerSettings")
+      .def(nb::init<>())
+      .def_rw("friction", &tl::LocalizerSettings::friction)
+      .def_rw("cone_softness", &tl::LocalizerSettings::cone_softness)
+      .def_rw("force_scale", &tl::LocalizerSettings::force_scale)
+      .def_rw("place_scale", &tl::LocalizerSettings::place_scale)
+      .def_rw("pitch_limit", &tl::LocalizerSettings::pitch_limit)
+      .def_rw("least_force", &tl::LocalizerSettings::least_force)
+      .def_rw("certain", &tl::LocalizerSettings::certain)
+      .def_rw("place_radius", &tl::LocalizerSettings::place_radius)
+      .def_rw("finger", &tl::LocalizerSettings::finger)
+      .def_rw("first_entry", &tl::LocalizerSettings::first_entry);
+  nb::class_<tl::LinkSurface>(m, "LinkSurface")
+      .def("__init__",
+           [](tl::LinkSurface* self, int node, const tl::Mesh& mesh) {
+             new (self) tl::LinkSurface{node, mesh};
+           })
+      .def_ro("node", &tl::LinkSurface::node);
+  nb::class_<tl::Localizer>(m, "Localizer")
+      .def("__init__",
+           [](tl::Localizer* self, const tl::Observer& observer,
+              std::vector<tl::DetectionRow> tests, const tl::NoiseFigures& figures,
+              std::vector<tl::LinkSurface> surfaces, const tl::LocalizerSettings& settings) {
+             new (self) tl::Localizer(observer, std::move(tests), figures, std::move(surfaces),
+                                      settings);
+           },
+           "observer"_a, "tests"_a, "noise"_a, "surfaces"_a, "settings"_a,
+           nb::keep_alive<1, 2>())
+      .def("wrench_covariance", [](tl::Localizer& l, const In& q, const In& row, int segment) {
+        l.expect(segment, row.size(), l.tests(), q.size(), q.size());
+        l.set_state(q.data(), nullptr);
+        std::vector<double> out(36);
+        if (!l.wrench_covariance(segment, row.data(), out.data()))
+          throw std::invalid_argument("the segment has no wrench");
+        return array(out, 6, 6);
+      })
+      .def("locate", &locate, "segment"_a, "row"_a, "normalized"_a.none(), "q"_a, "qd"_a.none())
+      .def("event", &event, "segment"_a)
+      .def("follow", &follow, "time"_a, "rows"_a, "normalized"_a, "levels"_a, "q"_a, "qd"_a);
+}
+
+}  // namespace contact
+
+inline void bind_contact(nanobind::module_& m) { contact::bind(m); }

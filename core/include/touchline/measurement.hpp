@@ -1,0 +1,386 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a segment's sensors say of one contact on one of its bodies, weighed by the covariance of
+// the noise: chi2(w) = constant - 2 vector . w + w^T information w, for the contact's wrench w in
+// world axes about the world origin. The same for every layout: a six-axis sensor at the inboard
+// end, joint torques, sensors of fewer axes, or what there is of them. No allocation per sample.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "touchline/dense.hpp"
+#include "touchline/detector.hpp"
+#include "touchline/observer.hpp"
+#include "touchline/posture.hpp"
+
+namespace touchline {
+
+// One sigma per sample of the signals, and what no filter takes away.
+struct NoiseFigures {
+  std::vector<double> qd, tau, wrench;  // n, n, 6 k
+  double period = 1e-3;                 // between samples [s]
+  double relative = 0.0;                // error of the model and the gains, as a part of the load
+  double force = 2e-3, moment = 5e-4;   // floors [N, Nm]
+};
+
+struct Quadratic {
+  double information[36];
+  double vector[6];
+  double constant;
+
+  double operator()(const double* w) const {
+    double chi2 = constant;
+    for (int i = 0; i < 6; ++i) {
+      double row = -2.0 * vector[i];
+      for (int j = 0; j < 6; ++j) row += information[6 * i + j] * w[j];
+      chi2 += row * w[i];
+    }
+    return chi2;
+  }
+};
+
+class Measurement {
+ public:
+  Measurement(const Observer& observer, std::vector<DetectionRow> tests, NoiseFigures noise)
+      : observer_(observer),
+        posture_(observer.tree(), observer.row_layout().joints),
+        tests_(std::move(tests)),
+        noise_(std::move(noise)),
+        layout_(observer.row_layout()),
+        joint_offsets_(layout_.joints) {
+    for (int g = 0; g < layout_.segments; ++g) rows_.push_back(rows_of(g));
+    std::size_t most = 0;
+    for (const auto& rows : rows_) most = std::max(most, rows.size());
+    const std::size_t size = 6 + most, sources = 6 * layout_.sensors + 2 * layout_.joints;
+    used_.resize(most);
+    own_.resize(most);
+    outboard_.resize(most);
+    coefficients_.resize(size * sources);
+    factor_.resize(size * size);
+    design_.resize(size * 7);
+  }
+
+  // The configuration of the sample; `qd` may be null.
+  void set_state(const double* q, const double* qd) { posture_.set(q, qd); }
+
+  // Takes the observer's row, and the detector's normalized rows (or null) from which the offsets
+  // follow. Returns false where nothing is known of the segment.
+  bool read(int g, const double* row, const double* normalized) {
+    segment_ = g;
+    row_ = row;
+    has_wrench_ = observer_.layout().segments[g].sensor >= 0 &&
+                  row[layout_.segment_settled() + g] > 0.0 &&
+                  std::isfinite(row[layout_.segment_wrench() + 6 * g]);
+    for (int i = 0; i < 6; ++i) raw_wrench_[i] = row[layout_.segment_wrench() + 6 * g + i];
+    find_offsets(normalized);
+    count_ = 0;
+    for (const Row& r : rows_[g]) take(r);
+    size_ = (has_wrench_ ? 6 : 0) + count_;
+    return size_ > 0 && weigh();
+  }
+
+  // The largest of a segment's normalized rows.
+  double strength(int g, const double* normalized) const {
+    double most = 0.0;
+    for (std::size_t i = 0; i < tests_.size(); ++i) {
+      if (tests_[i].segment == g) most = std::max(most, std::fabs(normalized[i]));
+    }
+    return most;
+  }
+
+  bool has_wrench() const { return has_wrench_; }
+  const double* wrench() const { return wrench_; }
+  // Rows in use: six of a wrench and the others.
+  int size() const { return size_; }
+  int scalars() const { return count_; }
+  const Posture& posture() const { return posture_; }
+  std::size_t tests() const { return tests_.size(); }
+
+  // Covariance (6, 6) of the segment's wrench.
+  void wrench_covariance(double* out) const {
+    for (int i = 0; i < 6; ++i) {
+      for (int j = 0; j < 6; ++j) {
+        out[6 * i + j] = 0.0;
+        for (int k = 0; k <= std::min(i, j); ++k)
+          out[6 * i + j] += factor_[i * size_ + k] * factor_[j * size_ + k];
+      }
+    }
+  }
+
+  // What all rows say of one contact on the body of `node`.
+  Quadratic quadratic(int node) {
+    const int first = has_wrench_ ? 6 : 0;
+    double* d = design_.data();  // rows of six, then the measured number
+    for (int i = 0; i < first; ++i) {
+      for (int k = 0; k < 6; ++k) d[7 * i + k] = i == k ? 1.0 : 0.0;
+      d[7 * i + 6] = wrench_[i];
+    }
+    for (int i = 0; i < count_; ++i) {
+      double* line = d + 7 * (first + i);
+      const bool loaded = subspace(*used_[i], node, line);
+      line[6] = own_[i];
+      if (loaded && has_wrench_ && std::isfinite(outboard_[i])) {
+        line[6] = outboard_[i];
+        for (int k = 0; k < 6; ++k) line[6] += line[k] * raw_wrench_[k];
+      }
+    }
+    for (int k = 0; k < 7; ++k) solve_lower(factor_.data(), size_, d + k, 7);
+    Quadratic result{};
+    for (int i = 0; i < size_; ++i) {
+      const double* line = d + 7 * i;
+      for (int a = 0; a < 6; ++a) {
+        for (int b = 0; b <= a; ++b) result.information[6 * a + b] += line[a] * line[b];
+        result.vector[a] += line[a] * line[6];
+      }
+      result.constant += line[6] * line[6];
+    }
+    for (int a = 0; a < 6; ++a) {
+      for (int b = a + 1; b < 6; ++b) result.information[6 * a + b] = result.information[6 * b + a];
+    }
+    return result;
+  }
+
+ private:
+  // A joint's torque, or one axis of a sensor that has fewer than six.
+  struct Row {
+    int joint, sensor, axis;
+  };
+
+  std::vector<Row> rows_of(int g) const {
+    std::vector<Row> rows;
+    const Layout& layout = observer_.layout();
+    const int own = layout.segments[g].sensor;
+    for (int j = 0; j < layout_.joints; ++j) {
+      const JointRow& joint = observer_.joints()[j];
+      if (joint.measured() && !joint.nodes.empty() && inboard_sensor(joint.nodes[0]) == own)
+        rows.push_back({j, -1, -1});
+    }
+    for (int s = 0; s < layout_.sensors; ++s) {
+      const SensorRow& sensor = observer_.sensors()[s];
+      if (sensor.six_axis() || inboard_sensor(sensor.node) != own || carries_sensor(sensor.node))
+        continue;
+      for (int a = 0; a < 6; ++a) {
+        if (sensor.axes[a]) rows.push_back({-1, s, a});
+      }
+    }
+    return rows;
+  }
+
+  int inboard_sensor(int node) const {
+    for (; node >= 0; node = posture_.nodes()[node].parent) {
+      for (std::size_t s = 0; s < observer_.sensors().size(); ++s) {
+        if (observer_.sensors()[s].six_axis() && observer_.sensors()[s].node == node)
+          return static_cast<int>(s);
+      }
+    }
+    return -1;
+  }
+
+  bool carries_sensor(int node) const {
+    for (const SensorRow& s : observer_.sensors()) {
+      if (s.six_axis() && observer_.layout().is_outboard(s.node, node)) return true;
+    }
+    return false;
+  }
+
+  // A row's offset is what the detector has taken out of it.
+  void find_offsets(const double* normalized) {
+    std::fill(joint_offsets_.begin(), joint_offsets_.end(), 0.0);
+    std::copy(raw_wrench_, raw_wrench_ + 6, wrench_);
+    if (normalized == nullptr) return;
+    double clean[6];
+    bool complete = false;
+    for (std::size_t i = 0; i < tests_.size(); ++i) {
+      const DetectionRow& test = tests_[i];
+      if (test.segment != segment_) continue;
+      const double value = normalized[i] * test.contact;
+      if (test.component < 0) {
+        joint_offsets_[test.joint] = row_[layout_.segment_torque() + test.joint] - value;
+      } else {
+        clean[test.component] = value;
+        complete = test.component == 5;
+      }
+    }
+    if (!has_wrench_ || !complete) return;
+    const int sensor = observer_.layout().segments[segment_].sensor;
+    store(wrench_to_parent(posture_.pose(observer_.sensors()[sensor].node),
+                           {{clean[0], clean[1], clean[2]}, {clean[3], clean[4], clean[5]}}),
+          wrench_);
+  }
+
+  void take(const Row& r) {
+    double own, outboard = std::nan("");
+    if (r.joint >= 0) {
+      if (!(row_[layout_.joint_settled() + r.joint] > 0.0)) return;
+      const double offset = joint_offsets_[r.joint];
+      own = row_[layout_.segment_torque() + r.joint] - offset;
+      outboard = row_[layout_.parity() + r.joint] - offset;
+    } else {
+      own = row_[layout_.sensor_wrench() + 6 * r.sensor + r.axis];
+    }
+    if (!std::isfinite(own)) return;
+    used_[count_] = &r;
+    own_[count_] = own;
+    outboard_[count_] = outboard;
+    ++count_;
+  }
+
+  // What a unit wrench on the body of `node` does to a row; false: nothing.
+  bool subspace(const Row& r, int node, double* out) const {
+    Spatial sum{};
+    bool loaded = false;
+    if (r.joint >= 0) {
+      for (int own : observer_.joints()[r.joint].nodes) {
+        if (!observer_.layout().is_outboard(node, own)) continue;
+        sum = sum + posture_.subspace(own);
+        loaded = true;
+      }
+    } else if (observer_.layout().is_outboard(node, observer_.sensors()[r.sensor].node)) {
+      sum = axis_in_world(r.sensor, r.axis);
+      loaded = true;
+    }
+    // The power of a wrench along a twist [v; w]: f . v + m . w.
+    store(sum, out);
+    return loaded;
+  }
+
+  // The twist whose product with a wrench is the sensor's reading of that axis.
+  Spatial axis_in_world(int sensor, int axis) const {
+    const Pose& X = posture_.pose(observer_.sensors()[sensor].node);
+    const Vec3 columns[3] = {X.R.x, X.R.y, X.R.z};
+    const Vec3& a = columns[axis % 3];
+    if (axis < 3) return {a, {}};
+    return {cross(X.p, a), a};
+  }
+
+  // How a first-order filter passes noise: of readings, averaged over each interval, and of
+  // velocities, which enter through a difference of momenta.
+  struct Gains {
+    double reading, velocity;
+  };
+  Gains gains(double bandwidth) const {
+    const double dt = noise_.period, a = pole(bandwidth, dt, Discretization::automatic);
+    return {std::sqrt(std::min(1.0, 0.5 * (1.0 - a))),
+            (1.0 - a) / dt * std::sqrt(2.0 / (1.0 + a))};
+  }
+
+  // The covariance of all rows, from the sources of noise, and its Cholesky factor.
+  bool weigh() {
+    const int sources = 6 * layout_.sensors + 2 * layout_.joints, first = has_wrench_ ? 6 : 0;
+    std::fill(coefficients_.begin(), coefficients_.end(), 0.0);
+    if (has_wrench_) weigh_wrench(sources);
+    for (int i = 0; i < count_; ++i) weigh_row(i, coefficients_.data() + (first + i) * sources);
+    for (int a = 0; a < size_; ++a) {
+      for (int b = 0; b <= a; ++b) {
+        const double* x = coefficients_.data() + a * sources;
+        const double* y = coefficients_.data() + b * sources;
+        double sum = 0.0;
+        for (int k = 0; k < sources; ++k) sum += x[k] * y[k];
+        factor_[a * size_ + b] = sum;
+      }
+      const double least = a < (has_wrench_ ? 3 : 0) ? noise_.force : noise_.moment;
+      factor_[a * size_ + a] += least * least;
+    }
+    return cholesky(factor_.data(), size_, 1e-15);
+  }
+
+  void weigh_wrench(int sources) {
+    const Segment& segment = observer_.layout().segments[segment_];
+    const Gains g = gains(observer_.sensors()[segment.sensor].bandwidth);
+    add_sensor(segment.sensor, g, 1.0, sources, load_error(segment.sensor));
+    for (int t : segment.successors) add_sensor(t, g, -1.0, sources, Spatial{});
+  }
+
+  // The error of gains and model, which grows with the load, by the sensor's axes.
+  Spatial load_error(int sensor) const {
+    const Spatial w = wrench_to_child(posture_.pose(observer_.sensors()[sensor].node),
+                                      {{wrench_[0], wrench_[1], wrench_[2]},
+                                       {wrench_[3], wrench_[4], wrench_[5]}});
+    return {{noise_.relative * norm3(w.linear), 0.0, 0.0},
+            {noise_.relative * norm3(w.angular), 0.0, 0.0}};
+  }
+  static double norm3(const Vec3& v) { return std::sqrt(dot(v, v)); }
+
+  void add_sensor(int s, const Gains& g, double sign, int sources, const Spatial& error) {
+    const int node = observer_.sensors()[s].node, n = layout_.joints;
+    for (int a = 0; a < 6; ++a) {
+      const double filtered = g.reading * noise_.wrench[6 * s + a];
+      const double load = a < 3 ? error.linear.x : error.angular.x;
+      add_column(6 * s + a, unit_wrench(node, a),
+                 sign * std::sqrt(filtered * filtered + load * load), sources);
+    }
+    for (int i = 0; i < n; ++i)
+      add_column(6 * layout_.sensors + n + i, posture_.momentum(node, i),
+                 sign * g.velocity * noise_.qd[i], sources);
+  }
+
+  Spatial unit_wrench(int node, int axis) const {
+    double w[6] = {0, 0, 0, 0, 0, 0};
+    w[axis] = 1.0;
+    return wrench_to_parent(posture_.pose(node), {{w[0], w[1], w[2]}, {w[3], w[4], w[5]}});
+  }
+
+  void add_column(int source, const Spatial& w, double scale, int sources) {
+    double values[6];
+    store(w, values);
+    for (int i = 0; i < 6; ++i) coefficients_[i * sources + source] += scale * values[i];
+  }
+
+  void weigh_row(int i, double* out) {
+    const Row& r = *used_[i];
+    const int n = layout_.joints, k = layout_.sensors;
+    if (r.joint < 0) {
+      const Gains g = gains(observer_.sensors()[r.sensor].bandwidth);
+      const double load = noise_.relative * own_[i];
+      const double filtered = g.reading * noise_.wrench[6 * r.sensor + r.axis];
+      out[6 * r.sensor + r.axis] = std::sqrt(filtered * filtered + load * load);
+      const Spatial axis = axis_in_world(r.sensor, r.axis);
+      const int node = observer_.sensors()[r.sensor].node;
+      for (int c = 0; c < n; ++c)
+        out[6 * k + n + c] = g.velocity * noise_.qd[c] * dot(axis, posture_.momentum(node, c));
+      return;
+    }
+    const JointRow& joint = observer_.joints()[r.joint];
+    const Gains g = gains(joint.bandwidth);
+    const double load = noise_.relative * own_[i], filtered = g.reading * noise_.tau[r.joint];
+    out[6 * k + r.joint] = std::sqrt(filtered * filtered + load * load);
+    for (int node : joint.nodes) {
+      const Spatial& s = posture_.subspace(node);
+      for (int c = 0; c < n; ++c)
+        out[6 * k + n + c] += g.velocity * noise_.qd[c] * dot(s, posture_.momentum(node, c));
+    }
+    for (const Projection& pair : observer_.layout().outboard_sensors[r.joint])
+      subtract_sensor(pair, g, out);
+  }
+
+  void subtract_sensor(const Projection& pair, const Gains& g, double* out) {
+    const int n = layout_.joints, k = layout_.sensors;
+    const Spatial& s = posture_.subspace(observer_.layout().lines[pair.line].node);
+    const int node = observer_.sensors()[pair.sensor].node;
+    for (int a = 0; a < 6; ++a)
+      out[6 * pair.sensor + a] -=
+          g.reading * noise_.wrench[6 * pair.sensor + a] * dot(s, unit_wrench(node, a));
+    for (int c = 0; c < n; ++c)
+      out[6 * k + n + c] -= g.velocity * noise_.qd[c] * dot(s, posture_.momentum(node, c));
+  }
+
+  const Observer& observer_;
+  Posture posture_;
+  std::vector<DetectionRow> tests_;
+  NoiseFigures noise_;
+  RowLayout layout_;
+  std::vector<std::vector<Row>> rows_;  // per segment
+  std::vector<double> joint_offsets_;
+
+  int segment_ = 0, count_ = 0, size_ = 0;
+  const double* row_ = nullptr;
+  bool has_wrench_ = false;
+  double wrench_[6] = {}, raw_wrench_[6] = {};
+  std::vector<const Row*> used_;
+  std::vector<double> own_;       // if the contact is inboard of the joint
+  std::vector<double> outboard_;  // if it is outboard, less what the wrench says
+  std::vector<double> coefficients_, factor_, design_;
+};
+
+}  // namespace touchline

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// The robot at one configuration, all in world axes about the world origin: poses, the twist of
+// each joint, and the momentum that a unit velocity of each joint makes. No allocation per sample.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "touchline/tree.hpp"
+
+namespace touchline {
+
+inline double dot(const Spatial& a, const Spatial& b) {
+  return dot(a.linear, b.linear) + dot(a.angular, b.angular);
+}
+
+class Posture {
+ public:
+  Posture(const Tree& tree, std::size_t joints)
+      : tree_(tree),
+        state_(tree.make_state<double>()),
+        unit_(joints, 0.0),
+        poses_(tree.nodes().size()),
+        subspaces_(tree.nodes().size()),
+        momenta_(tree.nodes().size() * joints) {}
+
+  // `qd` may be null: at rest.
+  void set(const double* q, const double* qd) {
+    const std::size_t joints = unit_.size();
+    for (std::size_t j = 0; j < joints; ++j) {
+      unit_[j] = 1.0;
+      tree_.sweep(q, unit_.data(), state_);
+      unit_[j] = 0.0;
+      for (std::size_t i = 0; i < poses_.size(); ++i) {
+        const NodeState<double>& s = state_.node(static_cast<int>(i));
+        momenta_[i * joints + j] = {s.linear_momentum,
+                                    s.angular_momentum + cross(s.p, s.linear_momentum)};
+      }
+    }
+    tree_.sweep(q, qd != nullptr ? qd : unit_.data(), state_);
+    for (std::size_t i = 0; i < poses_.size(); ++i) place(i);
+  }
+
+  const std::vector<Node>& nodes() const { return tree_.nodes(); }
+  const Pose& pose(int node) const { return poses_[node]; }
+  // The twist of a unit velocity of the joint that moves this node.
+  const Spatial& subspace(int node) const { return subspaces_[node]; }
+  // The momentum of a node and all outboard of it, by a unit velocity of a joint.
+  const Spatial& momentum(int node, std::size_t joint) const {
+    return momenta_[node * unit_.size() + joint];
+  }
+
+ private:
+  void place(std::size_t i) {
+    const NodeState<double>& s = state_.node(static_cast<int>(i));
+    const Node& node = tree_.nodes()[i];
+    poses_[i] = {s.R, s.p};
+    const Vec3 axis = node.multiplier * s.R.z;
+    if (node.kind == NodeKind::revolute) subspaces_[i] = {cross(s.p, axis), axis};
+    if (node.kind == NodeKind::prismatic) subspaces_[i] = {axis, {}};
+  }
+
+  const Tree& tree_;
+  TreeState<double> state_;
+  std::vector<double> unit_;
+  std::vector<Pose> poses_;          // per node
+  std::vector<Spatial> subspaces_;   // per node
+  std::vector<Spatial> momenta_;     // per node and joint
+};
+
+}  // namespace touchline

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a check says: sections of facts, and findings that ask for something to be done."""
+
+from dataclasses import dataclass, field
+
+
+@dataclass
+class Findings:
+    """Collects what was found.
+
+    Attributes:
+        findings: what should be mended, one clear line each.
+        notes: by section, what was seen.
+    """
+
+    findings: list[str] = field(default_factory=list)
+    notes: dict[str, list[str]] = field(default_factory=dict)
+
+    def find(self, line: str) -> None:
+        """Add a finding, once."""
+        if line not in self.findings:
+            self.findings.append(line)
+
+    def note(self, section: str, *lines: str) -> None:
+        """Add lines to a section."""
+        self.notes.setdefault(section, []).extend(lines)
+
+    def text(self) -> str:
+        """Everything, the findings last."""
+        parts = ["\n".join([f"{title}:", *lines]) for title, lines in self.notes.items() if lines]
+        if self.findings:
+            lines = [f"  {i}. {line}" for i, line in enumerate(self.findings, 1)]
+            parts.append("\n".join([f"findings: {len(lines)}", *lines]))
+        else:
+            parts.append("findings: none")
+        return "\n\n".join(parts)

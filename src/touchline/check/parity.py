@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How much the sensors of a robot check each other, and which faults nothing can tell.
+
+With a contact at the outboard end of every segment the measured residuals are y = A(q) x, with x
+the segments' wrenches. What is left of y outside the range of A is the parity space: it is zero
+whatever touches, and only a fault can fill it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.model.description import AXES
+from touchline.model.robot import Robot
+
+Array = NDArray[np.float64]
+
+CONFIGURATIONS = 24
+VISIBLE = 0.02  # of a unit fault; less is nothing beside noise and model errors
+
+
+@dataclass(frozen=True)
+class Parity:
+    """The parity space of a robot.
+
+    Attributes:
+        signals: number of measured signals.
+        unknowns: components of the segment wrenches that they must explain.
+        rank: of the parity space, in a general pose.
+        blind: signals whose constant error no pose shows, in words.
+        blind_once: signals whose error a single general pose does not show, in words.
+    """
+
+    signals: int
+    unknowns: int
+    rank: int
+    blind: tuple[str, ...]
+    blind_once: tuple[str, ...]
+
+
+def parity_of(robot: Robot) -> Parity:
+    """Rank of the parity space and the single faults that lie outside it."""
+    rng = np.random.default_rng(0)
+    names = _signal_names(robot)
+    projections, ranks = [], []
+    matrix = np.zeros((0, 0))
+    for q in _configurations(robot, rng):
+        matrix = response(robot, q)
+        projection, rank = _left_null(matrix)
+        projections.append(projection)
+        ranks.append(rank)
+    rank = int(np.median(ranks))
+    once = np.median([np.linalg.norm(p, axis=0) for p in projections], axis=0)
+    always = np.max([np.linalg.norm(p, axis=0) for p in projections], axis=0)
+    return Parity(
+        len(names),
+        len(names) - rank,
+        rank,
+        tuple(name for name, seen in zip(names, always, strict=True) if seen < VISIBLE),
+        tuple(name for name, seen in zip(names, once, strict=True) if seen < VISIBLE),
+    )
+
+
+def response(robot: Robot, q: Array) -> Array:
+    """A(q) (measured signals, 6 segments): residuals by wrenches in world, about its origin.
+
+    Numbers in N and Nm stand side by side: a metre is the scale of an arm.
+    """
+    poses = robot.poses(q)
+    starts = {node.sensor: i for i, node in enumerate(robot.nodes) if node.sensor}
+    ends = [_end(robot, name) for name in robot.segment_names]
+    rows = []
+    for j in _measured(robot):
+        node = next(i for i, n in enumerate(robot.nodes) if n.joint == robot.joint_names[j])
+        row = _joint_row(robot, poses, node)
+        felt = [node in _path(robot, end) for end in ends]
+        rows.append(np.hstack([row * f for f in felt]))
+    for name, sensor in zip(robot.sensor_names, robot.description.sensors, strict=True):
+        node = starts[name]
+        block = _wrench_to_sensor(poses[node])[[AXES.index(axis) for axis in sensor.axes]]
+        felt = [node in _path(robot, end) for end in ends]
+        rows.extend(np.hstack([block * f for f in felt]))
+    return np.array(rows).reshape(len(rows), 6 * len(ends))
+
+
+def _measured(robot: Robot) -> list[int]:
+    joints = robot.description.joints
+    return [j for j, joint in enumerate(joints) if joint.torque in ("sensor", "motor")]
+
+
+def _signal_names(robot: Robot) -> list[str]:
+    names = [f"torque of {robot.joint_names[j]}" for j in _measured(robot)]
+    return names + [f"{s.name}.{axis}" for s in robot.description.sensors for axis in s.axes]
+
+
+def _configurations(robot: Robot, rng: np.random.Generator) -> Array:
+    joints = [robot.mechanism.joints[name] for name in robot.joint_names]
+    lower = np.array([max(joint.lower, -np.pi) for joint in joints])
+    upper = np.array([min(joint.upper, np.pi) for joint in joints])
+    low, high = np.minimum(lower, upper), np.maximum(lower, upper)
+    return rng.uniform(low, high, (CONFIGURATIONS, len(joints)))
+
+
+def _left_null(matrix: Array) -> tuple[Array, int]:
+    """Orthonormal rows (r, signals) that are zero on the range of the matrix, and r."""
+    u, sizes, _ = np.linalg.svd(matrix, full_matrices=True)
+    rank = int((sizes > 1e-6 * max(sizes.max(initial=0.0), 1e-12)).sum())
+    return u[:, rank:].T, matrix.shape[0] - rank
+
+
+def _path(robot: Robot, node: int) -> list[int]:
+    path = []
+    while node >= 0:
+        path.append(node)
+        node = robot.nodes[node].parent
+    return path
+
+
+def _end(robot: Robot, segment: str) -> int:
+    """The most outboard body of a segment."""
+    own = [body.node for body in robot.bodies if body.segment == segment]
+    if not own:
+        return next(i for i, node in enumerate(robot.nodes) if node.sensor == segment)
+    return max(own, key=lambda node: len(_path(robot, node)))
+
+
+def _joint_row(robot: Robot, poses: Array, node: int) -> Array:
+    axis, origin = poses[node][:3, 2], poses[node][:3, 3]
+    if robot.nodes[node].kind == "prismatic":
+        return np.hstack([axis, np.zeros(3)])
+    return np.hstack([np.cross(origin, axis), axis])
+
+
+def _wrench_to_sensor(T: Array) -> Array:
+    """(6, 6): a wrench in world about its origin, in the sensor's frame about its origin."""
+    R, p = T[:3, :3], T[:3, 3]
+    lever = np.array([[0.0, -p[2], p[1]], [p[2], 0.0, -p[0]], [-p[1], p[0], 0.0]])
+    matrix = np.zeros((6, 6))
+    matrix[:3, :3] = matrix[3:, 3:] = R.T
+    matrix[3:, :3] = -R.T @ lever
+    return matrix

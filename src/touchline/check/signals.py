@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every signal of a recording by itself: is it there, alive, in range; and the time stamps."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.check.findings import Findings
+from touchline.estimation.samples import Samples
+from touchline.model.description import AXES
+from touchline.model.robot import Robot
+
+Array = NDArray[np.float64]
+
+ENOUGH = 50  # samples before a constant signal is called dead
+FEW = 0.005  # of the samples may be missing, late or at the end of the range
+OUTSIDE = 0.01  # rad or m beyond the limits before it is said
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Where a column of the signal table comes from."""
+
+    kind: str
+    name: str
+    index: tuple[int, ...]
+    range: float
+
+
+def signals_of(robot: Robot) -> list[Signal]:
+    """All measured signals, in the order of `SignalTable`."""
+    description = robot.description
+    signals = []
+    for kind in ("q", "qd", "tau"):
+        for j, joint in enumerate(description.joints):
+            if kind != "tau" or joint.torque in ("sensor", "motor"):
+                reach = joint.range / joint.gain if kind == "tau" else np.inf
+                signals.append(Signal(kind, joint.name, (j,), reach))
+    for k, sensor in enumerate(description.sensors):
+        for axis in sensor.axes:
+            i = AXES.index(axis)
+            # In other axes than the sensor's the range does not belong to one column.
+            reach = sensor.range[i] if sensor.frame == "sensor" else np.inf
+            signals.append(Signal("wrench", f"{sensor.name}.{axis}", (k, i), reach))
+    return signals
+
+
+class SignalTable:
+    """Least and largest value, samples missing, not finite and at the end of the range."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.signals = signals_of(robot)
+        count = len(self.signals)
+        self.samples = 0
+        self.low, self.high = np.full(count, np.inf), np.full(count, -np.inf)
+        self.missing, self.infinite = np.zeros(count, int), np.zeros(count, int)
+        self.at_range = np.zeros(count, int)
+
+    def add(self, part: Samples) -> None:
+        """Take N samples."""
+        self.samples += len(part)
+        for i, values in enumerate(self._columns(part)):
+            finite = np.isfinite(values)
+            self.missing[i] += int(np.isnan(values).sum())
+            self.infinite[i] += int(np.isinf(values).sum())
+            self.low[i] = min(self.low[i], values.min(where=finite, initial=np.inf))
+            self.high[i] = max(self.high[i], values.max(where=finite, initial=-np.inf))
+            self.at_range[i] += int((np.abs(values) >= self.signals[i].range).sum())
+
+    def _columns(self, part: Samples) -> Iterator[Array]:
+        for signal in self.signals:
+            yield getattr(part, signal.kind)[(slice(None), *signal.index)]
+
+    def dead(self) -> set[tuple[str, str]]:
+        """(kind, name) of the signals that never change."""
+        if self.samples < ENOUGH:
+            return set()
+        still = self.low == self.high
+        return {(s.kind, s.name) for s, d in zip(self.signals, still, strict=True) if d}
+
+    def report(self, robot: Robot, findings: Findings) -> None:
+        """Say what is wrong with single signals."""
+        moving = {
+            s.name
+            for i, s in enumerate(self.signals)
+            if s.kind == "q" and self.high[i] - self.low[i] > OUTSIDE
+        }
+        for i, signal in enumerate(self.signals):
+            self._report_one(i, signal, findings)
+            if self.samples < ENOUGH or self.low[i] != self.high[i]:
+                continue
+            if signal.kind in ("tau", "wrench") or signal.name in moving:
+                what = f"is always {self.low[i]:g}: dead, or not what the column should hold"
+                findings.find(f"{_column(signal)} {what}")
+        self._limits(robot, findings)
+
+    def _report_one(self, i: int, signal: Signal, findings: Findings) -> None:
+        column, few = _column(signal), FEW * self.samples
+        if self.missing[i] == self.samples:
+            findings.find(f"{column}: no value in the whole recording")
+        elif self.missing[i] > few:
+            share = 100 * self.missing[i] / self.samples
+            findings.find(f"{column}: missing in {share:.1f} % of the samples")
+        if self.infinite[i]:
+            findings.find(f"{column}: infinite in {self.infinite[i]} samples")
+        if self.at_range[i] > few:
+            share = 100 * self.at_range[i] / self.samples
+            findings.find(
+                f"{column}: at or beyond its range {signal.range:g} in {share:.1f} % of the "
+                f"samples (it reaches {max(abs(self.low[i]), abs(self.high[i])):.4g}): saturated, "
+                "or in other units"
+            )
+
+    def _limits(self, robot: Robot, findings: Findings) -> None:
+        outside = self.outside_limits(robot)
+        if not outside:
+            return
+        lines = [
+            f"position of {name} goes from {low:.4g} to {high:.4g}, outside the model's limits "
+            f"{lower:.4g} to {upper:.4g}"
+            for name, low, high, lower, upper in outside
+        ]
+        if self.looks_like_degrees(robot):
+            worst = lines[0]
+            findings.find(f"{worst}: the positions look like degrees; use factor 0.01745329 in log")
+            return
+        for line in lines:
+            findings.find(line)
+
+    def _positions(self, robot: Robot) -> Iterator[tuple[str, float, float, float, float]]:
+        for i, signal in enumerate(self.signals):
+            if signal.kind == "q" and self.low[i] <= self.high[i]:
+                model = robot.mechanism.joints[signal.name]
+                yield signal.name, self.low[i], self.high[i], model.lower, model.upper
+
+    def outside_limits(self, robot: Robot) -> list[tuple[str, float, float, float, float]]:
+        """Name, range of positions and limits of the joints that leave their limits."""
+        return [p for p in self._positions(robot) if p[1] < p[3] - OUTSIDE or p[2] > p[4] + OUTSIDE]
+
+    def looks_like_degrees(self, robot: Robot) -> bool:
+        """Are positions far outside, and all inside when taken for degrees?"""
+        joints = robot.mechanism.joints
+        found = [p for p in self._positions(robot) if joints[p[0]].kind == "revolute"]
+        far = any(max(-low, high) > 4 * np.pi for _, low, high, _, _ in found)
+        inside = all(
+            np.deg2rad(low) >= lower - 0.1 and np.deg2rad(high) <= upper + 0.1
+            for _, low, high, lower, upper in found
+        )
+        return far and inside
+
+
+def _column(signal: Signal) -> str:
+    what = {"q": "position of ", "qd": "velocity of ", "tau": "torque of ", "wrench": ""}
+    return f"{what[signal.kind]}{signal.name}"

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the sensors say and what the model expects, averaged over short pieces of a recording.
+
+An observer without lag that is told of no torque and no wrench takes all that moves and holds the
+arm for external: its residuals are the readings to be expected while nothing touches.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.estimation.observer import Observer
+from touchline.estimation.samples import Samples
+from touchline.model.description import Friction
+from touchline.model.robot import Robot
+
+Array = NDArray[np.float64]
+
+SECONDS, ROWS = 0.25, 8  # at least so long and so many samples is a window
+MOST = 4000
+
+
+@dataclass(frozen=True)
+class Windows:
+    """W windows of a recording; everything is a mean over the window.
+
+    Attributes:
+        q: (W, n) positions.
+        qd: (W, n) velocities as logged.
+        slope: (W, n) velocities from the positions.
+        torque: (W, n) as the description reads the log: sign, gain, bias and friction applied.
+        expected_torque: (W, n) without contact.
+        wrench: (W, k, 6) as logged.
+        expected_wrench: (W, k, 6) on the outboard side, in the sensor's frame, without contact.
+        weightless_wrench: the same for a sensor whose driver has taken the weight out.
+    """
+
+    q: Array
+    qd: Array
+    slope: Array
+    torque: Array
+    expected_torque: Array
+    wrench: Array
+    expected_wrench: Array
+    weightless_wrench: Array
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+
+class WindowMaker:
+    """Cuts a recording into windows, part by part."""
+
+    def __init__(self, robot: Robot, period: float) -> None:
+        self._robot = robot
+        self._rows = max(ROWS, round(SECONDS / period))
+        self._period, self._last = period, np.nan
+        self._models = [_expecting(robot, compensated) for compensated in ("none", "gravity")]
+        self._parts: list[dict[str, Array]] = []
+        self._count, self._every = 0, 1
+
+    def add(self, part: Samples) -> None:
+        """Take the next samples; what does not fill a window is left out."""
+        rows, count = self._rows, len(part) // self._rows
+        whole, weightless = (self._expect(model, part) for model in self._models)
+        if not count:
+            self._last = np.nan
+            return
+        signals = {
+            "q": part.q,
+            "qd": part.qd,
+            "torque": _read_torques(self._robot, part),
+            "expected_torque": whole.tau_ext,
+            "wrench": part.wrench,
+            "expected_wrench": whole.sensor_wrench,
+            "weightless_wrench": weightless.sensor_wrench,
+        }
+        cut = {name: _mean(values, count, rows) for name, values in signals.items()}
+        steps, q = self._steps(part.time, count), part.q[: count * rows]
+        shape = (count, rows, q.shape[1])
+        ends = q.reshape(shape)[:, -1] - q.reshape(shape)[:, 0]
+        span = steps[:, 1:].sum(axis=1)[:, None]
+        with np.errstate(invalid="ignore"):
+            good = ((steps > 0) & (steps < 3.5 * self._period)).all(axis=1)
+            cut["slope"] = np.divide(ends, span, out=np.full_like(ends, np.nan), where=span > 0)
+        good &= np.isfinite(cut["q"]).all(axis=1) & np.isfinite(cut["slope"]).all(axis=1)
+        self._keep({name: values[good] for name, values in cut.items()})
+
+    def _steps(self, time: Array, count: int) -> Array:
+        """Steps (count, rows) [s] that end at each sample; an observer begins anew after a gap."""
+        steps = np.diff(time, prepend=self._last)[: count * self._rows]
+        self._last = float(time[-1])
+        return steps.reshape(count, self._rows)
+
+    def _expect(self, model: Observer, part: Samples):
+        nothing = np.zeros_like(part.tau), np.zeros_like(part.wrench)
+        return model.run(part.time, part.q, part.qd, *nothing)
+
+    def _keep(self, cut: dict[str, Array]) -> None:
+        self._parts.append({name: values[:: self._every] for name, values in cut.items()})
+        self._count += len(self._parts[-1]["q"])
+        if self._count > 2 * MOST:  # a long recording: every other window will do
+            joined = {n: np.concatenate([p[n] for p in self._parts])[::2] for n in self._parts[0]}
+            self._parts, self._count, self._every = [joined], len(joined["q"]), 2 * self._every
+
+    def windows(self) -> Windows:
+        """All windows."""
+        n, k = len(self._robot.joint_names), len(self._robot.sensor_names)
+        shapes = dict.fromkeys(("q", "qd", "slope", "torque", "expected_torque"), (n,))
+        shapes |= dict.fromkeys(("wrench", "expected_wrench", "weightless_wrench"), (k, 6))
+        parts = self._parts or [{name: np.empty((0, *s)) for name, s in shapes.items()}]
+        return Windows(**{name: np.concatenate([p[name] for p in parts]) for name in shapes})
+
+
+def _expecting(robot: Robot, compensated: str) -> Observer:
+    description = robot.description
+    sensors = tuple(
+        replace(s, compensated=compensated, bias=(0.0,) * 6, polarity="outboard", frame="sensor")
+        for s in description.sensors
+    )
+    joints = tuple(replace(j, bias=0.0, friction=Friction()) for j in description.joints)
+    bare = Robot(replace(description, sensors=sensors, joints=joints), robot.mechanism)
+    return Observer(bare, bandwidth=1e9, method="paper", discretization="exponential")
+
+
+def _read_torques(robot: Robot, part: Samples) -> Array:
+    torques = part.tau.copy()
+    for j, joint in enumerate(robot.description.joints):
+        qd, friction = part.qd[:, j], joint.friction
+        torques[:, j] = joint.sign * joint.gain * part.tau[:, j] - joint.bias
+        torques[:, j] -= friction.coulomb * np.tanh(qd / friction.coulomb_width)
+        torques[:, j] -= friction.viscous * qd
+    return torques
+
+
+def _mean(values: Array, count: int, rows: int) -> Array:
+    """Mean (count, ...) over windows; NaN where less than half of the samples are there."""
+    cut = values[: count * rows].reshape(count, rows, *values.shape[1:])
+    there = np.isfinite(cut)
+    total = np.where(there, cut, 0.0).sum(axis=1)
+    number = there.sum(axis=1)
+    return np.divide(total, number, out=np.full(total.shape, np.nan), where=number > rows / 2)

@@ -1,0 +1,269 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Force-torque sensors beside the weight and the motion of what they carry."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import permutations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.check.findings import Findings
+from touchline.check.fit import FORCE_FACTORS, MOMENT_FACTORS, named_factor
+from touchline.check.model import outboard_mass
+from touchline.check.windows import Windows
+from touchline.model.description import SensorDescription
+from touchline.model.robot import Robot
+
+Array = NDArray[np.float64]
+
+LEAST_WEIGHT = 0.5  # N; a lighter load says nothing
+MASS_OFF, MASS_OFF_KG = 0.05, 0.05
+CLEARER = 0.4  # another explanation must leave so much less
+AXIS_NAMES = "xyz"
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """How a sensor's log may relate to what the model expects.
+
+    Attributes:
+        kind: "described", "polarity", "frame", "axes" or "compensated".
+        words: what would have to be changed.
+        forces, moments: (W, 3) expected, in the log's axes and with its sign.
+    """
+
+    kind: str
+    words: str
+    forces: Array
+    moments: Array
+
+
+@dataclass(frozen=True)
+class Fit:
+    """reading = factor * expected + offset, for forces or for moments; `cost` is what is left."""
+
+    factor: float
+    offset: Array
+    cost: float
+    varied: bool
+    telling: bool
+
+
+Limits = dict[tuple[str, int], float]
+
+
+def check_wrenches(
+    robot: Robot, windows: Windows, dead: set[str], limits: Limits, findings: Findings
+) -> None:
+    """Polarity, axes, frame, units, weight and bias of every sensor.
+
+    `limits` are the contact thresholds by segment and component [N, Nm].
+    """
+    if len(windows) < 1:
+        return
+    for k, sensor in enumerate(robot.description.sensors):
+        names = {f"{sensor.name}.{axis}" for axis in sensor.axes}
+        if not names & dead and np.isfinite(windows.wrench[:, k]).any():
+            _SensorCheck(robot, windows, k, limits, findings).run()
+
+
+class _SensorCheck:
+    def __init__(
+        self, robot: Robot, windows: Windows, k: int, limits: Limits, findings: Findings
+    ) -> None:
+        self.limits = limits
+        self.robot, self.windows, self.k, self.findings = robot, windows, k, findings
+        self.sensor: SensorDescription = robot.description.sensors[k]
+        self.mass = outboard_mass(robot, self.sensor.name)
+        axes = ("fx", "fy", "fz", "mx", "my", "mz")
+        self.has = np.array([axis in self.sensor.axes for axis in axes])
+        poses = [robot.poses(q) for q in windows.q]
+        node = next(i for i, n in enumerate(robot.nodes) if n.sensor == self.sensor.name)
+        self.R_world_sensor = np.array([T[node][:3, :3] for T in poses])
+        self.poses = poses
+        self.reading = windows.wrench[:, k]
+
+    def run(self) -> None:
+        weight = self.mass * float(np.linalg.norm(self.robot.gravity))
+        if weight < LEAST_WEIGHT:
+            line = f"  {self.sensor.name}: carries {weight:.2g} N, too little to tell anything"
+            self.findings.note("wrenches", line)
+            return
+        explanations = list(self._explanations())
+        costs = np.array([self._cost(e) for e in explanations])
+        own = costs[0]
+        order = [i for i in range(len(costs)) if costs[i] <= max(1.3 * costs.min(), 1e-12)]
+        best = explanations[0] if costs.min() > CLEARER * own else explanations[order[0]]
+        if best.kind != "described":
+            self.findings.find(f"sensor {self.sensor.name}: {best.words}")
+        self._judge(best, weight)
+
+    def _cost(self, explanation: Explanation) -> float:
+        """Misfit relative to the readings, forces and moments alike, unit and bias left free."""
+        force = self._fit(explanation.forces, slice(0, 3))
+        moment = self._fit(explanation.moments, slice(3, 6))
+        costs = [fit.cost for fit in (force, moment) if fit is not None and fit.telling]
+        return float(np.mean(costs)) if costs else 1.0
+
+    def _fit(self, expected: Array, part: slice) -> Fit | None:
+        has = self.has[part]
+        reading = self.reading[:, part][:, has]
+        usable = np.isfinite(reading).all(axis=1) & np.isfinite(expected).all(axis=1)
+        if not has.any() or not usable.any():
+            return None
+        turned = self.sensor.frame != "sensor" and not has.all()
+        if turned:
+            return None
+        return fit_vectors(expected[usable][:, has], reading[usable])
+
+    def _explanations(self) -> Iterator[Explanation]:
+        """The description as it is first, then what might be wrong with it, the likeliest first."""
+        described = self.sensor.compensated
+        sign = 1.0 if self.sensor.polarity == "outboard" else -1.0
+        R = self._to_log(self.sensor.frame)
+        own = self._expected(described)
+        yield Explanation("described", "", *self._turned(own, R, sign))
+        other = "inboard" if sign > 0 else "outboard"
+        words = f"reads the opposite of what it carries: set polarity: {other}"
+        yield Explanation("polarity", words, *self._turned(own, R, -sign))
+        if described == "gravity":
+            words = "the weight is still in the signal: compensated: none"
+            yield Explanation("compensated", words, *self._turned(self._expected("none"), R, sign))
+        for frame in ("sensor", "world", self.robot.mechanism.root, self.sensor.link):
+            if frame != self.sensor.frame:
+                R_other = self._to_log(frame)
+                words = f"the log gives its axes in another frame: frame: {frame}"
+                yield Explanation("frame", words, *self._turned(own, R_other, sign))
+                words += f", polarity: {other}"
+                yield Explanation("frame", words, *self._turned(own, R_other, -sign))
+        if self.has.all():
+            for P, words in axis_mixes():
+                yield Explanation("axes", words, *self._turned(own, P @ R, sign))
+
+    def _expected(self, compensated: str) -> Array:
+        w = self.windows
+        return (w.expected_wrench if compensated == "none" else w.weightless_wrench)[:, self.k]
+
+    def _turned(self, expected: Array, R_log_sensor: Array, sign: float) -> tuple[Array, Array]:
+        force = sign * np.einsum("wij,wj->wi", R_log_sensor, expected[:, :3])
+        return force, sign * np.einsum("wij,wj->wi", R_log_sensor, expected[:, 3:])
+
+    def _to_log(self, frame: str) -> Array:
+        """(W, 3, 3): from the sensor's axes to those of the log."""
+        if frame == "sensor":
+            return np.broadcast_to(np.eye(3), self.R_world_sensor.shape)
+        if frame == "world":
+            return self.R_world_sensor
+        place = self.robot.places[frame]
+        R = [
+            (np.eye(3) if place.node < 0 else T[place.node][:3, :3]) @ place.T_node_link[:3, :3]
+            for T in self.poses
+        ]
+        return np.einsum("wji,wjk->wik", np.array(R), self.R_world_sensor)
+
+    def _judge(self, best: Explanation, weight: float) -> None:
+        name = self.sensor.name
+        force = self._fit(best.forces, slice(0, 3))
+        moment = self._fit(best.moments, slice(3, 6))
+        self._judge_factor("forces", force, FORCE_FACTORS)
+        self._judge_factor("moments", moment, MOMENT_FACTORS)
+        if force is None or not force.telling or best.kind == "compensated":
+            return
+        if self.sensor.compensated == "gravity":
+            return
+        mass = force.factor * self.mass
+        sort = "" if force.varied else " (with the bias: its orientation never changed)"
+        self.findings.note(
+            "wrenches",
+            f"  {name}: carries {self.mass:.3f} kg in the model, {mass:.3f} kg measured{sort}",
+        )
+        near = 0.5 < force.factor < 2.0
+        if near and abs(mass - self.mass) > max(MASS_OFF * self.mass, MASS_OFF_KG):
+            self.findings.find(
+                f"sensor {name}: {mass:.3f} kg measured outboard of it, {self.mass:.3f} kg in the "
+                "model: a load is missing or too many, or its gain is off"
+            )
+        if near:
+            self._judge_bias(force, moment)
+
+    def _judge_factor(self, what: str, fit: Fit | None, factors: dict[float, str]) -> None:
+        if fit is None or not fit.telling or 0.5 < fit.factor < 2.0:
+            return
+        name = named_factor(fit.factor, factors)
+        start = f"sensor {self.sensor.name}: {what} are {fit.factor:.3g} times those expected"
+        if name is not None:
+            self.findings.find(f"{start}: in {name}")
+        elif abs(fit.factor) < 0.2:
+            self.findings.find(f"{start}: the weight seems taken out already; compensated: gravity")
+        else:
+            self.findings.find(f"{start}: check the unit, and what is mounted on it")
+
+    def _judge_bias(self, force: Fit, moment: Fit | None) -> None:
+        name = self.sensor.name
+        for fit, what, first, unit in ((force, "force", 0, "N"), (moment, "moment", 3, "Nm")):
+            if fit is None or not fit.varied:
+                continue
+            words = ", ".join(f"{x:.3g}" for x in fit.offset)
+            line = f"  {self.sensor.name}: {what} bias about [{words}] {unit} in the log's axes"
+            self.findings.note("wrenches", line)
+            limit = min(self.limits.get((name, i), np.inf) for i in range(first, first + 3))
+            given = np.abs(np.array(self.sensor.bias[first : first + 3])).max()
+            if np.abs(fit.offset).max() > max(limit, 1.05 * given + limit):
+                self.findings.find(
+                    f"sensor {self.sensor.name}: {what} bias about [{words}] {unit}, more than "
+                    f"the contact threshold {limit:.2g}: set bias"
+                )
+
+
+def fit_vectors(expected: Array, reading: Array) -> Fit:
+    """One factor and one offset for vectors (W, 3); windows far off (touches) are left out.
+
+    Without enough variation of the expected vectors factor and offset are one: the offset is 0.
+    """
+    centred = expected - np.median(expected, axis=0)
+    size = float(np.sqrt((expected**2).sum(axis=1).mean()))
+    varied = float(np.sqrt((centred**2).sum(axis=1).mean())) > 0.15 * size
+    use = np.ones(len(reading), dtype=bool)
+    factor, offset, rest = 1.0, np.zeros(reading.shape[1]), np.zeros(len(reading))
+    for _ in range(8):
+        x, y = expected[use], reading[use]
+        mean_x, mean_y = (x.mean(0), y.mean(0)) if varied else (0.0 * x[0], 0.0 * y[0])
+        power = float(((x - mean_x) ** 2).sum())
+        factor = float(((x - mean_x) * (y - mean_y)).sum()) / power if power > 0 else 0.0
+        offset = mean_y - factor * mean_x
+        rest = np.linalg.norm(reading - factor * expected - offset, axis=1)
+        keep = rest <= 3.0 * max(float(np.median(rest)), 1e-12)
+        if (keep == use).all() or keep.sum() < 4:
+            break
+        use = keep
+    spread = reading - np.median(reading, axis=0) if varied else reading
+    whole = max(float(np.median(np.linalg.norm(spread, axis=1))), 1e-12)
+    cost = float(np.median(rest)) / whole
+    if factor < 0:  # a sign is an explanation of its own, never a factor
+        cost = max(cost, 1.0)
+    return Fit(factor, offset, cost, varied, telling=size > 0.05)
+
+
+def axis_mixes() -> list[tuple[Array, str]]:
+    """Signed permutations (3, 3) of the axes but for the identity and its opposite, in words."""
+    mixes = []
+    for order in permutations(range(3)):
+        for signs in product((1, -1), repeat=3):
+            P = np.zeros((3, 3))
+            for row, (column, sign) in enumerate(zip(order, signs, strict=True)):
+                P[row, column] = sign
+            if order == (0, 1, 2) and len(set(signs)) == 1:
+                continue
+            mixes.append((P, _mix_words(order, signs)))
+    return sorted(mixes, key=lambda pair: int((pair[0] != np.eye(3)).sum()))
+
+
+def _mix_words(order: tuple[int, ...], signs: tuple[int, ...]) -> str:
+    parts = [
+        f"{AXIS_NAMES[row]} holds {'-' if sign < 0 else ''}{AXIS_NAMES[column]}"
+        for row, (column, sign) in enumerate(zip(order, signs, strict=True))
+        if row != column or sign < 0
+    ]
+    swapped = "axes swapped" if order != (0, 1, 2) else "axes of opposite sign"
+    return f"{swapped}: {', '.join(parts)}; mend the columns in log, or the pose"

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The surfaces of all links of a robot, ready for lines and points."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from touchline import _core
+from touchline.model.robot import Robot
+from touchline.model.surface import Surface, mechanism_surfaces
+from touchline.model.tree import invert
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Patch:
+    """The surface of one link, in the frame of the node that carries it.
+
+    Attributes:
+        link: name of the link, and `body` of the rigid body it belongs to.
+        node: index of the node in `robot.nodes`.
+        segment: name of the segment that feels it; None if no sensor can.
+        T_node_link: (4, 4).
+        surface: in the link's frame.
+        mesh: native, in the node's frame.
+    """
+
+    link: str
+    body: str
+    node: int
+    segment: str | None
+    T_node_link: Array
+    surface: Surface
+    mesh: _core.Mesh
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Where a line goes through a link's surface.
+
+    Attributes:
+        link: name of the link.
+        distance: along the line from its origin [m]; negative behind it.
+        position: (3,) [m] and `normal` (3,), outward, in world.
+        entry: does the line go in here?
+    """
+
+    link: str
+    distance: float
+    position: Array
+    normal: Array
+    entry: bool
+
+
+class Skin:
+    """All link surfaces of a robot.
+
+    Args:
+        robot: the robot.
+        kind: "collision" or "visual" shapes.
+
+    Attributes:
+        patches: one per link with a surface.
+        warnings: of surfaces that are doubtful or lost.
+    """
+
+    def __init__(self, robot: Robot, kind: str = "collision") -> None:
+        self.robot = robot
+        surfaces, self.warnings = mechanism_surfaces(robot.mechanism, kind)
+        names = set(robot.segment_names)
+        bodies = {link: body for body in robot.bodies for link in body.links}
+        self.patches = tuple(
+            _patch(robot, link, surface, bodies[link].name, bodies[link].segment, names)
+            for link, surface in surfaces.items()
+            if link in bodies
+        )
+
+    def crossings(
+        self, q: ArrayLike, origin: ArrayLike, direction: ArrayLike, segment: str | None = None
+    ) -> list[Crossing]:
+        """Every place where a line goes into or out of a link, along the line.
+
+        Args:
+            q: joint positions (n,) [rad or m].
+            origin: a point (3,) [m] of the line, in world.
+            direction: of the line (3,), in world, of any length.
+            segment: only the links of this segment.
+        """
+        poses = self.robot.poses(np.asarray(q, float))
+        origin = np.asarray(origin, float)
+        unit = np.asarray(direction, float) / np.linalg.norm(direction)
+        found = []
+        for patch in self.patches:
+            if segment not in (None, patch.segment):
+                continue
+            R, p = poses[patch.node][:3, :3], poses[patch.node][:3, 3]
+            rows = patch.mesh.crossings(R.T @ (origin - p), R.T @ unit)
+            for t, _, *normal in rows:
+                outward = R @ np.array(normal)
+                entry = bool(outward @ unit < 0)
+                found.append(Crossing(patch.link, float(t), origin + t * unit, outward, entry))
+        return sorted(found, key=lambda crossing: crossing.distance)
+
+    def links_around(self, q: ArrayLike, point: ArrayLike) -> list[str]:
+        """The links whose closed surface holds a point (3,) [m] of the world."""
+        # A direction in general position: along no edge of what people build.
+        direction = np.array([0.5381, 0.2917, 0.7908])
+        count: dict[str, int] = {}
+        for crossing in self.crossings(q, point, direction):
+            if crossing.distance > 0:
+                count[crossing.link] = count.get(crossing.link, 0) + (-1 if crossing.entry else 1)
+        return [link for link, depth in count.items() if depth > 0]
+
+    def nearest(self, q: ArrayLike, link: str, point: ArrayLike) -> tuple[float, Array]:
+        """Distance [m] and place (3,) [m] of the point of a link's surface nearest to `point`."""
+        patch = next(patch for patch in self.patches if patch.link == link)
+        T = self.robot.poses(np.asarray(q, float))[patch.node]
+        local = T[:3, :3].T @ (np.asarray(point, float) - T[:3, 3])
+        row = patch.mesh.nearest_to_point(local)[0]
+        return float(row[0]), T[:3, :3] @ row[2:5] + T[:3, 3]
+
+
+def _patch(
+    robot: Robot, link: str, surface: Surface, body: str, segment: str, segments: set[str]
+) -> Patch:
+    place = robot.places[link]
+    T = place.T_node_link
+    vertices = surface.vertices @ T[:3, :3].T + T[:3, 3]
+    mesh = _core.mesh(np.ascontiguousarray(vertices), np.ascontiguousarray(surface.faces, np.int64))
+    # What stands on the world inboard of all joints and sensors is felt by nothing.
+    felt = segment in segments and (segment != "root" or _moves(robot, place.node))
+    return Patch(link, body, place.node, segment if felt else None, T, surface, mesh)
+
+
+def _moves(robot: Robot, node: int) -> bool:
+    while node >= 0:
+        if robot.nodes[node].kind != "fixed":
+            return True
+        node = robot.nodes[node].parent
+    return False
+
+
+def in_link(patch: Patch, T_world_node: Array, point: Array) -> Array:
+    """A point (3,) of the world in the frame of a patch's link."""
+    T_link_world = invert(T_world_node @ patch.T_node_link)
+    return T_link_world[:3, :3] @ point + T_link_world[:3, 3]

@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Balls that are pushed against the simulated robot; MuJoCo's own contact forces are the truth."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from touchline.simulation.contacts import NOTHING, Touch, no_touch
+from touchline.simulation.mujoco_model import quaternion
+from touchline.simulation.plant import Plant
+from touchline.simulation.shapes import OTHER, ROBOT
+
+Array = NDArray[np.float64]
+
+
+# MuJoCo's default contacts are so hard that a loaded one may end by a rounding error. At this
+# impedance its contact is a plain spring, and depth and force vanish together.
+IMPEDANCE = 0.5
+CONTACT_DAMPING = 0.1  # ratio; the rail damps too, and more would make touching down a jump
+
+
+@dataclass(frozen=True)
+class Pusher:
+    """A ball on a rail, drawn along it by a spring whose far end travels in and back.
+
+    Attributes:
+        name: of the ball.
+        link: that it is meant to touch; what else it touches is told in a slot of its own.
+        point: (3,) in world towards which its surface travels [m].
+        direction: (3,) in which it pushes, world.
+        start: when it sets out, `gap` away from the point [s].
+        hold: how long it pushes with full force [s].
+        force: of the spring when it is held there [N].
+        radius: of the ball [m].
+        gap: [m].
+        speed: of the spring's end [m/s].
+        stiffness: of the spring [N/m].
+        mass: of the ball [kg].
+        friction: coefficient between ball and robot.
+        contact_stiffness: between ball and robot [N/m]: 20 N press them 1 mm into each other.
+    """
+
+    name: str
+    link: str
+    point: ArrayLike
+    direction: ArrayLike
+    start: float
+    hold: float = 1.0
+    force: float = 20.0
+    radius: float = 0.025
+    gap: float = 0.004
+    speed: float = 0.02
+    stiffness: float = 1000.0
+    mass: float = 0.2
+    friction: float = 0.5
+    contact_stiffness: float = 2e4
+
+    @property
+    def duration(self) -> float:
+        """From setting out until it is back [s]."""
+        return 2 * self._reach / self.speed + self.hold
+
+    @property
+    def _reach(self) -> float:
+        return self.gap + self.force / self.stiffness
+
+    def travel(self, time: float) -> float:
+        """How far the spring's end has come [m]."""
+        way = self.speed * (time - self.start)
+        back = self.speed * (self.start + self.duration - time)
+        return float(np.clip(min(way, back), 0.0, self._reach))
+
+
+class CollidingPushers:
+    """Balls in the plant's model; two slots each: the link that is meant, and the strongest other.
+
+    Args:
+        pushers: whose names differ.
+    """
+
+    physical = True
+
+    def __init__(self, pushers: Sequence[Pusher]) -> None:
+        self._mj: Any = import_module("mujoco")
+        self.pushers = tuple(pushers)
+        self._owners: tuple[str, ...] = ()
+        self._wrench = np.zeros(6)
+
+    def __len__(self) -> int:
+        return 2 * len(self.pushers)
+
+    def add(self, spec: Any, bodies: dict[str, Any]) -> None:
+        """Adds the balls to a model before it is compiled; see `build_model`."""
+        spec.option.cone = self._mj.mjtCone.mjCONE_ELLIPTIC
+        for pusher in self.pushers:
+            direction = _unit(pusher.direction)
+            away = pusher.radius + pusher.gap
+            body = spec.worldbody.add_body(
+                name=f"pusher:{pusher.name}",
+                pos=np.asarray(pusher.point, float) - away * direction,
+                gravcomp=1.0,
+            )
+            body.add_joint(
+                name=f"pusher:{pusher.name}",
+                type=self._mj.mjtJoint.mjJNT_SLIDE,
+                axis=direction,
+                damping=2.0 * np.sqrt(pusher.stiffness * pusher.mass),
+            )
+            body.add_geom(
+                name=f"pusher:{pusher.name}",
+                type=self._mj.mjtGeom.mjGEOM_SPHERE,
+                size=[pusher.radius, 0, 0],
+                quat=quaternion(np.eye(3)),
+                mass=pusher.mass,
+                contype=OTHER,
+                conaffinity=ROBOT,
+                condim=3,
+                priority=1,
+                friction=[pusher.friction, 0.005, 0.0001],
+                solref=_contact_spring(pusher),
+                solimp=[IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0],
+            )
+
+    def apply(self, plant: Plant) -> bool:
+        """Draws the balls along; to be called after `evaluate`."""
+        if not self._owners:
+            self._find(plant)
+        for pusher, dof in zip(self.pushers, self._dofs, strict=True):
+            stretch = pusher.travel(plant.time) - plant.data.qpos[dof]
+            plant.data.qfrc_applied[dof] = pusher.stiffness * stretch
+        return True
+
+    def _find(self, plant: Plant) -> None:
+        model = plant.model
+        links = {body: link for link, body in plant.bodies.items()}
+        self._owners = tuple(links.get(int(body), "") for body in model.geom_bodyid)
+        names = [f"pusher:{pusher.name}" for pusher in self.pushers]
+        self._dofs = [int(model.joint(name).dofadr[0]) for name in names]
+        self._geoms = {int(model.geom(name).id): i for i, name in enumerate(names)}
+
+    def touches(self, plant: Plant) -> list[Touch]:
+        """The contact forces on the robot at the plant's present state and inputs."""
+        idle = [no_touch(pusher.link) for pusher in self.pushers for _ in range(2)]
+        if plant.data.ncon == 0:
+            return idle
+        found: list[dict[str, list[tuple[Array, Array]]]] = [{} for _ in self.pushers]
+        for c in range(plant.data.ncon):
+            self._sort(plant, c, found)
+        for i, (pusher, by_link) in enumerate(zip(self.pushers, found, strict=True)):
+            touches = {link: _joined(link, forces) for link, forces in by_link.items()}
+            idle[2 * i] = touches.pop(pusher.link, idle[2 * i])
+            idle[2 * i + 1] = max(touches.values(), key=_strength, default=idle[2 * i + 1])
+        return idle
+
+    def _sort(
+        self, plant: Plant, c: int, found: list[dict[str, list[tuple[Array, Array]]]]
+    ) -> None:
+        """Notes one contact's point and force on the robot under its ball and link."""
+        contact = plant.data.contact[c]
+        first, second = (int(g) for g in contact.geom)
+        ball, other, sign = (first, second, 1.0) if first in self._geoms else (second, first, -1.0)
+        if ball not in self._geoms or contact.efc_address < 0:
+            return
+        self._mj.mj_contactForce(plant.model, plant.data, c, self._wrench)
+        # MuJoCo gives the force of the first shape on the second, in the contact's axes (rows).
+        force = sign * contact.frame.reshape(3, 3).T @ self._wrench[:3]
+        if force.any():
+            rows = found[self._geoms[ball]].setdefault(self._owners[other], [])
+            rows.append((contact.pos.copy(), force))
+
+
+def _contact_spring(pusher: Pusher) -> list[float]:
+    """MuJoCo's `solref` of a spring between the ball and something much heavier."""
+    k = pusher.contact_stiffness / pusher.mass
+    return [-k * IMPEDANCE**2, -2 * CONTACT_DAMPING * np.sqrt(k) * IMPEDANCE]
+
+
+def _strength(touch: Touch) -> float:
+    return float(np.linalg.norm(touch.force))
+
+
+def _joined(link: str, forces: list[tuple[Array, Array]]) -> Touch:
+    """Contacts of one ball with one link as one: at their centre, with the moment that is left."""
+    if len(forces) == 1:
+        return Touch(True, link, *forces[0], NOTHING)
+    weights = np.array([np.linalg.norm(force) for _, force in forces])
+    point = weights @ np.array([at for at, _ in forces]) / weights.sum()
+    moment = np.sum([np.cross(at - point, force) for at, force in forces], axis=0)
+    return Touch(True, link, point, np.sum([force for _, force in forces], axis=0), moment)
+
+
+def _unit(vector: ArrayLike) -> Array:
+    v = np.asarray(vector, float)
+    return v / np.linalg.norm(v)

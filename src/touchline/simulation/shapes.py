@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The links' surfaces as MuJoCo shapes: exact for rays, in convex pieces for collisions.
+
+MuJoCo collides the convex hull of a mesh, and its rays meet the triangles themselves.
+"""
+
+from collections.abc import Iterable
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.model.mechanism import Geometry, Link, Mechanism
+from touchline.model.surface import Surface, link_surface
+from touchline.simulation.mujoco_model import Addition, quaternion
+
+Array = NDArray[np.float64]
+PIECES = 12  # of a link at most
+MIN_TRIANGLES = 4
+ROBOT, OTHER = 1, 2  # who collides: robot with others, never among themselves
+
+
+def surfaces_for_rays(mechanism: Mechanism) -> Addition:
+    """Adds the links' true surfaces, which rays meet and nothing collides with."""
+
+    def add(spec: Any, bodies: dict[str, Any]) -> None:
+        for name, link in mechanism.links.items():
+            surface = link_surface(link)
+            if surface is not None:
+                mesh = f"surface:{name}"
+                _add_mesh(spec, mesh, surface.vertices, surface.faces)
+                _add_geom(spec, bodies[name], "mesh", f"link:{name}", meshname=mesh, contype=0)
+
+    return add
+
+
+def shapes_for_collisions(
+    mechanism: Mechanism, links: Iterable[str] | None = None, pieces: int = PIECES
+) -> Addition:
+    """Adds shapes that others collide with: primitives as they are, meshes in convex pieces.
+
+    Args:
+        mechanism: whose links.
+        links: those that can be touched; default: all.
+        pieces: convex pieces of a link at most.
+    """
+    chosen = set(mechanism.links if links is None else links)
+
+    def add(spec: Any, bodies: dict[str, Any]) -> None:
+        for name in chosen:
+            _add_collision(spec, bodies[name], mechanism.links[name], pieces)
+
+    return add
+
+
+def _add_collision(spec: Any, body: Any, link: Link, pieces: int) -> None:
+    shapes = link.collision or link.visual
+    primitives = [shape for shape in shapes if shape.kind not in ("mesh", "triangles")]
+    if len(primitives) == len(shapes):
+        for i, shape in enumerate(primitives):
+            _add_primitive(spec, body, f"link:{link.name}:{i}", shape)
+        return
+    surface = link_surface(link)
+    if surface is None:
+        return
+    for i, points in enumerate(convex_pieces(surface, pieces)):
+        mesh = f"piece:{link.name}:{i}"
+        spec.add_mesh(name=mesh, uservert=points.ravel())
+        _add_geom(spec, body, "mesh", f"link:{link.name}:{i}", meshname=mesh)
+
+
+def _add_primitive(spec: Any, body: Any, name: str, shape: Geometry) -> None:
+    size = np.zeros(3)
+    size[: len(shape.size)] = shape.size
+    if shape.kind == "box":
+        size = size / 2
+    elif shape.kind in ("cylinder", "capsule"):
+        size[1] /= 2
+    T = shape.T_link_shape
+    _add_geom(spec, body, shape.kind, name, size=size, pos=T[:3, 3], quat=quaternion(T[:3, :3]))
+
+
+def _add_mesh(spec: Any, name: str, vertices: Array, faces: NDArray[np.int64]) -> None:
+    shell = import_module("mujoco").mjtMeshInertia.mjMESH_INERTIA_SHELL  # it need not be closed
+    spec.add_mesh(
+        name=name,
+        uservert=vertices.ravel(),
+        userface=faces.astype(np.int32).ravel(),
+        inertia=shell,
+    )
+
+
+def _add_geom(spec: Any, body: Any, kind: str, name: str, **options: Any) -> None:
+    kinds = import_module("mujoco").mjtGeom
+    shared = {"contype": ROBOT, "conaffinity": OTHER, "condim": 3, "mass": 0.0}
+    if options.get("contype") == 0:
+        shared["conaffinity"] = 0
+    body.add_geom(name=name, type=getattr(kinds, f"mjGEOM_{kind.upper()}"), **shared | options)
+
+
+def convex_pieces(surface: Surface, pieces: int = PIECES) -> list[Array]:
+    """Points (P, 3) of convex pieces whose hulls follow a surface closely.
+
+    The surface is cut by planes across its own axes, each time where that takes the most from the
+    volume of the hulls, until it takes too little or there are enough pieces.
+
+    Args:
+        surface: of a link.
+        pieces: at most.
+    """
+    parts = [_Part(surface.vertices[surface.faces])]
+    enough = 2e-3 * parts[0].volume
+    while len(parts) < pieces:
+        best = max(parts, key=lambda part: part.gain)
+        if best.gain < enough:
+            break
+        parts.remove(best)
+        parts += best.halves
+    return [part.points for part in parts]
+
+
+class _Part:
+    """A part of a surface, its hull's volume, and what its best cut would gain."""
+
+    def __init__(self, triangles: Array) -> None:
+        self.triangles = triangles
+        self.points = np.unique(triangles.reshape(-1, 3), axis=0)
+        self.volume = _hull_volume(self.points)
+        self._cut: tuple[float, list[_Part]] | None = None
+
+    @property
+    def gain(self) -> float:
+        """Volume [m3] by which the hulls of the halves are smaller."""
+        return self._best()[0]
+
+    @property
+    def halves(self) -> "list[_Part]":
+        """Both sides of the best cut."""
+        return self._best()[1]
+
+    def _best(self) -> "tuple[float, list[_Part]]":
+        if self._cut is None:
+            cuts = [self._halve(axis, x) for axis in range(3) for x in (0.3, 0.5, 0.7)]
+            self._cut = max(cuts, key=lambda cut: cut[0])
+        return self._cut
+
+    def _halve(self, axis: int, fraction: float) -> "tuple[float, list[_Part]]":
+        low, high = self.points[:, axis].min(), self.points[:, axis].max()
+        sides = cut_triangles(self.triangles, axis, low + fraction * (high - low))
+        if any(len(side) < MIN_TRIANGLES for side in sides):
+            return 0.0, []
+        halves = [_Part(side) for side in sides]
+        if any(half.volume <= 0.0 for half in halves):
+            return 0.0, []
+        return self.volume - sum(half.volume for half in halves), halves
+
+
+def cut_triangles(triangles: Array, axis: int, position: float) -> tuple[Array, Array]:
+    """Triangles (T, 3, 3) below and above a plane across an axis; those it crosses are divided."""
+    above = triangles[:, :, axis] > position
+    count = above.sum(axis=1)
+    parts: tuple[list[Array], list[Array]] = ([triangles[count == 0]], [triangles[count == 3]])
+    for lone_above in (False, True):
+        crossed = count == (1 if lone_above else 2)
+        lone = np.argmax(above[crossed] == lone_above, axis=1)
+        rows = np.arange(len(lone))
+        a, b, c = (triangles[crossed][rows, (lone + i) % 3] for i in range(3))
+        ab, ac = _crossing(a, b, axis, position), _crossing(a, c, axis, position)
+        parts[lone_above].append(np.stack([a, ab, ac], axis=1))
+        pair = [np.stack([ab, b, c], axis=1), np.stack([ab, c, ac], axis=1)]
+        parts[not lone_above].extend(pair)
+    return np.concatenate(parts[0]), np.concatenate(parts[1])
+
+
+def _crossing(a: Array, b: Array, axis: int, position: float) -> Array:
+    """Where the edges from `a` to `b` (E, 3) cross the plane."""
+    share = (position - a[:, axis]) / (b[:, axis] - a[:, axis])
+    return a + share[:, None] * (b - a)
+
+
+def _hull_volume(points: Array) -> float:
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return float(ConvexHull(points).volume)
+    except QhullError:  # flat
+        return 0.0

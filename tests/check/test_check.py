@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every mistake that a user makes in a description or a log is named."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from free_motion import free_motion
+
+import touchline as tl
+from touchline.check.run import check
+from touchline.logs import write_table
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return tl.load_robot("sara-full")
+
+
+@pytest.fixture(scope="module")
+def recording(robot):
+    return free_motion(robot, rate=100.0)
+
+
+def findings_of(tmp_path, robot, samples, name="sara-full"):
+    path = tmp_path / "log.parquet"
+    write_table(path, samples, robot.description)
+    return check(name, path).findings
+
+
+def changed(samples, **changes):
+    """A copy with functions applied to signals, in place."""
+    copies = {name: getattr(samples, name).copy() for name in changes}
+    for name, change in changes.items():
+        result = change(copies[name])
+        copies[name] = copies[name] if result is None else result
+    return replace(samples, **copies)
+
+
+def test_nothing_is_found_where_nothing_is_wrong(tmp_path, robot, recording):
+    assert findings_of(tmp_path, robot, recording) == []
+
+
+BASE, WRIST, HANDLE = 0, 1, 2
+
+
+def scale(index, factor):
+    def change(values):
+        values[(slice(None), *index)] *= factor
+
+    return change
+
+
+def swap(a, b, sensor=None):
+    def change(values):
+        part = values if sensor is None else values[:, sensor]
+        part[:, [a, b]] = part[:, [b, a]]
+
+    return change
+
+
+def swap_axes(values):
+    swap(0, 1, WRIST)(values)
+    swap(3, 4, WRIST)(values)
+
+
+def flip_axes(values):
+    values[:, WRIST, [0, 1, 3, 4]] *= -1.0
+
+
+def hold(index):
+    def change(values):
+        values[(slice(None), *index)] = 1.25
+
+    return change
+
+
+def add(index, number):
+    def change(values):
+        values[(slice(None), *index)] += number
+
+    return change
+
+
+def drop(tau):
+    tau[::3, 5] = np.nan
+
+
+MISTAKES = {
+    "base polarity": ({"wrench": scale((BASE,), -1)}, ["sensor base", "polarity: inboard"]),
+    "wrist polarity": ({"wrench": scale((WRIST,), -1)}, ["sensor wrist", "polarity: inboard"]),
+    "wrist in kgf": (
+        {"wrench": scale((WRIST, slice(0, 3)), 1 / 9.80665)},
+        ["sensor wrist", "forces", "kgf"],
+    ),
+    "base in kN": (
+        {"wrench": scale((BASE, slice(0, 3)), 1e-3)},
+        ["sensor base", "forces", "kN"],
+    ),
+    "moments in mNm": (
+        {"wrench": scale((WRIST, slice(3, 6)), 1e3)},
+        ["sensor wrist", "moments", "mNm"],
+    ),
+    "axes swapped": ({"wrench": swap_axes}, ["sensor wrist", "axes swapped", "x holds y"]),
+    "axes turned": ({"wrench": flip_axes}, ["sensor wrist", "opposite sign", "x holds -x"]),
+    "weight taken out": (
+        {"wrench": scale((HANDLE,), 0.01)},
+        ["sensor handle", "compensated: gravity"],
+    ),
+    "dead wrench axis": ({"wrench": hold((WRIST, 2))}, ["wrist.fz", "always 1.25"]),
+    "force bias": ({"wrench": add((WRIST, 0), 7.0)}, ["sensor wrist", "bias", "7"]),
+    "torque sign": ({"tau": scale((2,), -1)}, ["joint3", "opposite sign"]),
+    "torque in mNm": ({"tau": scale((1,), 1e3)}, ["joint2", "mNm"]),
+    "torques swapped": ({"tau": swap(1, 3)}, ["joint2", "joint4", "swapped"]),
+    "dead torque": ({"tau": hold((4,))}, ["torque of joint5", "always 1.25"]),
+    "gravity taken out": ({"tau": scale((1,), 0.03)}, ["joint2", "compensated: gravity"]),
+    "torque offset": ({"tau": add((2,), 4.0)}, ["joint3", "offset", "+4.0"]),
+    "velocity sign": ({"qd": scale((0,), -1)}, ["velocity of joint1", "opposite sign"]),
+    "velocity in degrees": (
+        {"qd": scale((slice(None),), 180 / np.pi)},
+        ["velocity of joint2", "degrees"],
+    ),
+    "dead velocity": ({"qd": hold((3,))}, ["velocity of joint4", "always"]),
+    "positions in degrees": (
+        {"q": scale((slice(None),), 180 / np.pi)},
+        ["position", "degrees", "limits"],
+    ),
+    "positions outside": ({"q": add((1,), 3.0)}, ["position of joint2", "limits"]),
+    "time in ms": ({"time": lambda t: t * 1e3}, ["time", "milliseconds"]),
+    "gap": ({"time": lambda t: np.where(t > 10, t + 5, t)}, ["gaps", "5"]),
+    "repeated stamps": (
+        {"time": lambda t: np.repeat(t[::2], 2)[: len(t)]},
+        ["stamps", "repeat"],
+    ),
+    "missing values": ({"tau": drop}, ["torque of joint6", "missing"]),
+    "infinite values": ({"tau": add((5,), np.inf)}, ["torque of joint6", "infinite"]),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_named(tmp_path, robot, recording, mistake):
+    changes, words = MISTAKES[mistake]
+    findings = findings_of(tmp_path, robot, changed(recording, **changes))
+    assert any(all(word in line for word in words) for line in findings), findings
+
+
+@pytest.mark.parametrize(
+    "mistake", ["wrist polarity", "axes swapped", "torque sign", "torques swapped", "force bias"]
+)
+def test_a_mistake_is_named_alone(tmp_path, robot, recording, mistake):
+    changes, _ = MISTAKES[mistake]
+    assert len(findings_of(tmp_path, robot, changed(recording, **changes))) == 1
+
+
+def test_a_sensor_logged_in_world_axes(tmp_path, robot, recording):
+    turned = recording.wrench.copy()
+    for i, q in enumerate(recording.q):
+        R = robot.sensor_poses(q)[WRIST, :3, :3]
+        turned[i, WRIST] = np.concatenate([R @ turned[i, WRIST, :3], R @ turned[i, WRIST, 3:]])
+    findings = findings_of(tmp_path, robot, replace(recording, wrench=turned))
+    assert len(findings) == 1
+    assert "sensor wrist" in findings[0] and "frame: world" in findings[0]
+
+
+def test_a_load_that_the_model_lacks(tmp_path, robot, recording):
+    path = tmp_path / "robot.yaml"
+    text = robot.description.path.read_text()
+    path.write_text(text + "loads:\n  - {link: tool, mass: 0.6, com: [0, 0, 0.05]}\n")
+    loaded = free_motion(tl.load_robot(path), rate=100.0)
+    findings = findings_of(tmp_path, robot, loaded)
+    found = [line for line in findings if "sensor wrist" in line]
+    assert len(found) == 1
+    assert "1.500 kg measured" in found[0] and "0.900 kg in the model" in found[0]
+
+
+def test_a_bandwidth_too_high_for_the_rate(tmp_path, robot):
+    slow = free_motion(robot, rate=30.0)
+    findings = findings_of(tmp_path, robot, slow)
+    assert any("K dt = 3.33" in line and "about 10" in line for line in findings)
+
+
+def test_a_touch_hides_nothing_and_is_no_finding(tmp_path, robot, recording):
+    touched = recording.wrench.copy()
+    touch = (recording.time % 5 > 3.5)[:, None]
+    touched[:, BASE, :3] -= 25.0 * touch
+    assert findings_of(tmp_path, robot, replace(recording, wrench=touched)) == []
+
+
+def test_the_model_alone(robot):
+    result = check("sara-full")
+    assert result.findings == []
+    text = result.text()
+    assert "base carries 31.1" in text and "rank 7" in text and "wrist.fx" in text

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`touchline analyze` on good recordings: the files it leaves and what it prints."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from free_motion import free_motion
+
+import touchline as tl
+from touchline.cli import main
+from touchline.logs import write_table
+
+TOUCH = slice(1000, 1200)  # samples
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return tl.load_robot("sara-full")
+
+
+@pytest.fixture(scope="module")
+def recording(robot):
+    """Six seconds at 400 Hz; the base is pushed for half a second, twice."""
+    samples = free_motion(robot, seconds=6.0, rate=400.0)
+    wrench = samples.wrench.copy()
+    wrench[TOUCH, 0, 0] -= 20.0
+    wrench[2200:, 0, 1] += 100.0
+    return replace(samples, wrench=wrench)
+
+
+@pytest.fixture(scope="module")
+def results(robot, recording, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("analysis")
+    write_table(folder / "log.parquet", recording, robot.description)
+    status = main(
+        ["analyze", str(folder / "log.parquet"), "--robot", "sara-full", "--out", str(folder / "r")]
+    )
+    assert status == 0
+    return folder / "r"
+
+
+def strict_json(path):
+    def refuse(word):
+        raise ValueError(f"{word} is not JSON")
+
+    return json.loads(path.read_text(), parse_constant=refuse)
+
+
+def test_the_four_files_and_nothing_else(results):
+    names = sorted(path.name for path in results.iterdir())
+    assert names == ["contacts.parquet", "estimates.parquet", "events.json", "report.html"]
+
+
+def test_estimates_are_those_of_the_observer(results, robot, recording):
+    table = pq.read_table(results / "estimates.parquet")
+    estimate = tl.Observer(robot).run(
+        recording.time, recording.q, recording.qd, recording.tau, recording.wrench
+    )
+    names = table.column_names
+    assert names[:2] == ["time", "health"]
+    assert {"tau_ext.joint3", "wrist.ext.mz", "base.seg.fx"} <= set(names)
+    np.testing.assert_array_equal(table["time"], recording.time)
+    np.testing.assert_array_equal(table["health"], estimate.health)
+    for j, name in enumerate(robot.joint_names):
+        np.testing.assert_array_equal(table[f"tau_ext.{name}"], estimate.tau_ext[:, j])
+    g = robot.segment_names.index("wrist")
+    np.testing.assert_array_equal(table["wrist.seg.fy"], estimate.segment_wrench[:, g, 1])
+
+
+def test_events_have_the_keys_of_the_contract(results):
+    events = strict_json(results / "events.json")
+    keys = {"id", "segment", "level", "detected", "cleared", "link", "body", "body_probability"}
+    keys |= {"position", "position_link", "time_of_position", "position_std", "force"}
+    keys |= {"force_peak", "status", "joint", "candidates"}
+    assert all(keys <= set(event) for event in events)
+    first, last = (e for e in events if e["segment"] == "base")
+    assert 2.5 < first["detected"] < 2.52 and 3.0 < first["cleared"] < 3.3
+    assert first["level"] == "collision" and last["cleared"] is None
+    assert first["force"][0] == pytest.approx(20.0, abs=1.0)
+    assert last["force"][1] == pytest.approx(-100.0, abs=5.0)
+
+
+def test_contacts_have_a_row_per_sample_of_an_event(results):
+    events = strict_json(results / "events.json")
+    table = pq.read_table(results / "contacts.parquet").to_pydict()
+    names = "time health event segment link body body_probability status x y z fx fy fz "
+    names += "position_std pxx pxy pxz pyy pyz pzz"
+    assert set(names.split()) <= set(table)
+    for event in events:
+        times = [t for t, e in zip(table["time"], table["event"], strict=True) if e == event["id"]]
+        assert times[0] == pytest.approx(event["detected"])
+        assert event["cleared"] is None or times[-1] < event["cleared"]
+    assert set(table["status"]) <= {"located", "ambiguous", "not_separable", "wrench_only"}
+
+
+def test_numbers_do_not_depend_on_the_size_of_the_parts(results, tmp_path, monkeypatch):
+    monkeypatch.setattr("touchline.report.analysis.CHUNK", 333)
+    log = results.parent / "log.parquet"
+    assert main(["analyze", str(log), "--robot", "sara-full", "--out", str(tmp_path)]) == 0
+    for name in ("estimates.parquet", "contacts.parquet"):
+        assert pq.read_table(tmp_path / name).equals(pq.read_table(results / name))
+    pieces, whole = strict_json(tmp_path / "events.json"), strict_json(results / "events.json")
+    assert [e["detected"] for e in pieces] == [e["detected"] for e in whole]
+    assert [e["cleared"] for e in pieces] == [e["cleared"] for e in whole]
+
+
+def test_the_summary_tells_what_there_is(robot, recording, tmp_path, capsys):
+    wrench = recording.wrench.copy()
+    wrench[300:400, 1] = np.nan
+    time = recording.time.copy()
+    time[50] = time[49]
+    odd = replace(recording, wrench=wrench, time=time)
+    write_table(tmp_path / "log.csv", odd, robot.description)
+    arguments = ["analyze", str(tmp_path / "log.csv"), "--robot", "sara-full"]
+    options = ["--out", str(tmp_path / "r"), "--bandwidth", "500", "--method", "paper"]
+    assert main([*arguments, *options]) == 0
+    out = capsys.readouterr().out
+    for word in ("400 Hz", "settling", "bad_time", "missing", "sensor_excluded", "joint7", "wrist"):
+        assert word in out
+    assert "K dt = 1.25 > 1" in out and "use about 100" in out
+
+
+def test_other_files_in_the_directory_stay(results, tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "report.html").write_text("old")
+    log = results.parent / "log.parquet"
+    assert main(["analyze", str(log), "--robot", "sara-full", "--out", str(tmp_path)]) == 0
+    assert (tmp_path / "notes.txt").read_text() == "mine"
+    assert (tmp_path / "report.html").read_text().startswith("<!doctype html>")
+
+
+def test_help_has_an_example_in_every_command(capsys):
+    assert main(["--help"]) == 0
+    assert capsys.readouterr().out.count("Example: touchline ") >= 3
+    for command in ("analyze", "check", "bench"):
+        assert main([command, "--help"]) == 0
+        assert f"Example: touchline {command}" in capsys.readouterr().out

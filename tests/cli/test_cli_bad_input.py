@@ -1,0 +1,331 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whatever is wrong with an input: exit status 2 and one clear message, or a health bit."""
+
+import gzip
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from free_motion import free_motion
+
+import touchline as tl
+from touchline.cli import main
+from touchline.logs import write_table
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return tl.load_robot("sara")
+
+
+@pytest.fixture(scope="module")
+def samples(robot):
+    return free_motion(robot, seconds=3.0, rate=200.0)
+
+
+@pytest.fixture
+def log(tmp_path, robot, samples):
+    path = tmp_path / "log.parquet"
+    write_table(path, samples, robot.description)
+    return path
+
+
+def analyze(log, out, *options, robot="sara"):
+    return main(["analyze", str(log), "--robot", str(robot), "--out", str(out), *options])
+
+
+def refused(capsys, log, out, *options, robot="sara"):
+    """The message on stderr of an analysis that must be refused."""
+    assert analyze(log, out, *options, robot=robot) == 2
+    message = capsys.readouterr().err
+    assert message.strip() and "Traceback" not in message
+    return message
+
+
+def described(tmp_path, extra="", model="robot:sara", joints=""):
+    path = tmp_path / "robot.yaml"
+    path.write_text(f"name: mine\nmodel: {model}\n{joints}{extra}")
+    return path
+
+
+def without(path, *columns):
+    table = pq.read_table(path)
+    pq.write_table(table.drop_columns(list(columns)), path)
+
+
+def test_no_such_log(capsys, tmp_path):
+    assert "nothing.csv: no such file" in refused(capsys, tmp_path / "nothing.csv", tmp_path / "r")
+
+
+def test_no_such_robot(capsys, log, tmp_path):
+    message = refused(capsys, log, tmp_path / "r", robot="sarah")
+    assert "sarah" in message and "sara" in message
+    assert "no such file" in refused(capsys, log, tmp_path / "r", robot=tmp_path / "x.yaml")
+
+
+def test_every_error_of_a_description_at_once(capsys, log, tmp_path):
+    path = described(tmp_path, "gravitty: [0, 0, -9.81]\nobserver: {bandwidth: -3}\n")
+    message = refused(capsys, log, tmp_path / "r", robot=path)
+    assert "gravitty" in message and "did you mean 'gravity'" in message and "bandwidth" in message
+
+
+def test_unknown_joint(capsys, log, tmp_path):
+    path = described(tmp_path, joints="joints:\n  - {name: joint9}\n")
+    message = refused(capsys, log, tmp_path / "r", robot=path)
+    assert "joint9" in message and "joint1" in message
+
+
+def test_description_that_is_no_yaml(capsys, log, tmp_path):
+    path = described(tmp_path, "joints: [}")
+    assert "robot.yaml:3" in refused(capsys, log, tmp_path / "r", robot=path)
+
+
+def test_log_without_torques(capsys, log, tmp_path):
+    names = [f"tau.joint{i}" for i in (2, 3, 4, 5)]
+    without(log, *names)
+    message = refused(capsys, log, tmp_path / "r")
+    assert "log.parquet" in message and "no joint torques" in message
+
+
+def test_missing_and_misspelt_columns(capsys, log, tmp_path):
+    table = pq.read_table(log)
+    names = ["wrist.Fx" if name == "wrist.fx" else name for name in table.column_names]
+    pq.write_table(table.rename_columns(names).drop_columns(["q.joint4"]), log)
+    message = refused(capsys, log, tmp_path / "r")
+    assert "'wrist.fx'" in message and "did you mean 'wrist.Fx'" in message
+    assert "'q.joint4'" in message, message
+
+
+@pytest.mark.parametrize("name", ["log.parquet", "log.csv", "log.csv.gz", "log.db3", "log.mcap"])
+def test_empty_file(capsys, tmp_path, name):
+    path = tmp_path / name
+    path.write_bytes(b"")
+    message = refused(capsys, path, tmp_path / "r")
+    assert name in message and "empty" in message
+
+
+def test_table_without_rows(capsys, log, tmp_path):
+    pq.write_table(pq.read_table(log).slice(0, 0), log)
+    assert "log.parquet: " in refused(capsys, log, tmp_path / "r")
+
+
+@pytest.mark.parametrize("name", ["log.parquet", "log.db3", "log.mcap", "log.csv.gz"])
+def test_file_of_another_kind(capsys, tmp_path, name):
+    path = tmp_path / name
+    path.write_bytes(bytes(range(256)) * 64)
+    assert name in refused(capsys, path, tmp_path / "r")
+
+
+def test_unknown_kind_of_log(capsys, tmp_path):
+    path = tmp_path / "log.xlsx"
+    path.write_bytes(b"x" * 100)
+    message = refused(capsys, path, tmp_path / "r")
+    assert ".parquet" in message and ".mcap" in message
+
+
+def test_truncated_parquet(capsys, log, tmp_path):
+    log.write_bytes(log.read_bytes()[:-2000])
+    assert "log.parquet" in refused(capsys, log, tmp_path / "r")
+
+
+def test_word_in_a_column_of_numbers(capsys, robot, samples, tmp_path):
+    path = tmp_path / "log.csv"
+    write_table(path, samples, robot.description)
+    lines = path.read_text().splitlines()
+    column = lines[0].split(",").index('"tau.joint3"')
+    cells = lines[101].split(",")
+    cells[column] = "oops"
+    lines[101] = ",".join(cells)
+    path.write_text("\n".join(lines) + "\n")
+    message = refused(capsys, path, tmp_path / "r")
+    assert "oops" in message and "tau.joint3" in message and "log.csv" in message
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--bandwidth", "-5"], "-5"),
+        (["--bandwidth", "nan"], "nan"),
+        (["--bandwidth", "fast"], "fast"),
+        (["--method", "magic"], "magic"),
+        (["--colour", "red"], "--colour"),
+    ],
+)
+def test_bad_options(capsys, log, tmp_path, options, words):
+    assert words in refused(capsys, log, tmp_path / "r", *options)
+
+
+def test_missing_options(capsys):
+    assert main(["analyze", "log.csv"]) == 2
+    assert "--robot" in capsys.readouterr().err
+
+
+def test_unknown_command(capsys):
+    assert main(["analize"]) == 2
+    assert "did you mean 'analyze'" in capsys.readouterr().err
+
+
+def test_out_is_a_file(capsys, log, tmp_path):
+    (tmp_path / "r").write_text("precious")
+    assert "is a file" in refused(capsys, log, tmp_path / "r")
+    assert (tmp_path / "r").read_text() == "precious"
+
+
+def test_results_never_replace_an_input(capsys, robot, samples, tmp_path):
+    path = tmp_path / "estimates.parquet"
+    write_table(path, samples, robot.description)
+    before = path.read_bytes()
+    assert "would be replaced" in refused(capsys, path, tmp_path)
+    assert path.read_bytes() == before
+
+
+def test_old_results_stay_when_the_input_is_refused(capsys, log, tmp_path):
+    out = tmp_path / "r"
+    assert analyze(log, out) == 0
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    refused(capsys, tmp_path / "nothing.csv", out)
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+
+
+def estimates(out):
+    return pq.read_table(out / "estimates.parquet")
+
+
+def test_bad_samples_get_a_health_bit_and_harm_no_others(robot, samples, tmp_path):
+    tau, wrench, qd = samples.tau.copy(), samples.wrench.copy(), samples.qd.copy()
+    tau[100, 2] = np.inf
+    wrench[200:260, 1] = np.nan  # the wrist sensor is gone for 0.3 s
+    qd[400, 0] = np.nan
+    time = samples.time.copy()
+    time[150] = time[149]
+    time[350] = time[340]
+    time[450:] += 1.0
+    bad = replace(samples, tau=tau, wrench=wrench, qd=qd, time=time)
+    write_table(tmp_path / "log.parquet", bad, robot.description)
+    assert analyze(tmp_path / "log.parquet", tmp_path / "r") == 0
+    health = np.array(estimates(tmp_path / "r")["health"])
+    bits = tl.Health
+    assert health[100] & bits.NON_FINITE and health[400] & bits.MISSING
+    assert health[150] & bits.BAD_TIME and health[350] & bits.BAD_TIME
+    assert health[450] & bits.GAP
+    assert (health[201:260] & bits.MISSING).all() and health[259] & bits.SENSOR_EXCLUDED
+    assert (health[20:100] == 0).all()
+    base = np.array(estimates(tmp_path / "r")["base.ext.fx"])
+    assert np.isfinite(base[200:260]).all() and np.abs(base[200:260]).max() < 0.1
+
+
+def test_missing_and_unreadable_meshes_only_cost_the_location(capsys, log, tmp_path, robot):
+    text = robot.description.model.read_text()
+    folder = tmp_path / "meshes"
+    folder.mkdir()
+    (folder / "link1.stl").write_bytes(b"this is no mesh")
+    (tmp_path / "arm.urdf").write_text(text)
+    joints = robot.description.path.read_text().partition("joints:")[2]
+    path = described(tmp_path, model="arm.urdf", joints=f"joints:{joints}")
+    assert analyze(log, tmp_path / "r", robot=path) == 0
+    out = capsys.readouterr().out
+    assert "link2" in out and "no contact is located" in out
+
+
+def test_urdf_that_is_no_xml(capsys, log, tmp_path):
+    (tmp_path / "arm.urdf").write_text("<robot name='x'><link name='a'>")
+    path = described(tmp_path, model="arm.urdf")
+    assert "arm.urdf" in refused(capsys, log, tmp_path / "r", robot=path)
+
+
+def test_massless_moving_link_is_named(capsys, log, tmp_path):
+    zero = "links:\n  tool: {mass: 0.0}\n"
+    path = described(tmp_path, zero, joints="")
+    main(["check", str(path)])
+    assert "tool" in capsys.readouterr().out
+
+
+def test_truncated_stream_leaves_what_was_read(capsys, robot, tmp_path, monkeypatch):
+    monkeypatch.setattr("touchline.report.analysis.CHUNK", 500)
+    long = free_motion(robot, seconds=30.0, rate=200.0)
+    path = tmp_path / "log.csv.gz"
+    write_table(path, long, robot.description)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    status = analyze(path, tmp_path / "r")
+    captured = capsys.readouterr()
+    assert status in (0, 2) and "log.csv.gz" in captured.err + captured.out
+    folder = tmp_path / "r"
+    table = estimates(folder) if status == 0 else pq.read_table(folder / "estimates.parts")
+    assert 1000 < table.num_rows < 6000
+    assert isinstance(table, pa.Table)
+
+
+SLOW = """
+import sys, time
+import touchline.logs.writer as writer
+import touchline.report.analysis as analysis
+from touchline.cli import main
+writer.PART_ROWS, analysis.CHUNK = 500, 250
+add, count = analysis._Run.add, [0]
+def slow(self, part):
+    add(self, part)
+    count[0] += 1
+    if count[0] == 9:
+        print("nine parts", flush=True)
+        time.sleep(60)
+analysis._Run.add = slow
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def test_a_killed_run_leaves_what_it_had_finished(robot, tmp_path):
+    samples = free_motion(robot, seconds=15.0, rate=200.0)
+    wrench = samples.wrench.copy()
+    wrench[1000:1100, 0, 0] -= 30.0
+    log, out = tmp_path / "log.parquet", tmp_path / "r"
+    write_table(log, replace(samples, wrench=wrench), robot.description)
+    arguments = ["analyze", str(log), "--robot", "sara", "--out", str(out)]
+    process = subprocess.Popen(
+        [sys.executable, "-c", SLOW, *arguments], stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "nine parts\n"
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    table = pq.read_table(out / "estimates.parts")
+    np.testing.assert_array_equal(table["time"], samples.time[:2000])
+    assert not (out / "estimates.parquet").exists()
+    text = (out / "events.json").read_text()
+    assert '"segment": "base"' in text and "NaN" not in text
+    assert main(arguments) == 0  # and the next run clears up
+    assert not (out / "estimates.parts").exists()
+    assert pq.read_table(out / "estimates.parquet").num_rows == 3000
+
+
+def test_no_traceback_from_a_process(tmp_path):
+    process = subprocess.run(
+        [sys.executable, "-m", "touchline", "analyze", "x.csv", "--robot", "sara", "--out", "r"],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(Path(tl.__file__).parents[1])},
+        check=False,
+    )
+    assert process.returncode == 2
+    assert process.stderr == "touchline: x.csv: no such file\n"
+    assert not (tmp_path / "r").exists()
+
+
+def test_a_missing_extra_is_named(capsys, log, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    assert analyze(log, tmp_path / "r") == 1
+    assert "touchline[logs]" in capsys.readouterr().err
+
+
+def test_gzip_that_is_none(capsys, tmp_path):
+    path = tmp_path / "log.csv.gz"
+    path.write_bytes(gzip.compress(b"time,a\n0,1\n")[:10])
+    assert "log.csv.gz" in refused(capsys, path, tmp_path / "r")

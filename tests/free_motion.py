@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings with exact dynamics, made without a simulator."""
+
+import numpy as np
+
+import touchline as tl
+from touchline.estimation.samples import Samples
+
+
+def smooth_motion(robot, seconds, rate, seed=0, amplitude=0.5):
+    """Positions and velocities (N, n) of every joint about the middle of its range."""
+    rng = np.random.default_rng(seed)
+    joints = [robot.mechanism.joints[name] for name in robot.joint_names]
+    lower = np.array([max(joint.lower, -2.0) for joint in joints])
+    upper = np.array([min(joint.upper, 2.0) for joint in joints])
+    t = np.arange(round(seconds * rate))[:, None] / rate
+    w = rng.uniform(0.8, 1.6, len(joints))
+    phase = rng.uniform(0, 2 * np.pi, len(joints))
+    swing = amplitude * 0.5 * (upper - lower)
+    q = 0.5 * (lower + upper) + swing * np.sin(w * t + phase)
+    return q, swing * w * np.cos(w * t + phase)
+
+
+def exact_loads(robot, time, q, qd):
+    """Torques (N, n) and wrenches (N, k, 6) without contact, as an ideal sensor reads them.
+
+    An observer without lag that is told nothing takes all that moves the arm for external.
+    """
+    observer = tl.Observer(robot, bandwidth=1e9, method="paper", discretization="exponential")
+    n, k = len(robot.joint_names), len(robot.sensor_names)
+    nothing = np.zeros((len(time), n)), np.zeros((len(time), k, 6))
+    estimate = observer.run(time, q, qd, *nothing)
+    tau, wrench = estimate.tau_ext.copy(), estimate.sensor_wrench.copy()
+    # Means over the intervals before and after a sample make the value at the sample.
+    for values in (tau, wrench):
+        values[0] = values[1]
+        values[1:-1] = 0.5 * (values[1:-1] + values[2:])
+    return tau, wrench
+
+
+def free_motion(robot, seconds=20.0, rate=200.0, seed=0, noise=0.01):
+    """Samples of a robot whose description reads the log as it is (no sign, bias or friction)."""
+    q, qd = smooth_motion(robot, seconds, rate, seed)
+    time = np.arange(len(q)) / rate
+    tau, wrench = exact_loads(robot, time, q, qd)
+    rng = np.random.default_rng(seed + 1)
+    tau += rng.normal(0, noise, tau.shape)
+    wrench += rng.normal(0, noise, wrench.shape)
+    return Samples(time, q, qd, tau, wrench)

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The report: self-contained, small, and honest about what was recorded."""
+
+import base64
+import json
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from free_motion import free_motion
+
+import touchline as tl
+from touchline.logs import write_table
+from touchline.report.analysis import analyze
+from touchline.report.statistics import Moments
+
+VOID = {"meta", "line", "br", "hr", "img", "input", "link"}
+
+
+@pytest.fixture(scope="module")
+def analysis(tmp_path_factory):
+    robot = tl.load_robot("sara")
+    samples = free_motion(robot, seconds=10.0, rate=200.0)
+    wrench = samples.wrench.copy()
+    wrench[800:900, 0, 0] -= 20.0
+    folder = tmp_path_factory.mktemp("report")
+    path = folder / "a <b> & c.parquet"
+    write_table(path, replace(samples, wrench=wrench), robot.description)
+    return analyze(path, "sara", folder / "r")
+
+
+@pytest.fixture(scope="module")
+def page(analysis):
+    return (analysis.out / "report.html").read_text()
+
+
+def data_of(page):
+    return json.loads(re.search(r'id="data">(.*?)</script>', page, re.S)[1])
+
+
+class Balance(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.open, self.problems = [], []
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        if not self.open or self.open.pop() != tag:
+            self.problems.append((tag, self.getpos()))
+
+
+def test_every_tag_is_closed_and_names_are_escaped(page):
+    parser = Balance()
+    parser.feed(page)
+    assert parser.problems == [] and parser.open == []
+    assert "a &lt;b&gt; &amp; c.parquet" in page and "a <b>" not in page
+
+
+def test_nothing_is_fetched(page):
+    body = re.sub(r'id="data">.*?</script>', "", page, flags=re.S)
+    assert "default-src 'none'" in body
+    assert not re.search(r"""(src|href)\s*=|@import|url\((?!#)|fetch\(|XMLHttp""", body)
+    addresses = set(re.findall(r"https?://[^\"' )]+", body))
+    assert addresses <= {"http://www.w3.org/2000/svg"}
+    assert len(page) < 5e6
+
+
+def test_curves_are_those_of_the_estimates(analysis, page):
+    data = data_of(page)
+    torque = data["panels"][1]  # joint2 has a sensor
+    packed = data["curves"][torque["curves"][0]["column"]]
+    numbers = np.frombuffer(base64.b64decode(packed["high"]), "<i2")
+    values = np.where(numbers == -32768, np.nan, packed["middle"] + packed["step"] * numbers)
+    assert data["count"] == 2000
+    traces = analysis.curves.traces.high[:2000, torque["curves"][0]["column"]]
+    np.testing.assert_allclose(values, traces, atol=packed["step"])
+
+
+def test_the_event_is_in_table_and_plots(analysis, page):
+    (event,) = analysis.events
+    (shown,) = data_of(page)["events"]
+    assert shown["segment"] == "base" and shown["from"] == pytest.approx(event.detected)
+    assert page.count("data-event=") >= 1 and f"{event.detected:.3f}" in page
+
+
+def test_the_description_is_in_the_page(page):
+    for word in ("joint1", "from base", "polarity", "outboard", "gravity", "-9.81", "31.1"):
+        assert word in page
+
+
+def test_moments_ignore_what_is_not_known():
+    moments = Moments(2)
+    values = np.array([[1.0, np.nan], [-3.0, 2.0], [9.0, 4.0]])
+    moments.add(values, np.array([[True], [True], [False]]))
+    np.testing.assert_allclose(moments.rms, [np.sqrt(5.0), 2.0])
+    np.testing.assert_allclose(moments.mean, [-1.0, 2.0])
+    np.testing.assert_allclose(moments.largest, [3.0, 2.0])
+
+
+def test_a_browser_draws_every_plot_without_an_error(analysis, page):
+    browser = shutil.which("chromium") or shutil.which("google-chrome")
+    if browser is None:
+        pytest.skip("no chromium on this machine")
+    options = "--headless --no-sandbox --disable-gpu --disable-quic --disable-dev-shm-usage"
+    command = [browser, *options.split(), "--enable-logging=stderr", "--v=0", "--dump-dom"]
+    target = f"file://{analysis.out}/report.html"
+    done = subprocess.run(
+        [*command, target], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert "CONSOLE" not in done.stderr, done.stderr
+    drawn = len(re.findall(r'<path d="M[^"]+" class="curve', done.stdout))
+    panels = analysis.curves.panels
+    assert drawn == sum(len(panel.curves) for panel in panels)
+    assert done.stdout.count('class="event collision ') >= 1
