@@ -80,7 +80,7 @@ class ComputedTorque:
     """
 
     trajectory: Trajectory
-    frequency: float = 30.0
+    frequency: float = 60.0
 
     def torque(self, plant: Plant) -> Array:
         """Motor torques (n,) [Nm or N]."""

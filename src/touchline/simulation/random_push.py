@@ -153,7 +153,9 @@ def joined(runs: Sequence[Simulated], pause: float) -> Simulated:
         times.append(simulated.samples.time + shift)
         shift = float(times[-1][-1]) + pause
     fields = ("q", "qd", "tau", "wrench")
-    arrays: dict[str, Array] = {f: np.concatenate([getattr(r.samples, f) for r in runs]) for f in fields}
+    arrays: dict[str, Array] = {
+        f: np.concatenate([getattr(r.samples, f) for r in runs]) for f in fields
+    }
     samples = Samples(time=np.concatenate(times), row=0, **arrays)
     truths = [r.truth for r in runs]
     rows = {

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from touchline.model.robot import Robot
 from touchline.simulation.contacts import Profile, ScriptedContact, ScriptedForces
-from touchline.simulation.control import ComputedTorque, Trajectory, hold
+from touchline.simulation.control import Trajectory, hold
 from touchline.simulation.places import Place, PlaceFinder, weakest_direction
 from touchline.simulation.pushers import CollidingPushers, Pusher
 from touchline.simulation.random_push import random_pushes
@@ -36,8 +36,7 @@ def free_motion(
         settings: rates, noise, seed.
     """
     settings = settings or Run()
-    trajectory = wandering(read_setup(robot), speed, np.random.default_rng(settings.seed))
-    controller = ComputedTorque(trajectory)
+    controller = _motion(robot, speed, settings)
     return simulate(robot, controller, [], seconds, settings, scenario="free_motion")
 
 
@@ -55,7 +54,7 @@ def scripted(
         robot: any.
         contacts: one slot of the truth each.
         seconds: duration.
-        speed: of the fastest joint [rad/s]; 0: the arm is held by joint impedance control.
+        speed: of the fastest joint [rad/s]; 0: the arm stands.
         settings: rates, noise, seed.
         start: (n,) where the arm stands or about which it moves; default: home.
     """
@@ -79,7 +78,7 @@ def three_touches(
 
     Args:
         robot: with one six-axis sensor or more.
-        speed: of the fastest joint [rad/s]; 0: the arm is held by joint impedance control.
+        speed: of the fastest joint [rad/s]; 0: the arm stands.
         force: of each touch [N].
         seconds: duration.
         settings: rates, noise, seed.
@@ -144,7 +143,7 @@ def colliding_pushers(
 
     Args:
         robot: with surfaces.
-        speed: of the fastest joint [rad/s], which moves by 1 cm or so; 0: the arm is held.
+        speed: of the fastest joint [rad/s], which moves by 1 cm or so; 0: the arm stands.
         force: of each ball's spring [N].
         hold_time: with full force [s].
         settings: rates, noise, seed.
@@ -177,7 +176,8 @@ def demo(robot: Robot, seconds: float = 20.0, settings: Run | None = None) -> Si
         settings: rates, noise, seed.
     """
     settings = settings or Run()
-    trajectory = wandering(read_setup(robot), 0.35, np.random.default_rng(settings.seed))
+    setup = read_setup(robot)
+    trajectory = wandering(setup, 0.35, np.random.default_rng(settings.seed))
     finder = PlaceFinder(robot, trajectory, np.random.default_rng([settings.seed, 3]))
     links = structure_links(robot)
     ends = [body.links for body in robot.bodies if body.segment not in ("root", _structure(robot))]
@@ -190,17 +190,18 @@ def demo(robot: Robot, seconds: float = 20.0, settings: Run | None = None) -> Si
                 place = finder.find(group, start, start + 1.5)
                 force = finder.rng.uniform(10.0, 30.0)
                 contacts.append(_contact(place, force, start, start + 1.5))
-    controller = ComputedTorque(trajectory)
+    controller = impedance(setup, trajectory)
     forces = [ScriptedForces(contacts)]
     return simulate(robot, controller, forces, seconds, settings, scenario="demo")
 
 
 def _motion(robot: Robot, speed: float, settings: Run, start: Array | None = None) -> Tracking:
     setup = read_setup(robot)
+    trajectory = hold(setup.home if start is None else start)
     if speed:
         rng = np.random.default_rng(settings.seed)
-        return ComputedTorque(wandering(setup, speed, rng, center=start))
-    return impedance(setup, hold(setup.home if start is None else start))
+        trajectory = wandering(setup, speed, rng, center=start)
+    return impedance(setup, trajectory)
 
 
 def _touched(

@@ -125,7 +125,7 @@ class _Part:
 
     def __init__(self, triangles: Array) -> None:
         self.triangles = triangles
-        self.points = np.unique(triangles.reshape(-1, 3), axis=0)
+        self.points = _distinct(triangles.reshape(-1, 3))
         self.volume = _hull_volume(self.points)
         self._cut: tuple[float, list[_Part]] | None = None
 
@@ -177,6 +177,12 @@ def _crossing(a: Array, b: Array, axis: int, position: float) -> Array:
     """Where the edges from `a` to `b` (E, 3) cross the plane."""
     share = (position - a[:, axis]) / (b[:, axis] - a[:, axis])
     return a + share[:, None] * (b - a)
+
+
+def _distinct(points: Array) -> Array:
+    """The points (P, 3) without repetitions, told apart by one number each, which is fast."""
+    _, first = np.unique(points @ (1.0, np.sqrt(2.0), np.pi), return_index=True)
+    return points[first]
 
 
 def _hull_volume(points: Array) -> float:
