@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
-Name = Literal["fig4"]
+Name = Literal["fig4", "applications"]
 
 
 def reproduce(

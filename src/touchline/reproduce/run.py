@@ -7,12 +7,13 @@ from importlib import import_module
 from pathlib import Path
 
 from touchline.errors import InputError
-from touchline.model.suggest import did_you_mean
 from touchline.reproduce.experiment import Experiment
 from touchline.reproduce.outputs import make_folder, write_experiment, write_page
+from touchline.suggest import did_you_mean
 
 EXPERIMENTS = {
     "fig4": "touchline.reproduce.fig4",
+    "applications": "touchline.reproduce.applications",
 }
 
 
