@@ -23,8 +23,8 @@ from touchline.reproduce.replay import FORCE
 Array = NDArray[np.float64]
 
 NAMES = {
-    "screw": ("(a) Screw, and a person on the elbow", "Elbow: force"),
-    "teaching": ("(b) Teaching by the handle", "Hand: force"),
+    "screw": ("(a) Screwing", "Elbow: force"),
+    "teaching": ("(b) Teaching", "Hand: force"),
 }
 INSTANTS = {"screw": 2.5, "teaching": 2.6}  # of the pictures [s]
 
@@ -44,7 +44,7 @@ def drawings(parts: list[Application]) -> dict[str, Drawing]:
 CAPTION = (
     "Left: the arm at one instant; grey: true forces, rings: where they act, dots: points located "
     "from the sensors. Right: norms of the forces on each segment, and of the moment about the "
-    "tip of the tool."
+    "tip of the tool; orange: the error of eq. (5), joint torques alone."
 )
 
 
@@ -70,8 +70,9 @@ def _curves(panels: list[Any], part: Application, first: bool, last: bool) -> No
     replay = part.replay
     truth = {s: replay.filtered_truth(s) for s in ("wrist", part.other)}
     tool, other = replay.wrench("wrist"), replay.wrench(part.other)
-    _norms(panels[0], replay.time, truth["wrist"][:, FORCE], tool[:, FORCE], part.single[:, FORCE])
-    moments = (tool_moment(part, w) for w in (truth["wrist"], tool, part.single))
+    error = part.single - truth["wrist"]
+    _norms(panels[0], replay.time, truth["wrist"][:, FORCE], tool[:, FORCE], error[:, FORCE])
+    moments = (tool_moment(part, w) for w in (truth["wrist"], tool, error))
     _norms(panels[1], replay.time, *moments)
     _norms(panels[2], replay.time, truth[part.other][:, FORCE], other[:, FORCE], None)
     titles = ("Tool: force", "Tool: moment", NAMES[part.name][1])
@@ -87,10 +88,10 @@ def _curves(panels: list[Any], part: Application, first: bool, last: bool) -> No
         legend_above(panels[1], 1, panels[1].get_lines()[-1:])
 
 
-def _norms(axes: Any, time: Array, truth: Array, ours: Array, single: Array | None) -> None:
+def _norms(axes: Any, time: Array, truth: Array, ours: Array, error: Array | None) -> None:
     time, truth, ours = thin(time, *(np.linalg.norm(x, axis=1) for x in (truth, ours)))
     axes.plot(time, truth, color=COLORS["truth"], lw=2.6, alpha=0.7, label="true")
     axes.plot(time, ours, color=COLORS["segment"], label="ours")
-    if single is not None:
-        norm = thin(np.linalg.norm(single, axis=1))[0]
-        axes.plot(time, norm, color=COLORS["classical"], lw=0.8, label="eq. (5)", zorder=1)
+    if error is not None:
+        norm = thin(np.linalg.norm(error, axis=1))[0]
+        axes.plot(time, norm, color=COLORS["classical"], lw=0.8, label="error of eq. (5)", zorder=1)

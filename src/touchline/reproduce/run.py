@@ -13,6 +13,7 @@ from touchline.suggest import did_you_mean
 
 EXPERIMENTS = {
     "fig4": "touchline.reproduce.fig4",
+    "fig5": "touchline.reproduce.fig5",
     "applications": "touchline.reproduce.applications",
 }
 
