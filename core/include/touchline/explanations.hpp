@@ -384,7 +384,7 @@ class Explanations {
       if (!arrived && !try_point(view, k, k.point + step)) break;
     }
     if (arrived && k.fit.cone < 1.0) return;
-    for (double radius = 0.016; radius > 1e-3; radius *= 0.5) {
+    for (double radius = 0.032; radius > 1e-3; radius *= 0.5) {
       for (int round = 0; round < 3 && better_around(view, k, radius); ++round) {
       }
     }

@@ -17,7 +17,7 @@ struct LocalizerSettings {
   double cone_softness = 0.1;     // one sigma of the angle beyond the cone [rad]
   double force_scale = 50.0;      // of contact forces, where they cannot be seen [N]
   double place_scale = 0.1;       // of surfaces, where the place cannot be seen [m]
-  double pitch_limit = 4.5;       // sigmas beyond which one force does not explain a segment
+  double pitch_limit = 4.0;       // sigmas beyond which one force does not explain a segment
   double least_force = 0.3;       // below it no place is named [N]
   double certain = 0.9;           // probability of a place that counts as located
   double place_radius = 0.0225;   // explanations nearer than this are one place [m]

@@ -71,7 +71,7 @@ class Pipeline:
             torque_error=torque_error,
         )
         self.recorder = EventRecorder(self.detector, self.localizer)
-        self.contacts: ContactTable | None = None
+        self.contacts = ContactTable.empty(self.localizer)
         self._pending: list[tuple] = []
         self._touched = b""
         self._idle = np.zeros(len(robot.segment_names)).tobytes()

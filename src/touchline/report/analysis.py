@@ -17,6 +17,7 @@ from touchline.estimation.samples import Samples
 from touchline.logs import Log, open_log
 from touchline.model.robot import Robot, load_robot
 from touchline.report.curves import Curves
+from touchline.report.event_pictures import EventPoses
 from touchline.report.facts import bandwidth_warnings, bandwidths
 from touchline.report.outputs import REPORT, Outputs, prepare_directory, write_text
 from touchline.report.statistics import Statistics
@@ -39,6 +40,7 @@ class Analysis:
         statistics: of all samples.
         curves: for plots.
         events: all events.
+        poses: how the robot stood at the first of them.
         warnings: what the user should know.
     """
 
@@ -52,6 +54,7 @@ class Analysis:
     statistics: Statistics
     curves: Curves
     events: list[Event]
+    poses: EventPoses
     warnings: list[str]
 
 
@@ -119,6 +122,7 @@ class _Run:
         self._outputs = Outputs(out, robot)
         self._statistics = Statistics.of(len(robot.joint_names), len(robot.segment_names))
         self._curves = Curves(pipeline, self.period)
+        self._poses = EventPoses()
 
     def add(self, part: Samples) -> None:
         """Take the next samples."""
@@ -130,6 +134,7 @@ class _Run:
         if self.pipeline.contacts is not None:
             self._outputs.contacts(time, estimate, self.pipeline.contacts)
         self._outputs.events(self.pipeline.events)
+        self._poses.add(time, part.q, self.pipeline.events)
 
     def finish(
         self, log: Path, method: str, bandwidth: float | None, warnings: list[str]
@@ -148,6 +153,7 @@ class _Run:
             statistics=self._statistics,
             curves=self._curves,
             events=events,
+            poses=self._poses,
             warnings=warnings,
         )
 

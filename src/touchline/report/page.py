@@ -13,6 +13,7 @@ from touchline import __version__
 from touchline.contact.event import Event
 from touchline.report.analysis import Analysis
 from touchline.report.curves import Panel
+from touchline.report.event_pictures import pictures
 from touchline.report.facts import event_where, health_facts, joint_facts, segment_facts
 from touchline.report.html import Cell, note, section, table
 from touchline.report.outputs import strict
@@ -28,7 +29,8 @@ PAGE = """<!doctype html>
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta http-equiv="Content-Security-Policy"
-  content="default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'">
+  content="default-src 'none'; img-src data:; style-src 'unsafe-inline';
+  script-src 'unsafe-inline'">
 <title>{title}</title>
 <style>
 {style}</style>
@@ -54,6 +56,7 @@ def page_text(analysis: Analysis) -> str:
         _header(analysis),
         _warnings(analysis),
         _events(analysis),
+        pictures(analysis.robot, analysis.events, analysis.poses),
         _plots(analysis),
         _residuals(analysis),
         _health(analysis),

@@ -32,11 +32,14 @@ class Reading:
         motor_torque: (n,) torque of the motor, before rotor and friction [Nm or N]; springs and
             dampers set in the model count as the motor's.
         wrench: (k, 6) on the outboard body, sensor frame [N, Nm].
+        motion_torque: (n,) that the motion would take without contact; None where no joint's
+            driver takes it out [Nm or N].
     """
 
     link_torque: Array
     motor_torque: Array
     wrench: Array
+    motion_torque: Array | None = None
 
 
 class Plant:
@@ -69,6 +72,7 @@ class Plant:
         self._dofs = np.array([built.joints[j.name] for j in joints], dtype=int)
         self._set_couplings(built.joints)
         self._site_ids = [self.model.site(f"sensor:{s}").id for s in robot.sensor_names]
+        self._shows_motion = any(j.compensated == "model" for j in joints)
         moved = any(j.torque == "motor" for j in joints)
         self._friction = _Friction(robot) if moved else None
         self._motor_torque = np.zeros(len(joints))
@@ -84,7 +88,8 @@ class Plant:
             mimic = self.robot.mechanism.joints[name].mimic
             self._P[row, index[mimic.joint if mimic else name]] = mimic.multiplier if mimic else 1.0
             self._offset[row] = mimic.offset if mimic else 0.0
-        self.plain = np.array_equal(self._P, np.eye(n)) and self.model.nv == n
+        in_order = np.array_equal(self._dofs, np.arange(self.model.nv))
+        self.plain = in_order and np.array_equal(self._P, np.eye(n))
 
     @property
     def time(self) -> float:
@@ -179,6 +184,7 @@ class Plant:
             self._P.T @ transmitted,
             self._motor_torque + d.qfrc_passive[self._dofs],
             d.sensordata[: 6 * k].reshape(k, 6).copy(),
+            self._motion_torque() if self._shows_motion else None,
         )
 
     def inertia_times(self, acceleration: Array) -> Array:
@@ -215,8 +221,7 @@ class Plant:
         self._mj.mj_fwdVelocity(self.model, self.data)
         return self._P.T @ out[self._robot_dofs]
 
-    def motion_torque(self) -> Array:
-        """Link-side torques (n,) that the motion takes without anything touching [Nm or N]."""
+    def _motion_torque(self) -> Array:
         out = np.empty(self.model.nv)
         self._mj.mj_rne(self.model, self.data, 1, out)
         return self._P.T @ out[self._robot_dofs]
