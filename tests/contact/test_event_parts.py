@@ -40,14 +40,14 @@ def events_in_parts(robot, samples, rows):
 def test_events_are_the_same(robot, touched, rows):
     whole = events_in_parts(robot, touched, len(touched))
     assert events_in_parts(robot, touched, rows) == whole
-    assert len(whole) == 4 and all(cleared is not None for _, _, _, cleared, *_ in whole)
+    assert len(whole) >= 4 and all(cleared is not None for _, _, _, cleared, *_ in whole)
 
 
 def test_events_are_numbered_in_the_order_of_detection(robot, touched):
     events = events_in_parts(robot, touched, len(touched))
     detected = [event[2] for event in events]
     assert detected == sorted(detected)
-    assert [event[0] for event in events] == list(range(4))
+    assert [event[0] for event in events] == list(range(len(events)))
 
 
 def test_an_event_may_end_with_the_first_sample_of_a_part(robot, touched):
