@@ -3,6 +3,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +13,12 @@ from touchline.report.render import solids
 from touchline.report.render.camera import Camera, Size
 from touchline.report.render.light import FloorContact, Lights, ShadowMap, doubled, shaded
 from touchline.report.render.png import png_bytes
-from touchline.report.render.raster import rasterize, weights
+from touchline.report.render.raster import box, rasterize, weights
 from touchline.report.render.skin import Piece, Triangles, posed_skin
 
 __all__ = ["Camera", "Mark", "Scene", "png_bytes"]
 
-Array = NDArray[np.float64]
-Single = NDArray[np.float32]
+Array = NDArray[np.floating[Any]]
 
 FINE = 2  # samples per pixel, along each side
 NEAREST = 0.02  # m; triangles that come nearer to the camera are not drawn
@@ -92,10 +92,15 @@ class Scene:
         """Length [m] of the diagonal of the box around the robot."""
         if not len(self._surface.corners):
             return 1.0
-        return float(np.linalg.norm(np.ptp(self._surface.corners, axis=(0, 1))))
+        low, high = self._box
+        return float(np.linalg.norm(high - low))
 
     @cached_property
-    def balls(self) -> tuple[Single, Single]:
+    def _box(self) -> tuple[Array, Array]:
+        return box(self._surface.corners)
+
+    @cached_property
+    def balls(self) -> tuple[Array, Array]:
         """Middles (T, 3) and radii (T,) [m] of balls around the triangles."""
         corners = self._surface.corners.astype(np.float32)
         middle = corners.mean(axis=1)
@@ -158,7 +163,7 @@ class Scene:
     def render(self, camera: Camera, size: Size = (640, 640)) -> NDArray[np.uint8]:
         """The picture, (H, W, 3) in sRGB, of `size` (width, height) [pixels]."""
         lights = Lights.of(camera)
-        floor = float(self._surface.corners[..., 2].min())
+        floor = float(self._box[0][2])
         canvas = _Canvas(camera, size)
         shadow = ShadowMap(self._surface.corners, lights.key)
         ground = self._ground(camera, size, shadow, lights.key, floor)
@@ -188,7 +193,7 @@ class Scene:
 
     def _ground(
         self, camera: Camera, size: Size, shadow: ShadowMap, key: Array, floor: float
-    ) -> Single:
+    ) -> Array:
         """The background (H, W, 3): a calm gradient with the robot's shadow on the floor."""
         width, height = size
         fade = np.linspace(0, 1, height)[:, None] ** 1.2
@@ -201,7 +206,9 @@ class Scene:
         dark = np.zeros(len(rays), np.float32)
         dark[below] = 1 - (1 - 0.34 * shadow.shade_on_floor(points)) * (1 - 0.45 * foot.at(points))
         dark = doubled(dark.reshape(coarse[::-1]))[:height, :width, None]
-        return ground[:, None].astype(np.float32) * (1 - dark * np.float32([1.0, 0.97, 0.92]))
+        return ground[:, None].astype(np.float32) * (
+            1 - dark * np.array([1.0, 0.97, 0.92], np.float32)
+        )
 
     def _overlays(self) -> list[tuple[Triangles, str, float]]:
         """What is drawn over the robot: (triangles, colour, opacity), in order."""
@@ -234,7 +241,7 @@ class _Seen:
 
     sample: NDArray[np.int64]
     part: NDArray[np.int64]
-    depth: Single
+    depth: Array
     normal: Array
     position: Array
 
@@ -245,8 +252,8 @@ class _Canvas:
     def __init__(self, camera: Camera, size: Size) -> None:
         self._camera, self._size = camera, size
         self._fine = (size[0] * FINE, size[1] * FINE)
-        self._depth: Single | None = None
-        self._light: Single = np.zeros((size[0] * size[1], 3), np.float32)
+        self._depth: Array | None = None
+        self._light: Array = np.zeros((size[0] * size[1], 3), np.float32)
 
     @property
     def image(self) -> NDArray[np.uint8]:
@@ -275,7 +282,7 @@ class _Canvas:
         position = self._camera.eye + ray * depth[:, None]
         return _Seen(hit.pixel, triangles.part[number], depth, normal, position)
 
-    def put(self, ground: Single, seen: _Seen, colour: Single) -> None:
+    def put(self, ground: Array, seen: _Seen, colour: Array) -> None:
         """Begin with a background (H, W, 3) and what stands before it."""
         self._light = ground.reshape(-1, 3).copy()
         self._blend(seen, colour, np.ones(len(colour), np.float32))
@@ -285,14 +292,14 @@ class _Canvas:
         self._depth = np.full(self._fine[0] * self._fine[1], np.inf, np.float32)
         self._depth[seen.sample] = seen.depth
 
-    def put_over(self, seen: _Seen, colour: Single, opacity: float) -> None:
+    def put_over(self, seen: _Seen, colour: Array, opacity: float) -> None:
         """Draw over it: fainter where it is hidden."""
         share = np.full(len(colour), opacity, np.float32)
         if self._depth is not None:
             share[self._depth[seen.sample] < seen.depth - 1e-4] *= HIDDEN
         self._blend(seen, colour, share)
 
-    def _blend(self, seen: _Seen, colour: Single, share: Single) -> None:
+    def _blend(self, seen: _Seen, colour: Array, share: Array) -> None:
         y, x = np.divmod(seen.sample, self._fine[0])
         pixel = (y // FINE) * self._size[0] + x // FINE
         if not len(pixel):
