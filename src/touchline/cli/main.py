@@ -8,6 +8,12 @@ from touchline import __version__
 from touchline.cli.analyze import analyze
 from touchline.cli.bench import bench
 from touchline.cli.check import check
+<<<<<<< HEAD
+from touchline.cli.demo import demo
+from touchline.cli.simulate import simulate
+=======
+from touchline.cli.reproduce import reproduce
+>>>>>>> reproduce
 from touchline.errors import InputError
 from touchline.suggest import did_you_mean
 
@@ -22,7 +28,20 @@ usage: touchline COMMAND ...
 `touchline COMMAND --help` explains a command; `touchline --version` names the version.
 Exit status: 0 done, 1 failure (check: findings), 2 bad input."""
 
-COMMANDS: dict[str, Callable[..., int]] = {"analyze": analyze, "check": check, "bench": bench}
+COMMANDS: dict[str, Callable[..., int]] = {
+<<<<<<< HEAD
+    "demo": demo,
+    "simulate": simulate,
+    "analyze": analyze,
+    "check": check,
+    "bench": bench,
+=======
+    "analyze": analyze,
+    "check": check,
+    "bench": bench,
+    "reproduce": reproduce,
+>>>>>>> reproduce
+}
 
 EXTRAS = {
     "pyarrow": "logs",

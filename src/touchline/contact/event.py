@@ -140,6 +140,7 @@ class EventRecorder:
         self._robot = detector.observer.robot
         self._rows = detector.thresholds.rows
         self._open: dict[int, tuple[Event, _Strongest]] = {}
+        self._announced: dict[tuple[int, int], Event] = {}  # by segment and sample of a part
 
     def open_events(self) -> dict[int, Event]:
         """Events that last, by number of their segment."""
@@ -166,6 +167,7 @@ class EventRecorder:
             (N, m) the number of the event on each segment, -1 where there is none.
         """
         ids = np.full(detection.levels.shape, -1)
+        self._announce(time, detection.levels)
         for g in range(len(self._robot.segment_names)):
             levels = detection.levels[:, g]
             if g in self._open or levels.any():
@@ -180,6 +182,19 @@ class EventRecorder:
         for g, (event, _) in self._open.items():
             _place(event, self._localizer.event(g))
 
+    def _announce(self, time: Array, levels: Array) -> None:
+        """Numbers the events that begin in these samples in the order in which they do."""
+        active = levels > 0
+        before = np.zeros_like(active[:1])
+        before[:, list(self._open)] = True
+        rises = np.argwhere(active & ~np.vstack([before, active[:-1]]))
+        self._announced = {}
+        for row, g in rises.tolist():
+            name = self._robot.segment_names[g]
+            event = Event(len(self.events), name, "contact", float(time[row]))
+            self.events.append(event)
+            self._announced[g, row] = event
+
     def _add_segment(
         self,
         g: int,
@@ -193,21 +208,17 @@ class EventRecorder:
     ) -> None:
         active = levels > 0
         edges = np.flatnonzero(np.diff(active.astype(int), prepend=int(g in self._open)))
-        bounds = [0, *edges.tolist(), len(time)]
+        bounds = sorted({0, *edges.tolist(), len(time)})  # an edge may be the first sample
         for start, stop in zip(bounds[:-1], bounds[1:], strict=True):
             if start in edges and not active[start]:
                 self._close(g, float(time[start]), places)
             if start == stop or not active[start]:
                 continue
             if g not in self._open:
-                self._begin(g, float(time[start]))
+                event = self._announced[g, start]
+                self._open[g] = (event, _Strongest(len(self._rows) + 3))
             ids[start:stop, g] = self._open[g][0].id
             self._extend(g, slice(start, stop), levels, q, estimate, detection)
-
-    def _begin(self, g: int, time: float) -> None:
-        event = Event(len(self.events), self._robot.segment_names[g], "contact", time)
-        self.events.append(event)
-        self._open[g] = (event, _Strongest(len(self._rows) + 3))
 
     def _close(self, g: int, time: float, places: list[Array]) -> None:
         event, _ = self._open.pop(g)

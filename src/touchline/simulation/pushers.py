@@ -9,18 +9,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from touchline.simulation.contacts import NOTHING, Touch, no_touch
+from touchline.simulation.contacts import NOTHING, Touch, cross, no_touch
 from touchline.simulation.mujoco_model import quaternion
 from touchline.simulation.plant import Plant
 from touchline.simulation.shapes import OTHER, ROBOT
 
 Array = NDArray[np.float64]
+Force = tuple[Array, Array]  # point and force, (3,) each
 
 
-# MuJoCo's default contacts are so hard that a loaded one may end by a rounding error. At this
-# impedance its contact is a plain spring, and depth and force vanish together.
-IMPEDANCE = 0.5
-CONTACT_DAMPING = 0.1  # ratio; the rail damps too, and more would make touching down a jump
+# MuJoCo's contact force is (impedance * the other forces on the ball) + spring + damper. At its
+# default impedance a contact begins and ends with a jump by nearly all of these other forces; at a
+# small one it is a plain spring. `impratio` keeps friction firm all the same.
+IMPEDANCE = 0.02
+FRICTION_RATIO = 50.0
+CONTACT_DAMPING = 0.05  # ratio; the rail damps too, and more would make touching down a jump
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,7 @@ class Pusher:
     radius: float = 0.025
     gap: float = 0.004
     speed: float = 0.02
-    stiffness: float = 1000.0
+    stiffness: float = 2000.0
     mass: float = 0.2
     friction: float = 0.5
     contact_stiffness: float = 2e4
@@ -88,6 +91,7 @@ class CollidingPushers:
         self._mj: Any = import_module("mujoco")
         self.pushers = tuple(pushers)
         self._owners: tuple[str, ...] = ()
+        self._idle = [no_touch(pusher.link) for pusher in self.pushers for _ in range(2)]
         self._wrench = np.zeros(6)
 
     def __len__(self) -> int:
@@ -95,6 +99,7 @@ class CollidingPushers:
 
     def add(self, spec: Any, bodies: dict[str, Any]) -> None:
         """Adds the balls to a model before it is compiled; see `build_model`."""
+        spec.option.impratio = FRICTION_RATIO
         spec.option.cone = self._mj.mjtCone.mjCONE_ELLIPTIC
         for pusher in self.pushers:
             direction = _unit(pusher.direction)
@@ -144,52 +149,50 @@ class CollidingPushers:
 
     def touches(self, plant: Plant) -> list[Touch]:
         """The contact forces on the robot at the plant's present state and inputs."""
-        idle = [no_touch(pusher.link) for pusher in self.pushers for _ in range(2)]
         if plant.data.ncon == 0:
-            return idle
-        found: list[dict[str, list[tuple[Array, Array]]]] = [{} for _ in self.pushers]
-        for c in range(plant.data.ncon):
-            self._sort(plant, c, found)
-        for i, (pusher, by_link) in enumerate(zip(self.pushers, found, strict=True)):
-            touches = {link: _joined(link, forces) for link, forces in by_link.items()}
-            idle[2 * i] = touches.pop(pusher.link, idle[2 * i])
-            idle[2 * i + 1] = max(touches.values(), key=_strength, default=idle[2 * i + 1])
-        return idle
+            return self._idle
+        touches = list(self._idle)
+        for i, by_link in self._sorted(plant).items():
+            joined = {link: _joined(link, forces) for link, forces in by_link.items()}
+            touches[2 * i] = joined.pop(self.pushers[i].link, touches[2 * i])
+            touches[2 * i + 1] = max(joined.values(), key=_strength, default=touches[2 * i + 1])
+        return touches
 
-    def _sort(
-        self, plant: Plant, c: int, found: list[dict[str, list[tuple[Array, Array]]]]
-    ) -> None:
-        """Notes one contact's point and force on the robot under its ball and link."""
-        contact = plant.data.contact[c]
-        first, second = (int(g) for g in contact.geom)
-        ball, other, sign = (first, second, 1.0) if first in self._geoms else (second, first, -1.0)
-        if ball not in self._geoms or contact.efc_address < 0:
-            return
-        self._mj.mj_contactForce(plant.model, plant.data, c, self._wrench)
-        # MuJoCo gives the force of the first shape on the second, in the contact's axes (rows).
-        force = sign * contact.frame.reshape(3, 3).T @ self._wrench[:3]
-        if force.any():
-            rows = found[self._geoms[ball]].setdefault(self._owners[other], [])
-            rows.append((contact.pos.copy(), force))
+    def _sorted(self, plant: Plant) -> dict[int, dict[str, list[Force]]]:
+        """Points and forces on the robot by ball and link."""
+        contacts, found = plant.data.contact, {}
+        pairs, points = contacts.geom.tolist(), contacts.pos
+        for c, (first, second) in enumerate(pairs):
+            sign = 1.0 if first in self._geoms else -1.0
+            ball, other = (first, second) if first in self._geoms else (second, first)
+            if ball not in self._geoms:
+                continue
+            self._mj.mj_contactForce(plant.model, plant.data, c, self._wrench)
+            if self._wrench[0] > 0.0:
+                # MuJoCo gives the force of the first shape on the second, in the contact's axes.
+                force = sign * (self._wrench[:3] @ contacts.frame[c].reshape(3, 3))
+                links = found.setdefault(self._geoms[ball], {})
+                links.setdefault(self._owners[other], []).append((points[c].copy(), force))
+        return found
 
 
 def _contact_spring(pusher: Pusher) -> list[float]:
     """MuJoCo's `solref` of a spring between the ball and something much heavier."""
     k = pusher.contact_stiffness / pusher.mass
-    return [-k * IMPEDANCE**2, -2 * CONTACT_DAMPING * np.sqrt(k) * IMPEDANCE]
+    return [-k, -2 * CONTACT_DAMPING * np.sqrt(k)]
 
 
 def _strength(touch: Touch) -> float:
-    return float(np.linalg.norm(touch.force))
+    return float(touch.force @ touch.force)
 
 
-def _joined(link: str, forces: list[tuple[Array, Array]]) -> Touch:
+def _joined(link: str, forces: list[Force]) -> Touch:
     """Contacts of one ball with one link as one: at their centre, with the moment that is left."""
     if len(forces) == 1:
         return Touch(True, link, *forces[0], NOTHING)
     weights = np.array([np.linalg.norm(force) for _, force in forces])
     point = weights @ np.array([at for at, _ in forces]) / weights.sum()
-    moment = np.sum([np.cross(at - point, force) for at, force in forces], axis=0)
+    moment = np.sum([cross(at - point, force) for at, force in forces], axis=0)
     return Touch(True, link, point, np.sum([force for _, force in forces], axis=0), moment)
 
 

@@ -5,23 +5,27 @@ All take the robot first and share the settings of `Run`; the same seed gives th
 """
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.errors import InputError
 from touchline.model.robot import Robot
 from touchline.simulation.contacts import Profile, ScriptedContact, ScriptedForces
-from touchline.simulation.control import ComputedTorque, Trajectory, hold
-from touchline.simulation.places import Place, PlaceFinder, weakest_direction
+from touchline.simulation.control import hold
+from touchline.simulation.places import Place, PlaceFinder
 from touchline.simulation.pushers import CollidingPushers, Pusher
 from touchline.simulation.random_push import random_pushes
 from touchline.simulation.scene import Run, Tracking, impedance, simulate, wandering
 from touchline.simulation.setup import read_setup
-from touchline.simulation.shapes import shapes_for_collisions
+from touchline.simulation.shapes import CollisionShapes
 from touchline.simulation.touchable import structure_links
 from touchline.simulation.truth import Simulated
 
 Array = NDArray[np.float64]
+PUSHER_TRIES = 100
+ROUGHNESS, ROUGH_WITHIN = 5e-4, 0.012  # m by which colliding shapes may stand off, how far around
 
 
 def free_motion(
@@ -36,8 +40,7 @@ def free_motion(
         settings: rates, noise, seed.
     """
     settings = settings or Run()
-    trajectory = wandering(read_setup(robot), speed, np.random.default_rng(settings.seed))
-    controller = ComputedTorque(trajectory)
+    controller = _motion(robot, speed, settings)
     return simulate(robot, controller, [], seconds, settings, scenario="free_motion")
 
 
@@ -55,7 +58,7 @@ def scripted(
         robot: any.
         contacts: one slot of the truth each.
         seconds: duration.
-        speed: of the fastest joint [rad/s]; 0: the arm is held by joint impedance control.
+        speed: of the fastest joint [rad/s]; 0: the arm stands.
         settings: rates, noise, seed.
         start: (n,) where the arm stands or about which it moves; default: home.
     """
@@ -79,7 +82,7 @@ def three_touches(
 
     Args:
         robot: with one six-axis sensor or more.
-        speed: of the fastest joint [rad/s]; 0: the arm is held by joint impedance control.
+        speed: of the fastest joint [rad/s]; 0: the arm stands.
         force: of each touch [N].
         seconds: duration.
         settings: rates, noise, seed.
@@ -110,7 +113,7 @@ def base_touch(
 def singular_push(
     robot: Robot, force: float = 20.0, seconds: float = 1.0, settings: Run | None = None
 ) -> Simulated:
-    """The stretched arm is pushed in the direction in which it cannot move.
+    """The stretched arm is pushed in a direction in which it cannot move: no joint feels it.
 
     Arguments as in `three_touches`.
 
@@ -121,13 +124,11 @@ def singular_push(
     setup = read_setup(robot)
     trajectory = hold(setup.stretched)
     links = structure_links(robot)
-    outer = links[len(links) // 2 :]
-    direction, weakness = weakest_direction(robot, outer[-1], np.zeros(3), setup.stretched)
-    finder = PlaceFinder(robot, trajectory, np.random.default_rng(settings.seed))
-    place = finder.find(outer, 0.0, 0.0, direction=direction)
+    finder = PlaceFinder(robot, trajectory, np.random.default_rng([settings.seed, 3]))
+    place, lever = finder.find_weakest(links[len(links) // 2 :])
     contacts = [ScriptedForces([_contact(place, force, 0.2, seconds - 0.1)])]
     controller = impedance(setup, trajectory)
-    told = {"scenario": "singular_push", "singular_value_ratio": weakness}
+    told = {"scenario": "singular_push", "torque_per_newton": lever}
     return simulate(robot, controller, contacts, seconds, settings, **told)
 
 
@@ -144,7 +145,7 @@ def colliding_pushers(
 
     Args:
         robot: with surfaces.
-        speed: of the fastest joint [rad/s], which moves by 1 cm or so; 0: the arm is held.
+        speed: of the fastest joint [rad/s], which moves by some mm; 0: the arm stands.
         force: of each ball's spring [N].
         hold_time: with full force [s].
         settings: rates, noise, seed.
@@ -153,13 +154,15 @@ def colliding_pushers(
     setup = read_setup(robot)
     trajectory = hold(setup.home)
     if speed:
-        trajectory = wandering(setup, speed, np.random.default_rng(settings.seed), reach=0.02)
-    pushers = _pushers(robot, trajectory, force, hold_time, settings)
+        trajectory = wandering(setup, speed, np.random.default_rng(settings.seed), reach=0.008)
+    shapes = CollisionShapes(robot.mechanism)
+    finder = PlaceFinder(robot, trajectory, np.random.default_rng([settings.seed, 3]))
+    pushers = _pushers(robot, finder, shapes, force, hold_time)
     balls = CollidingPushers(pushers)
-    shapes = shapes_for_collisions(robot.mechanism, {pusher.link for pusher in pushers})
+    add_shapes = shapes.addition(pusher.link for pusher in pushers)
 
-    def add(spec, bodies) -> None:
-        shapes(spec, bodies)
+    def add(spec: Any, bodies: dict[str, Any]) -> None:
+        add_shapes(spec, bodies)
         balls.add(spec, bodies)
 
     controller = impedance(setup, trajectory)
@@ -177,7 +180,8 @@ def demo(robot: Robot, seconds: float = 20.0, settings: Run | None = None) -> Si
         settings: rates, noise, seed.
     """
     settings = settings or Run()
-    trajectory = wandering(read_setup(robot), 0.35, np.random.default_rng(settings.seed))
+    setup = read_setup(robot)
+    trajectory = wandering(setup, 0.35, np.random.default_rng(settings.seed))
     finder = PlaceFinder(robot, trajectory, np.random.default_rng([settings.seed, 3]))
     links = structure_links(robot)
     ends = [body.links for body in robot.bodies if body.segment not in ("root", _structure(robot))]
@@ -190,17 +194,18 @@ def demo(robot: Robot, seconds: float = 20.0, settings: Run | None = None) -> Si
                 place = finder.find(group, start, start + 1.5)
                 force = finder.rng.uniform(10.0, 30.0)
                 contacts.append(_contact(place, force, start, start + 1.5))
-    controller = ComputedTorque(trajectory)
+    controller = impedance(setup, trajectory)
     forces = [ScriptedForces(contacts)]
     return simulate(robot, controller, forces, seconds, settings, scenario="demo")
 
 
 def _motion(robot: Robot, speed: float, settings: Run, start: Array | None = None) -> Tracking:
     setup = read_setup(robot)
+    trajectory = hold(setup.home if start is None else start)
     if speed:
         rng = np.random.default_rng(settings.seed)
-        return ComputedTorque(wandering(setup, speed, rng, center=start))
-    return impedance(setup, hold(setup.home if start is None else start))
+        trajectory = wandering(setup, speed, rng, center=start)
+    return impedance(setup, trajectory)
 
 
 def _touched(
@@ -234,20 +239,34 @@ def _structure(robot: Robot) -> str:
 
 
 def _pushers(
-    robot: Robot, trajectory: Trajectory, force: float, hold_time: float, settings: Run
+    robot: Robot, finder: PlaceFinder, shapes: CollisionShapes, force: float, hold_time: float
 ) -> list[Pusher]:
-    rng = np.random.default_rng([settings.seed, 3])
-    finder = PlaceFinder(robot, trajectory, rng)
+    """One ball for each segment, setting out one after the other."""
     segments = {body.segment: body.links for body in robot.bodies if body.segment != "root"}
     groups = segments | {_structure(robot): structure_links(robot)[2:]}
     pushers = []
     for i, (segment, links) in enumerate(groups.items()):
-        place = finder.find(links, 0.0, 0.0, clearance=0.06)
-        T = robot.T_world_links(trajectory(0.0).q)[place.link]
+        place = _true_place(robot, finder, shapes, links)
+        T = finder.poses(0.0)[place.link]
         point = T[:3, :3] @ place.at.point + T[:3, 3]
-        start = 0.1 + 0.6 * i
+        start = 0.1 + 0.3 * i
         pushers.append(Pusher(segment, place.link, point, place.direction, start, hold_time, force))
     return pushers
+
+
+def _true_place(
+    robot: Robot, finder: PlaceFinder, shapes: CollisionShapes, links: Sequence[str]
+) -> Place:
+    """A place where the shapes that collide do not stand off the true surface.
+
+    Raises:
+        InputError: there is none.
+    """
+    for _ in range(PUSHER_TRIES):
+        place = finder.find(links, 0.0, 0.0, clearance=0.06)
+        if shapes.depth(place.link, place.at.point, ROUGH_WITHIN) < ROUGHNESS:
+            return place
+    raise InputError(f"robot {robot.name}: the shapes of {', '.join(links)} are too rough")
 
 
 SCENARIOS: dict[str, Callable[..., Simulated]] = {

@@ -96,7 +96,6 @@ def describe(robot: Robot, settings: Run) -> dict[str, Any]:
         "rate": settings.rate,
         "physics": settings.physics,
         "noise": settings.noise is not None,
-        "truth.links": list(robot.mechanism.links),
     }
 
 
