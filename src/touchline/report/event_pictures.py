@@ -3,6 +3,7 @@
 
 from collections.abc import Sequence
 from html import escape
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +13,10 @@ from touchline.model.robot import Robot
 from touchline.report.figure import svg_picture
 from touchline.report.html import note, section
 from touchline.report.picture import SIGMAS, Scene
+from touchline.report.render.skin import robot_skin
 from touchline.report.views import views_of_contact
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
 
 MOST_PICTURED = 12  # events; each brings some 130 kB to the page
 SIZE = (520, 520)
@@ -46,6 +48,8 @@ class EventPoses:
 
 def pictures(robot: Robot, events: Sequence[Event], poses: EventPoses) -> str:
     """The section of the report with the pictures of the first events; empty without any."""
+    if not robot_skin(robot):
+        return ""
     shown = [(event, poses.get(event)) for event in events]
     figures = [event_pictures(robot, event, q) for event, q in shown if q is not None]
     if not figures:
@@ -103,7 +107,7 @@ def _position(robot: Robot, event: Event, q: Array) -> Array | None:
     """The event's point (3,) in world, on the link as it stands at `q`."""
     if event.position_link is None or event.link is None:
         return event.position
-    T = robot.T_world_links(q)[event.link]
+    T = robot.T_world_links(np.asarray(q, np.float64))[event.link]
     return T[:3, :3] @ event.position_link + T[:3, 3]
 
 
