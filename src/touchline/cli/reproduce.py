@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
-Name = Literal["fig4", "fig5", "applications"]
+Name = Literal["fig4", "fig5", "fig6", "applications"]
 
 
 def reproduce(

@@ -196,9 +196,13 @@ def _rows(part: Application) -> list[Row]:
     return rows
 
 
-def _place(part: Application, segment: str, method: str) -> dict[str, float | int | None]:
+def _place(part: Application, segment: str, method: str) -> dict[str, str | float | int | None]:
     """Errors of the located points."""
-    nothing = {"points": None, "point_error_median": None, "point_error_max": None}
+    nothing: dict[str, str | float | int | None] = {
+        "points": None,
+        "point_error_median": None,
+        "point_error_max": None,
+    }
     if method != "ours":
         return nothing
     error = point_errors(part.replay, segment)

@@ -43,8 +43,8 @@ def drawings(pushes: Pushes, after: list[Recoil]) -> dict[str, Drawing]:
         second.start + 0.12,
     )
     with styled():
-        figure = new_figure(PAGE, 5.2)
-        upper, lower = figure.subfigures(2, 1, height_ratios=(1.0, 1.75))
+        figure = new_figure(PAGE, 4.7)
+        upper, lower = figure.subfigures(2, 1, height_ratios=(1.0, 2.4))
         _pictures(upper, replay, instants)
         axes = lower.subplots(2, 2, sharex=True)
         _forces(axes[0, 0], replay)
@@ -74,7 +74,7 @@ CAPTION = (
 
 
 def _pictures(figure: Any, replay: Replay, instants: tuple[float, ...]) -> None:
-    view = ArmView(replay.robot, azimuth=-0.75, elevation=0.5)
+    view = ArmView(replay.robot, azimuth=-0.4, elevation=0.35)
     rows = [int(np.argmin(np.abs(replay.time - t))) for t in instants]
     configurations = replay.signals[1][rows]
     for number, (axes, row) in enumerate(zip(figure.subplots(1, len(rows)), rows, strict=True), 1):

@@ -14,6 +14,7 @@ from touchline.suggest import did_you_mean
 EXPERIMENTS = {
     "fig4": "touchline.reproduce.fig4",
     "fig5": "touchline.reproduce.fig5",
+    "fig6": "touchline.reproduce.fig6",
     "applications": "touchline.reproduce.applications",
 }
 
