@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from touchline.contact.event import Event
 from touchline.model.robot import Robot
+from touchline.report.comparison import Comparison
 from touchline.report.figure import svg_picture
 from touchline.report.html import note, section
 from touchline.report.picture import SIGMAS, Scene
@@ -46,12 +47,21 @@ class EventPoses:
         return self._poses.get(event.id)
 
 
-def pictures(robot: Robot, events: Sequence[Event], poses: EventPoses) -> str:
+def pictures(
+    robot: Robot,
+    events: Sequence[Event],
+    poses: EventPoses,
+    comparisons: Sequence[Comparison] = (),
+) -> str:
     """The section of the report with the pictures of the first events; empty without any."""
     if not robot_skin(robot):
         return ""
     shown = [(event, poses.get(event)) for event in events]
-    figures = [event_pictures(robot, event, q) for event, q in shown if q is not None]
+    figures = [
+        event_pictures(robot, event, q, _truth_of(event, comparisons))
+        for event, q in shown
+        if q is not None
+    ]
     if not figures:
         return ""
     words = (
@@ -63,6 +73,12 @@ def pictures(robot: Robot, events: Sequence[Event], poses: EventPoses) -> str:
         f" The first {len(figures)} of {len(events)} events." if len(figures) < len(events) else ""
     )
     return section("Where it was touched", note(words + more), *figures, anchor="pictures")
+
+
+def _truth_of(event: Event, comparisons: Sequence[Comparison]) -> list[tuple[Array, Array]]:
+    """Point and force of the true contact that an event found, at the event's time."""
+    found = [row for row in comparisons if row.event is event]
+    return [row.truth.at(event.time_of_position or event.detected) for row in found]
 
 
 def event_pictures(
