@@ -33,10 +33,15 @@ class TrueContact:
         """Largest force [N]."""
         return float(np.linalg.norm(self.force, axis=1).max())
 
-    def at(self, time: float) -> tuple[Array, Array]:
-        """Point (3,) [m] and force (3,) [N] at a time [s] of the contact."""
-        i = min(int(np.searchsorted(self.time, time)), len(self.time) - 1)
-        return self.point[i], self.force[i]
+    @property
+    def mean_force(self) -> Array:
+        """Force (3,) [N], mean over the samples near the peak."""
+        norms = np.linalg.norm(self.force, axis=1)
+        return self.force[norms >= 0.9 * norms.max()].mean(axis=0)
+
+    def point_at(self, time: float) -> Array:
+        """Point (3,) [m] at a time [s] of the contact."""
+        return self.point[min(int(np.searchsorted(self.time, time)), len(self.time) - 1)]
 
 
 @dataclass(frozen=True)
@@ -117,21 +122,16 @@ def _mismatch(contact: TrueContact, event: Event) -> float:
     """Distance of forces relative to the truth, the measure by which contacts are told apart."""
     if event.force is None:
         return np.inf
-    return float(np.linalg.norm(event.force - _mean_force(contact))) / contact.strength
-
-
-def _mean_force(contact: TrueContact) -> Array:
-    norms = np.linalg.norm(contact.force, axis=1)
-    return contact.force[norms >= 0.9 * norms.max()].mean(axis=0)
+    return float(np.linalg.norm(event.force - contact.mean_force)) / contact.strength
 
 
 def _comparison(contact: TrueContact, event: Event | None) -> Comparison:
     position_error = force_error = np.nan
     if event is not None and event.position is not None and event.time_of_position is not None:
-        point, _ = contact.at(event.time_of_position)
+        point = contact.point_at(event.time_of_position)
         position_error = float(np.linalg.norm(event.position - point))
     if event is not None and event.force is not None:
-        force_error = float(np.linalg.norm(event.force - _mean_force(contact)))
+        force_error = float(np.linalg.norm(event.force - contact.mean_force))
     return Comparison(contact, event, position_error, force_error)
 
 

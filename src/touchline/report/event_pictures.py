@@ -69,6 +69,8 @@ def pictures(
         "touched and points along the force on it; the line goes on along the force. The disc is "
         f"{SIGMAS:g} standard deviations of the point. What the arm hides is drawn fainter."
     )
+    if comparisons:
+        words += " Blue is the truth of the simulation."
     more = (
         f" The first {len(figures)} of {len(events)} events." if len(figures) < len(events) else ""
     )
@@ -78,7 +80,8 @@ def pictures(
 def _truth_of(event: Event, comparisons: Sequence[Comparison]) -> list[tuple[Array, Array]]:
     """Point and force of the true contact that an event found, at the event's time."""
     found = [row for row in comparisons if row.event is event]
-    return [row.truth.at(event.time_of_position or event.detected) for row in found]
+    time = event.time_of_position or event.detected
+    return [(row.truth.point_at(time), row.truth.mean_force) for row in found]
 
 
 def event_pictures(
@@ -107,8 +110,7 @@ def event_scene(
     """What the pictures of an event show; arguments as of `event_pictures`."""
     scene = Scene(robot, q)
     for point, force in truth or ():
-        size = float(np.linalg.norm(force))
-        scene.add_contact(point, force, "truth", label=f"true {size:.1f} N")
+        scene.add_contact(point, force, "truth")
     position = _position(robot, event, q)
     if position is not None and event.link is not None:
         scene.highlight(event.link)
