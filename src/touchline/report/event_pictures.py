@@ -67,7 +67,8 @@ def pictures(
     words = (
         "The arm as it stood at the event, from two sides. The arrow ends where the arm was "
         "touched and points along the force on it; the line goes on along the force. The disc is "
-        f"{SIGMAS:g} standard deviations of the point. What the arm hides is drawn fainter."
+        f"{SIGMAS:g} standard deviations of the point, and lies within the ball where they are small. "
+        "What the arm hides is drawn fainter."
     )
     if comparisons:
         words += " Blue is the truth of the simulation."
