@@ -26,7 +26,7 @@ WIDTH = 0.26
 def drawings(cases: list[Case], table: list[Row]) -> dict[str, Drawing]:
     """The cases over the fractions."""
     with styled():
-        figure = new_figure(PAGE, 3.9)
+        figure = new_figure(PAGE, 3.7)
         upper, lower = figure.subfigures(2, 1, height_ratios=(1.25, 1.0))
         for axes, case in zip(upper.subplots(1, len(cases)), cases, strict=True):
             _picture(axes, case)
@@ -44,7 +44,7 @@ CAPTION = (
 def _picture(axes: Any, case: Case) -> None:
     replay, row = case.replay, case.row
     q, truth = replay.signals[1][row], replay.simulated.truth
-    view = ArmView(replay.robot, azimuth=-0.9, elevation=0.3)
+    view = ArmView(replay.robot, azimuth=-0.5, elevation=0.3)
     view.draw(axes, q)
     for slot in np.flatnonzero(truth.link[row] >= 0):
         point = truth.point[row, slot]
@@ -54,7 +54,7 @@ def _picture(axes: Any, case: Case) -> None:
         located = replay.located(segment)[row]
         if np.isfinite(located).all():
             view.point(axes, located, COLORS["segment"], 4.5)
-    view.frame(axes, q[None], 0.2)
+    view.frame(axes, q[None], 0.12)
     axes.set_title(case.name, pad=2)
 
 
