@@ -256,16 +256,9 @@ def _words(cases: list[Case], table: list[Row]) -> tuple[str, str, str]:
         f"joints inboard, and {100 * total(table, 'eq5', outer):.0f} % further out. At rest "
         "the classical wrench does not suffer from its coupling (figure 4) and is even quieter: "
         f"median force error {median(table, 'classical'):.2f} N against "
-<<<<<<< HEAD
-        f"{median(table, 'ours'):.2f} "
-        "N, for velocity noise reaches a momentum and not an inverse dynamics. What it gets wrong "
-        "it gets wrong because the first entry of its line, the paper's rule, is on another link "
-        f"or far away. Of the pictured contacts ours gets {sum(v.right for v in ours)} of "
-=======
         f"{median(table, 'ours'):.2f} N, for the observer lets velocity noise through, K M qd. "
         "What it gets wrong it gets wrong because the first entry of its line, the paper's rule, "
         "is on another link or far from the point; ours weighs all entries. Of the pictured contacts ours gets {sum(v.right for v in ours)} of "
->>>>>>> reproduce
         f"{len(ours)} right, eq. (5) {sum(v.right for v in eq5)}."
     )
     return shows, says, sees
