@@ -46,13 +46,13 @@ class TouchableSurface:
     def __init__(self, robot: Robot, floor: float = 0.0) -> None:
         self._mj: Any = import_module("mujoco")
         self.robot, self.floor = robot, floor
-        built = build_model(robot, 1e-3, addition=surfaces_for_rays(robot.mechanism))
+        surfaces = {name: link_surface(link) for name, link in robot.mechanism.links.items()}
+        self.surfaces = {name: s for name, s in surfaces.items() if s is not None}
+        built = build_model(robot, 1e-3, addition=surfaces_for_rays(self.surfaces))
         self._model, self._data = built.model, self._mj.MjData(built.model)
         self._bodies = built.bodies
         names = {body: link for link, body in built.bodies.items()}
         self._owner = [names[body] for body in built.model.geom_bodyid]
-        surfaces = {name: link_surface(link) for name, link in robot.mechanism.links.items()}
-        self.surfaces = {name: s for name, s in surfaces.items() if s is not None}
 
     def draw(self, rng: np.random.Generator, links: Sequence[str]) -> SurfacePoint:
         """A point, uniform over the area of the links together.
