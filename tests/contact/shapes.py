@@ -51,9 +51,7 @@ def describe(mechanism, sensors, torque="sensor", qd=1e-4):
 
 def still(shape):
     """One link with one shape, bolted to a sensor."""
-    mechanism = Mechanism(
-        "still", "body", {"body": Link("body", BODY, (shape,))}, {}, np.zeros(3)
-    )
+    mechanism = Mechanism("still", "body", {"body": Link("body", BODY, (shape,))}, {}, np.zeros(3))
     return describe(mechanism, [("base", "body")])
 
 

@@ -153,7 +153,9 @@ def resting_signals(
         signals = signals + rng.normal(size=signals.shape) * np.array([*noise.tau, *sensors])
         qd = rng.normal(size=qd.shape) * np.array(noise.qd)
     tau = np.where(_measured(robot), signals[:, :n], np.nan)
-    return Signals(time, np.tile(q, (len(time), 1)), qd, tau, signals[:, n:].reshape(len(time), k, 6))
+    return Signals(
+        time, np.tile(q, (len(time), 1)), qd, tau, signals[:, n:].reshape(len(time), k, 6)
+    )
 
 
 def touch_loads(robot: Robot, q: Array, node: int, position: Array, force: Array) -> Array:
