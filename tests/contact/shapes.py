@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from touchline.bench.localization import Touch, resting_signals
+from touchline.bench.touches import Touch, resting_signals
 from touchline.contact.skin import Skin
 from touchline.estimation.observer import Observer
 from touchline.model.description import (

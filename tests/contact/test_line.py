@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from shapes import chain, measured, sphere, still
 
-from touchline.bench.localization import Touch, resting_signals
+from touchline.bench.touches import Touch, resting_signals
 from touchline.contact.line import line_at, line_point, pitch, pitch_score
 from touchline.contact.localizer import Localizer
 from touchline.estimation.observer import Observer

@@ -6,7 +6,7 @@ import pytest
 from shapes import BODY, box, chain, describe, measured, still, turned
 
 import touchline as tl
-from touchline.bench.localization import TouchSampler, resting_signals
+from touchline.bench.touches import TouchSampler, resting_signals
 from touchline.contact.localizer import Localizer
 from touchline.contact.skin import Skin
 from touchline.estimation.observer import Observer

@@ -1,180 +1,176 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How well contacts are located: random poses and points, an arm at rest, sensor noise."""
+"""`touchline bench localization`: how well contacts are located, by force and body.
 
-from dataclasses import dataclass
+Random poses of an arm at rest, reachable points uniform over the area of its links, a force in the
+friction cone for 0.3 s, the description's sensor noise; through the whole pipeline.
+"""
+
+import csv
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.contact.skin import Patch, Skin
-from touchline.model.robot import Robot
+from touchline.bench.touches import Touch, TouchSampler, resting_signals
+from touchline.contact.pipeline import Pipeline
+from touchline.contact.skin import Skin
+from touchline.model.robot import Robot, load_robot
 
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Touch:
-    """A force on an arm at rest.
-
-    Attributes:
-        q: joint positions (n,) [rad or m].
-        patch: the surface that is touched.
-        position: (3,) [m] in world.
-        normal: (3,) outward, in world.
-        force: (3,) [N] on the robot, in world.
-    """
-
-    q: Array
-    patch: Patch
-    position: Array
-    normal: Array
-    force: Array
-
-
-class TouchSampler:
-    """Random poses and reachable points, uniform over the area of the surfaces.
-
-    Args:
-        skin: the robot's surfaces.
-        rng: source of chance.
-        segments: only links of these segments; default: all that are felt.
-        friction: forces are uniform in this friction cone.
-        clearance: free space along the outward normal [m].
-        floor: points lie above this height [m].
-    """
-
-    def __init__(
-        self,
-        skin: Skin,
-        rng: np.random.Generator,
-        segments: tuple[str, ...] | None = None,
-        friction: float = 0.5,
-        clearance: float = 0.03,
-        floor: float = 0.0,
-    ) -> None:
-        self.skin, self.robot, self._rng = skin, skin.robot, rng
-        self._friction, self._clearance, self._floor = friction, clearance, floor
-        self._patches = [
-            patch
-            for patch in skin.patches
-            if patch.segment is not None and (segments is None or patch.segment in segments)
-        ]
-        areas = np.array([patch.surface.areas.sum() for patch in self._patches])
-        self._shares = areas / areas.sum()
-
-    def sample(self, force: float, q: Array | None = None) -> Touch:
-        """A reachable touch of `force` [N], at joint positions `q` (n,) or at random ones."""
-        given = q
-        while True:
-            q = self._rng.uniform(*_limits(self.robot)) if given is None else given
-            patch = self._patches[self._rng.choice(len(self._patches), p=self._shares)]
-            point, normal = self._point(patch, q)
-            if self._reachable(q, patch, point, normal):
-                push = force * _in_cone(-normal, self._friction, self._rng)
-                return Touch(q, patch, point, normal, push)
-
-    def _point(self, patch: Patch, q: Array) -> tuple[Array, Array]:
-        surface = patch.surface
-        face = self._rng.choice(len(surface.faces), p=surface.areas / surface.areas.sum())
-        u, v = self._rng.random(2)
-        if u + v > 1:
-            u, v = 1 - u, 1 - v
-        a, b, c = surface.vertices[surface.faces[face]]
-        T = self.robot.poses(q)[patch.node] @ patch.T_node_link
-        local = a + u * (b - a) + v * (c - a)
-        return T[:3, :3] @ local + T[:3, 3], T[:3, :3] @ surface.normals[face]
-
-    def _reachable(self, q: Array, patch: Patch, point: Array, normal: Array) -> bool:
-        if point[2] < self._floor or self.skin.links_around(q, point + 1e-6 * normal):
-            return False
-        ahead = [c.distance for c in self.skin.crossings(q, point, normal) if c.distance > 1e-6]
-        return not ahead or min(ahead) > self._clearance
-
-
-def _limits(robot: Robot) -> tuple[Array, Array]:
-    joints = [robot.mechanism.joints[name] for name in robot.joint_names]
-    lower = np.array([max(joint.lower, -np.pi) for joint in joints])
-    return lower, np.array([min(joint.upper, np.pi) for joint in joints])
-
-
-def _in_cone(axis: Array, friction: float, rng: np.random.Generator) -> Array:
-    """A unit vector uniform over the solid angle of a cone around `axis`."""
-    cosine = rng.uniform(1.0 / np.sqrt(1.0 + friction**2), 1.0)
-    turn = rng.uniform(0.0, 2 * np.pi)
-    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    s = np.cross(axis, helper)
-    s /= np.linalg.norm(s)
-    side = np.cos(turn) * s + np.sin(turn) * np.cross(axis, s)
-    return cosine * axis + np.sqrt(1.0 - cosine**2) * side
+FORCES = (5.0, 10.0, 20.0, 35.0, 50.0)  # N
+NEAR = 0.0225  # m, what counts as found
+GROSS = 0.1  # m
+BEGIN, END = 0.1, 0.4  # s, of the touch
 
 
 @dataclass(frozen=True)
-class Signals:
-    """What the sensors of an arm at rest report: `time` (N,), `q`, `qd`, `tau`, `wrench`."""
+class Trial:
+    """One touch and what was made of it; errors are NaN where nothing was located.
 
-    time: Array
-    q: Array
-    qd: Array
-    tau: Array
-    wrench: Array
+    `right` and `error` [m] are those of the event, `row_right` and `row_error` of the last sample.
+    """
+
+    body: str
+    force: float
+    status: str
+    right: bool
+    error: float
+    force_error: float
+    row_right: bool
+    row_error: float
+    std: float
+
+    @property
+    def found(self) -> bool:
+        """Right body and near enough, over the event."""
+        return self.right and self.error < NEAR
+
+    @property
+    def row_found(self) -> bool:
+        """The same for the last sample alone."""
+        return self.row_right and self.row_error < NEAR
 
 
-def resting_signals(
+def run_trials(
     robot: Robot,
-    q: Array,
-    touches: list[tuple[Touch, float]],
-    duration: float,
-    rng: np.random.Generator | None,
-    period: float = 1e-3,
-) -> Signals:
-    """What the sensors report while an arm at rest is touched.
-
-    Sensors are taken as plain: sign 1, no bias, polarity outboard, their own axes.
+    forces: Iterable[float] = FORCES,
+    count: int = 400,
+    seed: int = 0,
+    noise: bool = True,
+    segments: tuple[str, ...] | None = None,
+    rule: str = "likelihood",
+) -> Iterator[Trial]:
+    """Touches an arm at rest, `count` times with each force [N].
 
     Args:
-        robot: the robot.
-        q: joint positions (n,) [rad or m].
-        touches: each with the time at which it begins [s]; it lasts to the end.
-        duration: of the recording [s].
-        rng: source of the noise of the description; None: without noise.
-        period: between samples [s].
+        robot: that is touched.
+        forces: [N].
+        count: touches per force.
+        seed: of all that is random.
+        noise: with the noise of the description, or none.
+        segments: names of those that are touched; default: all.
+        rule: of the localizer.
     """
-    n, k = len(robot.joint_names), len(robot.sensor_names)
-    time = np.arange(round(duration / period)) * period
-    rest = robot.terms(q, np.zeros(n))[1]
-    loads = np.zeros((len(time), n + 6 * k))
-    for touch, begin in touches:
-        loads[time >= begin] += touch_loads(robot, q, touch.patch.node, touch.position, touch.force)
-    signals = rest - loads  # at rest: 0 = tau - n + tau_ext
-    qd = np.zeros((len(time), n))
-    if rng is not None:
-        noise = robot.description.noise
-        sensors = [x for name in robot.sensor_names for x in noise.sensors[name]]
-        signals = signals + rng.normal(size=signals.shape) * np.array([*noise.tau, *sensors])
-        qd = rng.normal(size=qd.shape) * np.array(noise.qd)
-    tau = np.where(_measured(robot), signals[:, :n], np.nan)
-    return Signals(
-        time, np.tile(q, (len(time), 1)), qd, tau, signals[:, n:].reshape(len(time), k, 6)
+    skin = Skin(robot)
+    rng = np.random.default_rng(seed)
+    sampler = TouchSampler(skin, rng, segments)
+    for force in forces:
+        for _ in range(count):
+            touch = sampler.sample(force)
+            pipeline = Pipeline(robot, skin=skin, rule=rule)
+            yield _trial(pipeline, touch, force, rng if noise else None)
+
+
+def _trial(
+    pipeline: Pipeline, touch: Touch, force: float, rng: np.random.Generator | None
+) -> Trial:
+    s = resting_signals(pipeline.robot, touch.q, [(touch, BEGIN)], END, rng)
+    pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+    events = [event for event in pipeline.events if event.segment == touch.patch.segment]
+    columns = pipeline.contacts.columns()
+    rows = np.flatnonzero(columns["segment"] == touch.patch.segment)
+    if not events or not len(rows):
+        return Trial(touch.patch.body, force, "missed", False, *[np.nan] * 2, False, *[np.nan] * 2)
+    event, last = events[0], rows[-1]
+    position = event.position if event.position is not None else np.full(3, np.nan)
+    row = np.array([columns[axis][last] for axis in "xyz"])
+    row_force = np.array([columns[axis][last] for axis in ("fx", "fy", "fz")])
+    return Trial(
+        body=touch.patch.body,
+        force=force,
+        status=event.status,
+        right=event.body == touch.patch.body,
+        error=float(np.linalg.norm(position - touch.position)),
+        force_error=float(np.linalg.norm(row_force - touch.force)),
+        row_right=columns["body"][last] == touch.patch.body,
+        row_error=float(np.linalg.norm(row - touch.position)),
+        std=float(columns["position_std"][last]),
     )
 
 
-def touch_loads(robot: Robot, q: Array, node: int, position: Array, force: Array) -> Array:
-    """What a force (3,) at `position` (3,) on a node does to all joints and sensors (n + 6 k,)."""
-    n = len(robot.joint_names)
-    loads = np.zeros(n + 6 * len(robot.sensor_names))
-    poses = robot.poses(q)
-    while node >= 0:
-        here, T = robot.nodes[node], poses[node]
-        moment = np.cross(position - T[:3, 3], force)
-        if here.coordinate >= 0:
-            load = force if here.kind == "prismatic" else moment
-            loads[here.coordinate] += here.multiplier * (T[:3, 2] @ load)
-        if here.sensor is not None:
-            at = n + 6 * robot.sensor_names.index(here.sensor)
-            loads[at : at + 6] += np.concatenate([force @ T[:3, :3], moment @ T[:3, :3]])
-        node = here.parent
-    return loads
+def table(trials: list[Trial]) -> str:
+    """The trials by force and by body."""
+    head = f"{'':12}{'n':>6}{'event':>9}{'row':>9}{'body':>9}{'gross':>8}"
+    head += f"{'median':>9}{'p99':>9}{'RMS':>9}{'force RMS':>11}{'unsure':>8}\n"
+    head += f"{'':12}{'':>6}{'found':>9}{'found':>9}{'right':>9}{'> 10 cm':>8}"
+    head += f"{'mm':>9}{'mm':>9}{'mm':>9}{'N':>11}"
+    lines = [head]
+    for force in sorted({trial.force for trial in trials}):
+        lines.append(_line(f"{force:g} N", [t for t in trials if t.force == force]))
+    lines.append("")
+    for body in dict.fromkeys(sorted(trial.body for trial in trials)):
+        lines.append(_line(body, [t for t in trials if t.body == body]))
+    lines += ["", _line("all", trials)]
+    return "\n".join(lines)
 
 
-def _measured(robot: Robot) -> NDArray[np.bool_]:
-    return np.array([joint.torque in ("sensor", "motor") for joint in robot.description.joints])
+def _line(name: str, trials: list[Trial]) -> str:
+    errors = np.array([t.error for t in trials if np.isfinite(t.error)])
+    forces = np.array([t.force_error for t in trials if np.isfinite(t.force_error)])
+    if not len(errors):
+        return f"{name:12}{len(trials):6}  nothing located"
+    share = [np.mean(list(x)) for x in zip(*_marks(trials), strict=True)]
+    near = errors[errors < GROSS]  # a few decimetres would hide all else in the RMS
+    numbers = [np.median(errors), np.percentile(errors, 99), np.sqrt(np.mean(near**2))]
+    line = f"{name:12}{len(trials):6}" + "".join(f"{100 * x:8.2f}%" for x in share[:3])
+    line += f"{100 * share[3]:7.2f}%" + "".join(f"{1e3 * x:9.2f}" for x in numbers)
+    return line + f"{np.sqrt(np.mean(forces**2)):11.3f}{100 * share[4]:7.2f}%"
+
+
+def _marks(trials: list[Trial]) -> Iterator[tuple[bool, ...]]:
+    for t in trials:
+        yield t.found, t.row_found, t.right, t.error > GROSS, t.status != "located"
+
+
+def main(output: Path | None = None, rounds: int = 40) -> None:
+    """Prints the tables of `sara`; `rounds` times ten touches with each force."""
+    from tqdm import tqdm
+
+    robot = load_robot("sara")
+    count = 10 * rounds
+    trials = run_trials(robot, count=count)
+    total = count * len(FORCES)
+    done = list(tqdm(trials, total=total, desc="localization", disable=None, leave=False))
+    print(f"localization benchmark: {robot.name} at rest, default noise, {len(done)} touches")
+    print("found: right body and within 22.5 mm; RMS without gross errors\n")
+    print(table(done))
+    print(
+        "\nbest published, 20 N, noise-free, Panda with base sensor: 99.96 %, RMS 1.6 mm, 0.01 N"
+        " (Han and Kim, ICRA 2023)"
+    )
+    if output is not None:
+        write(output, done)
+
+
+def write(output: Path, trials: list[Trial]) -> None:
+    """Writes the trials as .json or .csv."""
+    rows = [asdict(trial) for trial in trials]
+    if output.suffix == ".csv":
+        with output.open("w", newline="") as file:
+            writer = csv.DictWriter(file, list(rows[0]))
+            writer.writeheader()
+            writer.writerows(rows)
+    else:
+        clean = [{k: None if v != v else v for k, v in row.items()} for row in rows]
+        output.write_text(json.dumps(clean, indent=1))

@@ -7,11 +7,19 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
-BENCHMARKS = {"observer": "touchline.bench.observer"}
+BENCHMARKS = {
+    "observer": "touchline.bench.observer",
+    "localization": "touchline.bench.localization",
+}
+
+
+Name = Literal["observer", "localization"]
 
 
 def bench(
-    names: Annotated[Positional[tuple[Literal["observer"], ...]], arg(metavar="[NAME ...]")] = (),
+    names: Annotated[
+        Positional[tuple[Literal["observer", "localization"], ...]], arg(metavar="[NAME ...]")
+    ] = (),
     /,
     output: Annotated[Path | None, arg(metavar="FILE")] = None,
     rounds: int = 40,
@@ -21,10 +29,13 @@ def bench(
     Example: touchline bench observer
 
     Args:
-        names: What to measure (observer); default: everything.
-        output: Writes the figures here as well (.json or .csv).
-        rounds: How often each candidate is timed.
+        names: What to measure (observer, localization); default: everything.
+        output: Writes the figures here as well (.json or .csv), one file per name.
+        rounds: How often each candidate is timed; ten touches with each force.
     """
-    for name in names or BENCHMARKS:
-        import_module(BENCHMARKS[name]).main(output, rounds)
+    wanted = names or tuple(BENCHMARKS)
+    for name in wanted:
+        several = output is not None and len(wanted) > 1
+        file = output.with_stem(f"{output.stem}-{name}") if output and several else output
+        import_module(BENCHMARKS[name]).main(file, rounds)
     return 0

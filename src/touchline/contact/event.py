@@ -101,39 +101,38 @@ def _place(event: Event, answer: EventAnswer) -> None:
         setattr(event, name, value)
 
 
-class _Strongest:
-    """Mean of rows over the samples that come near the peak, gathered part by part.
+class _Gathered:
+    """What an event has brought so far, the same in whatever parts it comes."""
 
-    Attributes:
-        peak: the largest strength.
-        force: the largest force [N]; `wrench` (6,) and `q` (n,) are those of its sample.
-        torques: (n,) largest external torque of each joint [Nm], NaN where none is known.
-    """
-
-    def __init__(self, width: int, joints: int) -> None:
-        self.force, self.wrench, self.q = -1.0, np.zeros(6), np.zeros(joints)
-        self.torques = np.full(joints, np.nan)
-        self.peak = 0.0
-        self._sum = np.zeros(width)
+    def __init__(self, rows: int, joints: int) -> None:
+        self.strength = 0.0  # the largest so far
+        self.force = 0.0  # the largest norm, and the wrench and the joint positions then
+        self.wrench, self.q = np.zeros(6), np.zeros(joints)
+        self.torque = np.zeros(joints)  # the largest of each joint
+        self._sum = np.zeros(rows)
         self._count = 0
 
-    def add(self, strength: Array, rows: Array) -> None:
-        peak = float(np.max(strength, initial=0.0))
-        if peak * STRONG > self.peak:  # all that came before was weak
+    def add_rows(self, strength: Array, rows: Array) -> None:
+        """For the mean over the samples that come near the peak of those up to then."""
+        peaks = np.maximum.accumulate(np.concatenate([[self.strength], strength]))
+        leaps = np.flatnonzero(STRONG * strength > peaks[:-1])
+        if len(leaps):  # all that came before was weak
             self._sum[:] = 0.0
             self._count = 0
-        self.peak = max(self.peak, peak)
-        strong = strength >= STRONG * self.peak
-        self._sum += rows[strong].sum(axis=0)
+        start = leaps[-1] if len(leaps) else 0
+        strong = strength[start:] >= STRONG * peaks[start + 1 :]
+        self._sum += rows[start:][strong].sum(axis=0)
         self._count += int(strong.sum())
+        self.strength = float(peaks[-1])
 
-    def add_loads(self, q: Array, wrenches: Array, torques: Array) -> None:
-        """Takes the positions, the segment's wrenches and the joints' torques of a part."""
-        self.torques = np.fmax(self.torques, np.fmax.reduce(np.abs(torques)))
+    def add_peaks(self, wrenches: Array, q: Array, tau_ext: Array) -> None:
+        """Wrenches (N, 6), NaN where there is none, with joint positions and torques (N, n)."""
         norms = np.linalg.norm(np.nan_to_num(wrenches[:, :3]), axis=1)
-        row = int(norms.argmax())
-        if norms[row] > self.force:
-            self.force, self.wrench, self.q = float(norms[row]), wrenches[row], q[row]
+        largest = int(np.argmax(norms))
+        if norms[largest] > self.force:
+            self.force = float(norms[largest])
+            self.wrench, self.q = wrenches[largest].copy(), q[largest].copy()
+        self.torque = np.maximum(self.torque, np.abs(np.nan_to_num(tau_ext)).max(axis=0))
 
     @property
     def mean(self) -> Array:
@@ -155,7 +154,7 @@ class EventRecorder:
         self.events: list[Event] = []
         self._robot = detector.observer.robot
         self._rows = detector.thresholds.rows
-        self._open: dict[int, tuple[Event, _Strongest]] = {}
+        self._open: dict[int, tuple[Event, _Gathered]] = {}
         self._announced: dict[tuple[int, int], Event] = {}  # by segment and sample of a part
 
     def open_events(self) -> dict[int, Event]:
@@ -232,7 +231,8 @@ class EventRecorder:
                 continue
             if g not in self._open:
                 event = self._announced[g, start]
-                self._open[g] = (event, _Strongest(len(self._rows) + 3, q.shape[1]))
+                gathered = _Gathered(len(self._rows) + 3, len(self._robot.joint_names))
+                self._open[g] = (event, gathered)
             ids[start:stop, g] = self._open[g][0].id
             self._extend(g, slice(start, stop), levels, q, estimate, detection)
 
@@ -245,25 +245,21 @@ class EventRecorder:
     def _extend(
         self, g: int, part: slice, levels: Array, q: Array, estimate: Estimate, detection: Detection
     ) -> None:
-        event, strongest = self._open[g]
+        event, gathered = self._open[g]
         own = np.array([row.segment == g for row in self._rows])
         normalized = detection.normalized[part]
-        strength = np.abs(normalized[:, own]).max(axis=1)
-        forces = np.nan_to_num(estimate.segment_wrench[part, g, :3])
-        strongest.add(strength, np.hstack([normalized, forces]))
-        strongest.add_loads(q[part], estimate.segment_wrench[part, g], estimate.tau_ext[part])
+        wrenches = estimate.segment_wrench[part, g]
+        forces = np.nan_to_num(wrenches[:, :3])
+        gathered.add_rows(np.abs(normalized[:, own]).max(axis=1), np.hstack([normalized, forces]))
+        gathered.add_peaks(wrenches, q[part], estimate.tau_ext[part])
         if levels[part].max() >= Level.COLLISION:
             event.level = "collision"
         if event.segment != "root":
-            event.force = strongest.mean[-3:]
-            event.force_peak = strongest.force
-        self._name_joint(event, g, strongest)
-        if event.joint is not None:
-            torque = strongest.torques[self._robot.joint_names.index(event.joint)]
-            event.torque_peak = float(torque) if np.isfinite(torque) else None
+            event.force, event.force_peak = gathered.mean[-3:], gathered.force
+        self._name_joint(event, g, gathered)
 
-    def _name_joint(self, event: Event, g: int, strongest: _Strongest) -> None:
-        mean = strongest.mean
+    def _name_joint(self, event: Event, g: int, gathered: _Gathered) -> None:
+        mean, names = gathered.mean, self._robot.joint_names
         loaded = [
             (row.joint, abs(mean[i]))
             for i, row in enumerate(self._rows)
@@ -271,16 +267,20 @@ class EventRecorder:
         ]
         beyond = [joint for joint, x in loaded if x > 1.0]
         if beyond:
-            event.joint = self._robot.joint_names[max(beyond, key=self._robot.joint_depth)]
+            joint = max(beyond, key=self._robot.joint_depth)
         elif event.segment != "root":
-            event.joint = self._inboard_joint(event.segment, strongest.q, strongest.wrench)
-        elif loaded:
-            event.joint = self._robot.joint_names[max(loaded, key=lambda pair: pair[1])[0]]
+            joint = self._inboard_joint(event.segment, gathered)
+        else:
+            joint = max(loaded, key=lambda pair: pair[1])[0] if loaded else None
+        event.joint = None if joint is None else names[joint]
+        measured = joint is not None and gathered.torque[joint] > 0.0
+        event.torque_peak = float(gathered.torque[joint]) if measured else None
 
-    def _inboard_joint(self, segment: str, q: Array, wrench: Array) -> str | None:
+    def _inboard_joint(self, segment: str, gathered: _Gathered) -> int | None:
         """The most distal joint inboard of a segment that its wrench loads beyond its threshold."""
         limits = {row.joint: row.contact for row in self._rows if row.joint >= 0}
-        for joint, torque in reversed(self._robot.torques_of_wrench(segment, q, wrench)):
+        loads = self._robot.torques_of_wrench(segment, gathered.q, gathered.wrench)
+        for joint, torque in reversed(loads):
             if joint in limits and abs(torque) > limits[joint]:
-                return self._robot.joint_names[joint]
+                return joint
         return None

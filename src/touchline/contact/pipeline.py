@@ -10,6 +10,7 @@ from touchline.contact.contact import Contact
 from touchline.contact.detector import Detection, Detector
 from touchline.contact.event import Event, EventRecorder
 from touchline.contact.localizer import TORQUE_ERROR, Localizer
+from touchline.contact.skin import Skin
 from touchline.contact.table import ContactTable
 from touchline.estimation.observer import Estimate, Observer
 from touchline.model.robot import Robot
@@ -47,6 +48,7 @@ class Pipeline:
         rule: of the localizer, "likelihood" or "paper" (the first entry of the line).
         wrench_error: of gains and model, as a part of the load, and `torque_error`, for the
             localizer's weights.
+        skin: the robot's surfaces, if already at hand.
     """
 
     def __init__(
@@ -58,6 +60,7 @@ class Pipeline:
         rule: str = "likelihood",
         wrench_error: float = 0.0,
         torque_error: float = TORQUE_ERROR,
+        skin: Skin | None = None,
     ) -> None:
         self.robot = robot
         self.observer = Observer(robot, bandwidth, method)
@@ -69,6 +72,7 @@ class Pipeline:
             rule=rule,
             wrench_error=wrench_error,
             torque_error=torque_error,
+            skin=skin,
         )
         self.recorder = EventRecorder(self.detector, self.localizer)
         self.contacts = ContactTable.empty(self.localizer)

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Random touches of an arm at rest, and what its sensors report: no physics engine needed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.contact.skin import Patch, Skin
+from touchline.model.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A force on an arm at rest.
+
+    Attributes:
+        q: joint positions (n,) [rad or m].
+        patch: the surface that is touched.
+        position: (3,) [m] in world.
+        normal: (3,) outward, in world.
+        force: (3,) [N] on the robot, in world.
+    """
+
+    q: Array
+    patch: Patch
+    position: Array
+    normal: Array
+    force: Array
+
+
+class TouchSampler:
+    """Random poses and reachable points, uniform over the area of the surfaces.
+
+    Args:
+        skin: the robot's surfaces.
+        rng: source of chance.
+        segments: only links of these segments; default: all that are felt.
+        friction: forces are uniform in this friction cone.
+        clearance: free space along the outward normal [m].
+        floor: points lie above this height [m].
+    """
+
+    def __init__(
+        self,
+        skin: Skin,
+        rng: np.random.Generator,
+        segments: tuple[str, ...] | None = None,
+        friction: float = 0.5,
+        clearance: float = 0.03,
+        floor: float = 0.0,
+    ) -> None:
+        self.skin, self.robot, self._rng = skin, skin.robot, rng
+        self._friction, self._clearance, self._floor = friction, clearance, floor
+        self._patches = [
+            patch
+            for patch in skin.patches
+            if patch.segment is not None and (segments is None or patch.segment in segments)
+        ]
+        areas = np.array([patch.surface.areas.sum() for patch in self._patches])
+        self._shares = areas / areas.sum()
+
+    def sample(self, force: float, q: Array | None = None) -> Touch:
+        """A reachable touch of `force` [N], at joint positions `q` (n,) or at random ones."""
+        given = q
+        while True:
+            q = self._rng.uniform(*_limits(self.robot)) if given is None else given
+            patch = self._patches[self._rng.choice(len(self._patches), p=self._shares)]
+            point, normal = self._point(patch, q)
+            if self._reachable(q, patch, point, normal):
+                push = force * _in_cone(-normal, self._friction, self._rng)
+                return Touch(q, patch, point, normal, push)
+
+    def _point(self, patch: Patch, q: Array) -> tuple[Array, Array]:
+        surface = patch.surface
+        face = self._rng.choice(len(surface.faces), p=surface.areas / surface.areas.sum())
+        u, v = self._rng.random(2)
+        if u + v > 1:
+            u, v = 1 - u, 1 - v
+        a, b, c = surface.vertices[surface.faces[face]]
+        T = self.robot.poses(q)[patch.node] @ patch.T_node_link
+        local = a + u * (b - a) + v * (c - a)
+        return T[:3, :3] @ local + T[:3, 3], T[:3, :3] @ surface.normals[face]
+
+    def _reachable(self, q: Array, patch: Patch, point: Array, normal: Array) -> bool:
+        if point[2] < self._floor or self.skin.links_around(q, point + 1e-6 * normal):
+            return False
+        ahead = [c.distance for c in self.skin.crossings(q, point, normal) if c.distance > 1e-6]
+        return not ahead or min(ahead) > self._clearance
+
+
+def _limits(robot: Robot) -> tuple[Array, Array]:
+    joints = [robot.mechanism.joints[name] for name in robot.joint_names]
+    lower = np.array([max(joint.lower, -np.pi) for joint in joints])
+    return lower, np.array([min(joint.upper, np.pi) for joint in joints])
+
+
+def _in_cone(axis: Array, friction: float, rng: np.random.Generator) -> Array:
+    """A unit vector uniform over the solid angle of a cone around `axis`."""
+    cosine = rng.uniform(1.0 / np.sqrt(1.0 + friction**2), 1.0)
+    turn = rng.uniform(0.0, 2 * np.pi)
+    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    s = np.cross(axis, helper)
+    s /= np.linalg.norm(s)
+    side = np.cos(turn) * s + np.sin(turn) * np.cross(axis, s)
+    return cosine * axis + np.sqrt(1.0 - cosine**2) * side
+
+
+@dataclass(frozen=True)
+class Signals:
+    """What the sensors of an arm at rest report: `time` (N,), `q`, `qd`, `tau`, `wrench`."""
+
+    time: Array
+    q: Array
+    qd: Array
+    tau: Array
+    wrench: Array
+
+
+def resting_signals(
+    robot: Robot,
+    q: Array,
+    touches: list[tuple[Touch, float]],
+    duration: float,
+    rng: np.random.Generator | None,
+    period: float = 1e-3,
+) -> Signals:
+    """What the sensors report while an arm at rest is touched.
+
+    Sensors are taken as plain: sign 1, no bias, polarity outboard, their own axes.
+
+    Args:
+        robot: the robot.
+        q: joint positions (n,) [rad or m].
+        touches: each with the time at which it begins [s]; it lasts to the end.
+        duration: of the recording [s].
+        rng: source of the noise of the description; None: without noise.
+        period: between samples [s].
+    """
+    n, k = len(robot.joint_names), len(robot.sensor_names)
+    time = np.arange(round(duration / period)) * period
+    rest = robot.terms(q, np.zeros(n))[1]
+    loads = np.zeros((len(time), n + 6 * k))
+    for touch, begin in touches:
+        loads[time >= begin] += touch_loads(robot, q, touch.patch.node, touch.position, touch.force)
+    signals = rest - loads  # at rest: 0 = tau - n + tau_ext
+    qd = np.zeros((len(time), n))
+    if rng is not None:
+        noise = robot.description.noise
+        sensors = [x for name in robot.sensor_names for x in noise.sensors[name]]
+        signals = signals + rng.normal(size=signals.shape) * np.array([*noise.tau, *sensors])
+        qd = rng.normal(size=qd.shape) * np.array(noise.qd)
+    tau = np.where(_measured(robot), signals[:, :n], np.nan)
+    return Signals(
+        time, np.tile(q, (len(time), 1)), qd, tau, signals[:, n:].reshape(len(time), k, 6)
+    )
+
+
+def touch_loads(robot: Robot, q: Array, node: int, position: Array, force: Array) -> Array:
+    """What a force (3,) at `position` (3,) on a node does to all joints and sensors (n + 6 k,)."""
+    n = len(robot.joint_names)
+    loads = np.zeros(n + 6 * len(robot.sensor_names))
+    poses = robot.poses(q)
+    while node >= 0:
+        here, T = robot.nodes[node], poses[node]
+        moment = np.cross(position - T[:3, 3], force)
+        if here.coordinate >= 0:
+            load = force if here.kind == "prismatic" else moment
+            loads[here.coordinate] += here.multiplier * (T[:3, 2] @ load)
+        if here.sensor is not None:
+            at = n + 6 * robot.sensor_names.index(here.sensor)
+            loads[at : at + 6] += np.concatenate([force @ T[:3, :3], moment @ T[:3, :3]])
+        node = here.parent
+    return loads
+
+
+def _measured(robot: Robot) -> NDArray[np.bool_]:
+    return np.array([joint.torque in ("sensor", "motor") for joint in robot.description.joints])
