@@ -57,7 +57,7 @@ def pictures(robot: Robot, events: Sequence[Event], poses: EventPoses) -> str:
     words = (
         "The arm as it stood at the event, from two sides. The arrow ends where the arm was "
         "touched and points along the force on it; the line goes on along the force. The disc is "
-        f"{SIGMAS:g} standard deviations of the point, and lies within the ball where they are small. "
+        f"{SIGMAS:g} standard deviations of the point; a small one is inside the ball. "
         "What the arm hides is drawn fainter."
     )
     more = (
