@@ -10,6 +10,7 @@ from touchline.model.surface import link_surface
 from touchline.simulation import random_push
 from touchline.simulation.contacts import Profile
 from touchline.simulation.noise import SensorNoise
+from touchline.simulation.plant import Plant
 from touchline.simulation.random_push import Timing, random_push_runs, random_pushes
 from touchline.simulation.record import simulate_to_log
 from touchline.simulation.scenario import (
@@ -86,7 +87,7 @@ def test_colliding_bodies_touch_the_true_surface_from_outside(sara, collided):
 
 
 def test_the_demo_touches_three_segments_at_once_and_the_base(sara):
-    simulated = demo(sara, 9.0, Run(physics=1000.0))
+    simulated = demo(sara, 6.0, Run(physics=2000.0))
     segments = {link: body.segment for body in sara.bodies for link in body.links}
     touched = [
         {segments[simulated.truth.links[i]] for i in row[row >= 0]} for row in simulated.truth.link
@@ -116,6 +117,25 @@ def test_random_pushes_are_reachable_and_within_the_friction_cone(sara):
         assert surface.reachable(T[:3, :3] @ at + T[:3, 3], normal)
         assert point[2] > 0
         assert force_errors(sara, simulated).max() < TOLERANCE * np.linalg.norm(force) / 20
+
+
+def test_an_arm_on_springs_is_stable_in_every_pose(sara):
+    rng, setup = np.random.default_rng(0), read_setup(sara)
+    plant, stiffest = Plant(sara, 1000.0), np.inf
+    for _ in range(100):
+        q = rng.uniform(setup.lower, setup.upper)
+        plant.reset(q)
+        plant.evaluate()
+        _, damping = plant.hold(q, setup.stiffness, setup.damping)
+        plant.command(plant.gravity_torque())
+        plant.data.qvel[:] = 0.01
+        for _ in range(40):
+            plant.evaluate()
+            plant.accelerate()
+            plant.integrate()
+        assert np.abs(plant.qd).max() < 0.05
+        stiffest = min(stiffest, (damping / setup.damping).min())
+    assert stiffest < 0.95  # it was needed
 
 
 def test_the_fast_way_of_pushing_is_the_same_physics(sara, monkeypatch):

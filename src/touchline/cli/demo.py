@@ -47,7 +47,7 @@ def demo(
     settings = Run(seed, noise=SensorNoise())
     simulate_to_log("demo", robot, log, write_table, settings, {"seconds": duration})
     analysis = analyze(log, "sara", out)
-    print(comparison_text(analysis.events, log))
+    print(comparison_text(analysis.comparisons, analysis.events))
     report = out / "report.html"
     print(f"report: {report}")
     if not headless:

@@ -9,6 +9,7 @@ from touchline.cli.analyze import analyze
 from touchline.cli.bench import bench
 from touchline.cli.check import check
 from touchline.cli.demo import demo
+from touchline.cli.reproduce import reproduce
 from touchline.cli.simulate import simulate
 from touchline.errors import InputError
 from touchline.suggest import did_you_mean
@@ -29,6 +30,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "simulate": simulate,
     "analyze": analyze,
     "check": check,
+    "reproduce": reproduce,
     "bench": bench,
 }
 

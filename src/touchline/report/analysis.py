@@ -16,6 +16,7 @@ from touchline.estimation.observer import METHODS
 from touchline.estimation.samples import Samples
 from touchline.logs import Log, open_log
 from touchline.model.robot import Robot, load_robot
+from touchline.report.comparison import Comparison, compare_log
 from touchline.report.curves import Curves
 from touchline.report.event_pictures import EventPoses
 from touchline.report.facts import bandwidth_warnings, bandwidths
@@ -41,6 +42,7 @@ class Analysis:
         curves: for plots.
         events: all events.
         poses: how the robot stood at the first of them.
+        comparisons: of the events with the truth of a simulated log.
         warnings: what the user should know.
     """
 
@@ -55,6 +57,7 @@ class Analysis:
     curves: Curves
     events: list[Event]
     poses: EventPoses
+    comparisons: list[Comparison]
     warnings: list[str]
 
 
@@ -154,6 +157,7 @@ class _Run:
             curves=self._curves,
             events=events,
             poses=self._poses,
+            comparisons=compare_log(events, log),
             warnings=warnings,
         )
 

@@ -33,6 +33,16 @@ class TrueContact:
         """Largest force [N]."""
         return float(np.linalg.norm(self.force, axis=1).max())
 
+    @property
+    def mean_force(self) -> Array:
+        """Force (3,) [N], mean over the samples near the peak."""
+        norms = np.linalg.norm(self.force, axis=1)
+        return self.force[norms >= 0.9 * norms.max()].mean(axis=0)
+
+    def point_at(self, time: float) -> Array:
+        """Point (3,) [m] at a time [s] of the contact."""
+        return self.point[min(int(np.searchsorted(self.time, time)), len(self.time) - 1)]
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -49,11 +59,16 @@ class Comparison:
 
 
 def read_truth(log: Path) -> list[TrueContact]:
-    """The true contacts of a simulated Parquet log, in the order of their beginning."""
+    """The true contacts of a simulated Parquet log, in the order of their beginning.
+
+    Empty for a log without truth, as those of real robots are.
+    """
     import json
 
     import pyarrow.parquet as pq
 
+    if log.suffix != ".parquet":
+        return []
     schema = pq.read_schema(log)
     columns = [name for name in schema.names if name.startswith("truth.contact.")]
     if not columns:
@@ -84,6 +99,11 @@ def _contacts(data: dict[str, Array], slot: int, links: Sequence[str]) -> list[T
     return found
 
 
+def compare_log(events: Sequence[Event], log: Path) -> list[Comparison]:
+    """The events of a log beside its truth; empty for a log without."""
+    return compare(events, read_truth(log))
+
+
 def compare(events: Sequence[Event], truth: Sequence[TrueContact]) -> list[Comparison]:
     """Finds for each true contact the event nearest to it among those of its time."""
     left = list(events)
@@ -102,44 +122,43 @@ def _mismatch(contact: TrueContact, event: Event) -> float:
     """Distance of forces relative to the truth, the measure by which contacts are told apart."""
     if event.force is None:
         return np.inf
-    return float(np.linalg.norm(event.force - _mean_force(contact))) / contact.strength
-
-
-def _mean_force(contact: TrueContact) -> Array:
-    norms = np.linalg.norm(contact.force, axis=1)
-    return contact.force[norms >= 0.9 * norms.max()].mean(axis=0)
+    return float(np.linalg.norm(event.force - contact.mean_force)) / contact.strength
 
 
 def _comparison(contact: TrueContact, event: Event | None) -> Comparison:
     position_error = force_error = np.nan
     if event is not None and event.position is not None and event.time_of_position is not None:
-        i = min(np.searchsorted(contact.time, event.time_of_position), len(contact.time) - 1)
-        position_error = float(np.linalg.norm(event.position - contact.point[i]))
+        point = contact.point_at(event.time_of_position)
+        position_error = float(np.linalg.norm(event.position - point))
     if event is not None and event.force is not None:
-        force_error = float(np.linalg.norm(event.force - _mean_force(contact)))
+        force_error = float(np.linalg.norm(event.force - contact.mean_force))
     return Comparison(contact, event, position_error, force_error)
 
 
-def comparison_text(events: Sequence[Event], log: Path) -> str:
-    """The table of errors of a simulated log, for a terminal."""
-    rows = compare(events, read_truth(log))
-    head = f"{'begins':>7}  {'touched':<9} {'force':>7}   {'felt on':<9} {'after':>6}"
-    lines = [f"{head}  {'point off':>9}  {'force off':>9}  status"]
-    for row in rows:
-        lines.append(_line(row))
-    found = sum(row.event is not None for row in rows)
-    extra = len(events) - found
-    lines.append(f"{found} of {len(rows)} contacts felt, {extra} events without a contact")
-    return "\n".join(lines)
+def comparison_text(rows: Sequence[Comparison], events: Sequence[Event]) -> str:
+    """The table of errors for a terminal."""
+    lines = ["   ".join(f"{cell:>9}" for cell in HEAD)]
+    lines += ["   ".join(f"{cell:>9}" for cell in cells(row)) for row in rows]
+    return "\n".join([*lines, verdict(rows, events)])
 
 
-def _line(row: Comparison) -> str:
+HEAD = ("begins", "touched", "force", "felt on", "after", "point off", "force off", "status")
+
+
+def cells(row: Comparison) -> list[str]:
+    """One line of the table, units included."""
     truth, event = row.truth, row.event
-    start = f"{truth.time[0]:6.2f}s  {truth.link:<9} {truth.strength:5.1f} N"
+    start = [f"{truth.time[0]:.2f} s", truth.link, f"{truth.strength:.1f} N"]
     if event is None:
-        return f"{start}   not felt"
+        return [*start, "not felt", "", "", "", ""]
     delay = 1e3 * (event.detected - truth.time[0])
     point = "-" if np.isnan(row.position_error) else f"{1e3 * row.position_error:.2f} mm"
     force = "-" if np.isnan(row.force_error) else f"{row.force_error:.2f} N"
-    where = event.link or event.segment
-    return f"{start}   {where:<9} {delay:3.0f} ms  {point:>9}  {force:>9}  {event.status}"
+    status = event.status.replace("_", " ")
+    return [*start, event.link or event.segment, f"{delay:.0f} ms", point, force, status]
+
+
+def verdict(rows: Sequence[Comparison], events: Sequence[Event]) -> str:
+    """How many true contacts were found, and how many events belong to none."""
+    found = sum(row.event is not None for row in rows)
+    return f"{found} of {len(rows)} contacts felt, {len(events) - found} events without a contact"

@@ -3,18 +3,21 @@
 
 from collections.abc import Sequence
 from html import escape
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from touchline.contact.event import Event
 from touchline.model.robot import Robot
+from touchline.report.comparison import Comparison
 from touchline.report.figure import svg_picture
 from touchline.report.html import note, section
 from touchline.report.picture import SIGMAS, Scene
+from touchline.report.render.skin import robot_skin
 from touchline.report.views import views_of_contact
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
 
 MOST_PICTURED = 12  # events; each brings some 130 kB to the page
 SIZE = (520, 520)
@@ -44,21 +47,42 @@ class EventPoses:
         return self._poses.get(event.id)
 
 
-def pictures(robot: Robot, events: Sequence[Event], poses: EventPoses) -> str:
+def pictures(
+    robot: Robot,
+    events: Sequence[Event],
+    poses: EventPoses,
+    comparisons: Sequence[Comparison] = (),
+) -> str:
     """The section of the report with the pictures of the first events; empty without any."""
+    if not robot_skin(robot):
+        return ""
     shown = [(event, poses.get(event)) for event in events]
-    figures = [event_pictures(robot, event, q) for event, q in shown if q is not None]
+    figures = [
+        event_pictures(robot, event, q, _truth_of(event, comparisons))
+        for event, q in shown
+        if q is not None
+    ]
     if not figures:
         return ""
     words = (
         "The arm as it stood at the event, from two sides. The arrow ends where the arm was "
         "touched and points along the force on it; the line goes on along the force. The disc is "
-        f"{SIGMAS:g} standard deviations of the point. What the arm hides is drawn fainter."
+        f"{SIGMAS:g} standard deviations of the point; where they are small the ball hides it. "
+        "What the arm hides is drawn fainter."
     )
+    if comparisons:
+        words += " Blue is the truth of the simulation."
     more = (
         f" The first {len(figures)} of {len(events)} events." if len(figures) < len(events) else ""
     )
     return section("Where it was touched", note(words + more), *figures, anchor="pictures")
+
+
+def _truth_of(event: Event, comparisons: Sequence[Comparison]) -> list[tuple[Array, Array]]:
+    """Point and force of the true contact that an event found, at the event's time."""
+    found = [row for row in comparisons if row.event is event]
+    time = event.time_of_position or event.detected
+    return [(row.truth.point_at(time), row.truth.mean_force) for row in found]
 
 
 def event_pictures(
@@ -87,8 +111,7 @@ def event_scene(
     """What the pictures of an event show; arguments as of `event_pictures`."""
     scene = Scene(robot, q)
     for point, force in truth or ():
-        size = float(np.linalg.norm(force))
-        scene.add_contact(point, force, "truth", label=f"true {size:.1f} N")
+        scene.add_contact(point, force, "truth")
     position = _position(robot, event, q)
     if position is not None and event.link is not None:
         scene.highlight(event.link)
@@ -103,7 +126,7 @@ def _position(robot: Robot, event: Event, q: Array) -> Array | None:
     """The event's point (3,) in world, on the link as it stands at `q`."""
     if event.position_link is None or event.link is None:
         return event.position
-    T = robot.T_world_links(q)[event.link]
+    T = robot.T_world_links(np.asarray(q, np.float64))[event.link]
     return T[:3, :3] @ event.position_link + T[:3, 3]
 
 

@@ -4,6 +4,7 @@
 import base64
 from dataclasses import dataclass
 from html import escape
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from touchline.report.picture import COLOURS, Scene
 from touchline.report.render.camera import Camera, Size
 from touchline.report.render.png import png_bytes
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
 
 APART = 13.0  # pixels between an arrow's tail and its label
 LINE = 19.0  # pixels between lines of text

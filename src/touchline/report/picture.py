@@ -3,6 +3,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,28 +11,23 @@ from numpy.typing import NDArray
 from touchline.model.robot import Robot
 from touchline.report.render import solids
 from touchline.report.render.camera import Camera, Size
+from touchline.report.render.canvas import Canvas
 from touchline.report.render.light import FloorContact, Lights, ShadowMap, doubled, shaded
 from touchline.report.render.png import png_bytes
-from touchline.report.render.raster import rasterize, weights
+from touchline.report.render.raster import box
 from touchline.report.render.skin import Piece, Triangles, posed_skin
 
 __all__ = ["Camera", "Mark", "Scene", "png_bytes"]
 
-Array = NDArray[np.float64]
-Single = NDArray[np.float32]
+Array = NDArray[np.floating[Any]]
 
-FINE = 2  # samples per pixel, along each side
-NEAREST = 0.02  # m; triangles that come nearer to the camera are not drawn
 SIGMAS = 2.0  # of the drawn ellipsoid
-HIDDEN = 0.30  # opacity of what the arm hides, relative to what it does not
 FORCE_SCALE, SHORTEST, LONGEST = 0.010, 0.09, 0.42  # m/N, m, m, for an arm of 1.5 m
 
 # Okabe and Ito's vermilion and blue: told apart with any colour vision.
 COLOURS = {"truth": "#0072b2", "estimate": "#d55e00", "candidate": "#e69f00"}
 SHELL, TRIM, TINT = "#f1f2f4", "#5d646d", "#ffd39e"
 SKY, FLOOR = "#f8f9fb", "#e4e8ed"
-
-ENCODED = (np.linspace(0, 1, 1 << 14) ** (1 / 2.2) * 255 + 0.5).astype(np.uint8)
 
 
 def linear(colour: str) -> Array:
@@ -92,10 +88,15 @@ class Scene:
         """Length [m] of the diagonal of the box around the robot."""
         if not len(self._surface.corners):
             return 1.0
-        return float(np.linalg.norm(np.ptp(self._surface.corners, axis=(0, 1))))
+        low, high = self._box
+        return float(np.linalg.norm(high - low))
 
     @cached_property
-    def balls(self) -> tuple[Single, Single]:
+    def _box(self) -> tuple[Array, Array]:
+        return box(self._surface.corners)
+
+    @cached_property
+    def balls(self) -> tuple[Array, Array]:
         """Middles (T, 3) and radii (T,) [m] of balls around the triangles."""
         corners = self._surface.corners.astype(np.float32)
         middle = corners.mean(axis=1)
@@ -158,8 +159,8 @@ class Scene:
     def render(self, camera: Camera, size: Size = (640, 640)) -> NDArray[np.uint8]:
         """The picture, (H, W, 3) in sRGB, of `size` (width, height) [pixels]."""
         lights = Lights.of(camera)
-        floor = float(self._surface.corners[..., 2].min())
-        canvas = _Canvas(camera, size)
+        floor = float(self._box[0][2])
+        canvas = Canvas(camera, size)
         shadow = ShadowMap(self._surface.corners, lights.key)
         ground = self._ground(camera, size, shadow, lights.key, floor)
         body = canvas.see(self._surface, self._closed())
@@ -188,7 +189,7 @@ class Scene:
 
     def _ground(
         self, camera: Camera, size: Size, shadow: ShadowMap, key: Array, floor: float
-    ) -> Single:
+    ) -> Array:
         """The background (H, W, 3): a calm gradient with the robot's shadow on the floor."""
         width, height = size
         fade = np.linspace(0, 1, height)[:, None] ** 1.2
@@ -201,7 +202,9 @@ class Scene:
         dark = np.zeros(len(rays), np.float32)
         dark[below] = 1 - (1 - 0.34 * shadow.shade_on_floor(points)) * (1 - 0.45 * foot.at(points))
         dark = doubled(dark.reshape(coarse[::-1]))[:height, :width, None]
-        return ground[:, None].astype(np.float32) * (1 - dark * np.float32([1.0, 0.97, 0.92]))
+        return ground[:, None].astype(np.float32) * (
+            1 - dark * np.array([1.0, 0.97, 0.92], np.float32)
+        )
 
     def _overlays(self) -> list[tuple[Triangles, str, float]]:
         """What is drawn over the robot: (triangles, colour, opacity), in order."""
@@ -226,85 +229,3 @@ class Scene:
                 arrow = solids.arrow(*self.arrow(mark), radius * unit)
                 layers.append((arrow, COLOURS[mark.kind], opacity))
         return layers
-
-
-@dataclass(frozen=True)
-class _Seen:
-    """The samples (N,) of a canvas that show triangles, and what they show."""
-
-    sample: NDArray[np.int64]
-    part: NDArray[np.int64]
-    depth: Single
-    normal: Array
-    position: Array
-
-
-class _Canvas:
-    """An image being drawn, with FINE x FINE samples per pixel."""
-
-    def __init__(self, camera: Camera, size: Size) -> None:
-        self._camera, self._size = camera, size
-        self._fine = (size[0] * FINE, size[1] * FINE)
-        self._depth: Single | None = None
-        self._light: Single = np.zeros((size[0] * size[1], 3), np.float32)
-
-    @property
-    def image(self) -> NDArray[np.uint8]:
-        """(H, W, 3) in sRGB."""
-        steps = (self._light.clip(0, 1) * np.float32(len(ENCODED) - 1) + 0.5).astype(np.uint16)
-        return ENCODED[steps].reshape(self._size[1], self._size[0], 3)
-
-    def see(self, triangles: Triangles, closed: NDArray[np.bool_] | None = None) -> _Seen:
-        """Which samples show the triangles, nearest first; backs of closed ones are left out."""
-        pixels, depth = self._camera.project(triangles.corners, self._fine)
-        near = np.minimum(np.minimum(depth[:, 0], depth[:, 1]), depth[:, 2])
-        shown = near > NEAREST
-        if closed is not None:
-            shown &= ~closed | (_turn(pixels) < 0)
-        pixels, nearness = pixels[shown], 1 / depth[shown]
-        hit = rasterize(pixels, nearness, self._fine)
-        y, x = np.divmod(hit.pixel, self._fine[0])
-        share = weights(pixels, nearness, hit.triangle, x + 0.5, y + 0.5)
-        number, depth = np.flatnonzero(shown)[hit.triangle], 1 / hit.nearness
-        normal = np.einsum("ni,nij->nj", share, triangles.normals[number])
-        ray = self._camera.rays_at(x, y, self._fine)
-        away = np.einsum("ij,ij->i", normal, ray) > 0
-        if closed is None or not closed.all():
-            normal[away] *= -1
-        normal /= np.sqrt(np.einsum("ij,ij->i", normal, normal))[:, None]
-        position = self._camera.eye + ray * depth[:, None]
-        return _Seen(hit.pixel, triangles.part[number], depth, normal, position)
-
-    def put(self, ground: Single, seen: _Seen, colour: Single) -> None:
-        """Begin with a background (H, W, 3) and what stands before it."""
-        self._light = ground.reshape(-1, 3).copy()
-        self._blend(seen, colour, np.ones(len(colour), np.float32))
-
-    def hides(self, seen: _Seen) -> None:
-        """What lies behind these samples is drawn fainter from now on."""
-        self._depth = np.full(self._fine[0] * self._fine[1], np.inf, np.float32)
-        self._depth[seen.sample] = seen.depth
-
-    def put_over(self, seen: _Seen, colour: Single, opacity: float) -> None:
-        """Draw over it: fainter where it is hidden."""
-        share = np.full(len(colour), opacity, np.float32)
-        if self._depth is not None:
-            share[self._depth[seen.sample] < seen.depth - 1e-4] *= HIDDEN
-        self._blend(seen, colour, share)
-
-    def _blend(self, seen: _Seen, colour: Single, share: Single) -> None:
-        y, x = np.divmod(seen.sample, self._fine[0])
-        pixel = (y // FINE) * self._size[0] + x // FINE
-        if not len(pixel):
-            return
-        low, high = int(pixel.min()), int(pixel.max()) + 1
-        pixel = pixel - low
-        cover = np.bincount(pixel, share, high - low) / FINE**2
-        for i in range(3):
-            added = np.bincount(pixel, share * colour[:, i].clip(0, 1), high - low) / FINE**2
-            self._light[low:high, i] = self._light[low:high, i] * (1 - cover) + added
-
-
-def _turn(corners: Array) -> Array:
-    (x1, y1), (x2, y2) = ((corners[:, i] - corners[:, 0]).T for i in (1, 2))
-    return x1 * y2 - x2 * y1

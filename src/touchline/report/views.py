@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """From where a contact is seen well."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from touchline.report.picture import Mark, Scene
 from touchline.report.render.camera import Camera
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
 
 AZIMUTHS = np.deg2rad(np.arange(0, 360, 30))
 ELEVATIONS = np.deg2rad([10.0, 30.0])

@@ -21,6 +21,7 @@ from touchline.simulation.mujoco_model import Addition, build_model
 
 Array = NDArray[np.float64]
 HOLDING_FREQUENCY = 25.0  # rad/s of a joint on springs of its own
+FASTEST_DECAY = 1.5  # of a damper, per step; Runge-Kutta's limit is 2.8
 
 
 @dataclass(frozen=True)
@@ -144,13 +145,17 @@ class Plant:
             damping: (n,) [Nm s/rad]; None: critical for the same inertia.
 
         Returns:
-            Stiffness and damping (n,).
+            Stiffness and damping (n,) as set: both less where the physics' step is too long for
+            the dampers at the present inertia.
         """
+        inertia = np.array([self.inertia_times(e) for e in np.eye(len(q))])
         if stiffness is None or damping is None:
-            unit = np.eye(len(q))
-            inertia = np.array([self.inertia_times(e)[j] for j, e in enumerate(unit)])
-            stiffness = inertia * HOLDING_FREQUENCY**2
-            damping = 2 * inertia * HOLDING_FREQUENCY
+            stiffness = np.diag(inertia) * HOLDING_FREQUENCY**2
+            damping = 2 * np.diag(inertia) * HOLDING_FREQUENCY
+        # The fastest decay must be slow against the step, or the integration is unstable.
+        fastest = np.linalg.eigvals(np.linalg.solve(inertia, np.diag(damping))).real.max()
+        softer = min(1.0, FASTEST_DECAY * self.rate / fastest)
+        stiffness, damping = softer * stiffness, softer * damping
         m = self.model
         m.jnt_stiffness[m.dof_jntid[self._dofs]], m.dof_damping[self._dofs] = stiffness, damping
         m.qpos_spring[self._dofs] = q

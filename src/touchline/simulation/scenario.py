@@ -20,7 +20,7 @@ from touchline.simulation.random_push import random_pushes
 from touchline.simulation.scene import Run, Tracking, impedance, simulate, wandering
 from touchline.simulation.setup import read_setup
 from touchline.simulation.shapes import CollisionShapes
-from touchline.simulation.touchable import structure_links
+from touchline.simulation.touchable import structure, structure_links, touchable_links
 from touchline.simulation.truth import Simulated
 
 Array = NDArray[np.float64]
@@ -81,17 +81,13 @@ def three_touches(
     end 0.1 s before the log does.
 
     Args:
-        robot: with one six-axis sensor or more.
+        robot: with surfaces.
         speed: of the fastest joint [rad/s]; 0: the arm stands.
         force: of each touch [N].
         seconds: duration.
         settings: rates, noise, seed.
     """
-    segments: dict[str, list[str]] = {}
-    for body in robot.bodies:
-        if body.segment != "root":
-            segments.setdefault(body.segment, []).extend(body.links)
-    groups = list(segments.values())
+    groups = list(touchable_links(robot).values())
     return _touched(robot, groups, speed, force, seconds, settings, "three_touches")
 
 
@@ -175,7 +171,7 @@ def demo(robot: Robot, seconds: float = 20.0, settings: Run | None = None) -> Si
     """The arm moves slowly, is touched near its base, then at three places at once, and again.
 
     Args:
-        robot: with one six-axis sensor or more.
+        robot: with surfaces.
         seconds: duration.
         settings: rates, noise, seed.
     """
@@ -184,7 +180,7 @@ def demo(robot: Robot, seconds: float = 20.0, settings: Run | None = None) -> Si
     trajectory = wandering(setup, 0.35, np.random.default_rng(settings.seed))
     finder = PlaceFinder(robot, trajectory, np.random.default_rng([settings.seed, 3]))
     links = structure_links(robot)
-    ends = [body.links for body in robot.bodies if body.segment not in ("root", _structure(robot))]
+    ends = [group for name, group in touchable_links(robot).items() if name != structure(robot)]
     acts = [(links[:1], 0.5), (links[3:6], 3.0), *((e, 3.0) for e in ends), (links[1:3], 6.0)]
     contacts = []
     for begin in np.arange(0.5, seconds - 2.0, 8.0):
@@ -234,16 +230,11 @@ def _contact(place: Place, force: float, begin: float, end: float) -> ScriptedCo
     return ScriptedContact(place.link, place.at.point, force * place.direction, profile)
 
 
-def _structure(robot: Robot) -> str:
-    return robot.body_of(structure_links(robot)[0]).segment
-
-
 def _pushers(
     robot: Robot, finder: PlaceFinder, shapes: CollisionShapes, force: float, hold_time: float
 ) -> list[Pusher]:
     """One ball for each segment, setting out one after the other."""
-    segments = {body.segment: body.links for body in robot.bodies if body.segment != "root"}
-    groups = segments | {_structure(robot): structure_links(robot)[2:]}
+    groups = touchable_links(robot) | {structure(robot): structure_links(robot)[2:]}
     pushers = []
     for i, (segment, links) in enumerate(groups.items()):
         place = _true_place(robot, finder, shapes, links)

@@ -4,7 +4,7 @@
 MuJoCo collides the convex hull of a mesh, and its rays meet the triangles themselves.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from importlib import import_module
 from typing import Any
 
@@ -21,16 +21,14 @@ MIN_TRIANGLES = 4
 ROBOT, OTHER = 1, 2  # who collides: robot with others, never among themselves
 
 
-def surfaces_for_rays(mechanism: Mechanism) -> Addition:
-    """Adds the links' true surfaces, which rays meet and nothing collides with."""
+def surfaces_for_rays(surfaces: Mapping[str, Surface]) -> Addition:
+    """Adds the true surfaces of links, which rays meet and nothing collides with."""
 
     def add(spec: Any, bodies: dict[str, Any]) -> None:
-        for name, link in mechanism.links.items():
-            surface = link_surface(link)
-            if surface is not None:
-                mesh = f"surface:{name}"
-                _add_mesh(spec, mesh, surface.vertices, surface.faces)
-                _add_geom(spec, bodies[name], "mesh", f"link:{name}", meshname=mesh, contype=0)
+        for name, surface in surfaces.items():
+            mesh = f"surface:{name}"
+            _add_mesh(spec, mesh, surface.vertices, surface.faces)
+            _add_geom(spec, bodies[name], "mesh", f"link:{name}", meshname=mesh, contype=0)
 
     return add
 

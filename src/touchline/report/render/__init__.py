@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A small software renderer in NumPy: no OpenGL, no window, the same pixels on every machine."""
+"""A small software renderer in NumPy: no OpenGL, no window, no display needed."""

@@ -3,11 +3,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
 Vector = Sequence[float] | Array
 Size = tuple[int, int]
 
@@ -109,10 +110,9 @@ class Camera:
     def rays_at(self, column: NDArray, row: NDArray, size: Size) -> Array:
         """Directions (N, 3) in world through the middles of pixels, of unit depth."""
         scale = 1 / (self.focal * size[1])
-        seen = np.ones((len(column), 3))
-        seen[:, 0] = (column + (0.5 - size[0] / 2)) * scale
-        seen[:, 1] = (row + (0.5 - size[1] / 2)) * scale
-        return seen @ self.axes
+        x, y = (column + (0.5 - size[0] / 2)) * scale, (row + (0.5 - size[1] / 2)) * scale
+        right, down, forward = self.axes
+        return np.stack([right[i] * x + down[i] * y + forward[i] for i in range(3)], axis=1)
 
 
 def _axes(forward: Array, up: Vector) -> Array:

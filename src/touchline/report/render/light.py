@@ -2,15 +2,15 @@
 """How surfaces and floor are lit: a key light that casts shadows, a fill and a head light."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from touchline.report.render.camera import Camera
-from touchline.report.render.raster import rasterize
+from touchline.report.render.raster import box, rasterize
 
-Array = NDArray[np.float64]
-Single = NDArray[np.float32]
+Array = NDArray[np.floating[Any]]
 
 MAP = 512  # pixels across the shadow map
 TAPS = [(x, y) for x in (-3, -1, 1, 3) for y in (-3, -1, 1, 3)]  # pixels of it
@@ -49,7 +49,7 @@ class ShadowMap:
         x /= np.linalg.norm(x)
         self._axes = np.array([x, np.cross(light, x), light])
         seen = corners @ self._axes.T
-        low, high = seen.min(axis=(0, 1)), seen.max(axis=(0, 1))
+        low, high = box(seen)
         room = 0.08 * (high - low)[:2].max()
         self._low = np.append(low[:2] - room, low[2] - 1.0)  # heights begin at 1
         self._scale = MAP / ((high - low)[:2].max() + 2 * room)
@@ -57,9 +57,9 @@ class ShadowMap:
         hit = rasterize(pixels, seen[..., 2] - self._low[2], (MAP, MAP))
         self._height = np.zeros(MAP * MAP, np.float32)
         self._height[hit.pixel] = hit.nearness
-        self._blurred: Single | None = None
+        self._blurred: Array | None = None
 
-    def lit(self, points: Array, normals: Array) -> Single:
+    def lit(self, points: Array, normals: Array) -> Array:
         """Part (N,) of the key light that reaches points of the surface, soft at the borders."""
         step = 1.5 / self._scale
         faces = np.flatnonzero(normals @ self._axes[2] > 0)
@@ -82,7 +82,7 @@ class ShadowMap:
         return bilinear(self._blurred, place * (self._scale / 2))
 
 
-def bilinear(image: Array | Single, place: Array) -> Array:
+def bilinear(image: Array, place: Array) -> Array:
     """Values (N,) of an image (H, W) at points (N, 2), x first; the border's beyond it."""
     height, width = image.shape
     x, y = (place - 0.5).T
@@ -93,7 +93,7 @@ def bilinear(image: Array | Single, place: Array) -> Array:
     return top * (1 - v) + (image[i + 1, j] * (1 - u) + image[i + 1, j + 1] * u) * v
 
 
-def doubled(image: Single) -> Single:
+def doubled(image: Array) -> Array:
     """An image (H, W) at twice the size, interpolated linearly."""
     for _ in range(2):
         before, after = np.vstack([image[:1], image[:-1]]), np.vstack([image[1:], image[-1:]])
@@ -102,7 +102,7 @@ def doubled(image: Single) -> Single:
     return image
 
 
-def blur(image: Single, radius: int) -> Single:
+def blur(image: Array, radius: int) -> Array:
     """An image (H, W) after three passes of a box of `radius`, which is nearly a Gaussian."""
     width = 2 * radius + 1
     for _ in range(3):
@@ -121,7 +121,9 @@ class FloorContact:
     REACH = 0.12  # m; what is higher above the floor darkens it little
 
     def __init__(self, corners: Array, floor: float) -> None:
-        low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+        lowest = np.minimum(np.minimum(*corners[:, :2, 2].T), corners[:, 2, 2])
+        corners = corners[lowest < floor + 4 * self.REACH]
+        low, high = box(corners)
         room = 0.25 * (high - low)[:2].max() + 0.1
         self._low, self._scale = low[:2] - room, 192 / ((high - low)[:2].max() + 2 * room)
         above = corners[..., 2] - floor
@@ -136,7 +138,7 @@ class FloorContact:
         return bilinear(self._dark, (points[:, :2] - self._low) * self._scale)
 
 
-def shaded(lights: Lights, normals: Array, albedo: Array, lit: Array | float = 1.0) -> Single:
+def shaded(lights: Lights, normals: Array, albedo: Array, lit: Array | float = 1.0) -> Array:
     """Linear colours (N, 3) of points.
 
     Args:

@@ -2,11 +2,12 @@
 """Which triangle each pixel shows: a z-buffer filled row by row, without a loop over triangles."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
 Index = NDArray[np.int64]
 
 SHIFT = np.uint64(32)
@@ -47,13 +48,22 @@ def rasterize(corners: Array, nearness: Array, size: tuple[int, int]) -> Raster:
     return Raster(pixel, triangle, (best >> SHIFT).astype(np.uint32).view(np.float32))
 
 
+def box(points: Array) -> tuple[Array, Array]:
+    """Return the least and the largest coordinates (d,) of points (..., d).
+
+    Column by column, which is several times faster than along the first axis.
+    """
+    columns = [points[..., i] for i in range(points.shape[-1])]
+    return np.array([c.min() for c in columns]), np.array([c.max() for c in columns])
+
+
 def _window(corners: Array, size: tuple[int, int]) -> tuple[Index, tuple[int, int]]:
     """Return the first pixel (2,) and the size of the part of an image that triangles touch."""
-    points = corners.reshape(-1, 2)
-    if not len(points):
+    if not len(corners):
         return np.zeros(2, np.int64), (0, 0)
-    low = np.floor(points.min(axis=0).clip(0, size)).astype(np.int64)
-    high = np.ceil(points.max(axis=0).clip(0, size)).astype(np.int64)
+    least, largest = box(corners)
+    low = np.floor(least.clip(0, size)).astype(np.int64)
+    high = np.ceil(largest.clip(0, size)).astype(np.int64)
     return low, (int(high[0] - low[0]), int(high[1] - low[1]))
 
 

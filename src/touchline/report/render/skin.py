@@ -3,6 +3,7 @@
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from touchline.model.mechanism import Geometry, Link
 from touchline.model.robot import Robot
 from touchline.model.surface import Surface, link_surface
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
 Index = NDArray[np.int64]
 
 CREASE = np.cos(np.deg2rad(35.0))  # edges sharper than this stay sharp
@@ -81,7 +82,7 @@ def robot_skin(robot: Robot) -> tuple[Piece, ...]:
 
 def posed_skin(robot: Robot, q: Array) -> list[tuple[Piece, Triangles]]:
     """The drawn shapes with their triangles in world at joint positions `q` (n,) [rad]."""
-    poses = robot.T_world_links(q)
+    poses = robot.T_world_links(np.asarray(q, np.float64))
     return [(piece, piece.triangles.moved(poses[piece.link])) for piece in robot_skin(robot)]
 
 

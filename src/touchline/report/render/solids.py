@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Simple solids to mark things with: arrows, balls, ellipsoids, rods."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from touchline.report.render.skin import Triangles
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
 
 SIDES = 32
 

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`index.html`: one file that explains each experiment and shows its figures and numbers."""
+
+import base64
+from collections.abc import Sequence
+from html import escape
+
+from touchline import __version__
+from touchline.reproduce.experiment import Check, Experiment, Row, Table
+from touchline.reproduce.figure import rendered
+
+PAGE = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy"
+  content="default-src 'none'; style-src 'unsafe-inline'; img-src data:">
+<title>{title}</title>
+<style>{style}</style>
+</head>
+<body>
+<main>
+<h1>The paper's experiments, again</h1>
+<p class="soft">M. Iskandar, O. Eiberger, A. Albu-Sch&auml;ffer, A. De Luca, A. Dietrich:
+Collision detection, identification, and localization on the DLR SARA robot with sensing
+redundancy, ICRA 2021. Simulated here on an arm of the same class and layout, whose geometry and
+numbers are not DLR's; forces and lengths are therefore not to be compared with the paper's figure
+by figure. Written by <code>touchline reproduce</code>, version {version}.</p>
+{body}
+</main>
+</body>
+</html>
+"""
+STYLE = """
+body{margin:0;background:#fff;color:#22262b;font:16px/1.55 Georgia,'Times New Roman',serif}
+main{max-width:60rem;margin:0 auto;padding:2rem 1.2rem 4rem}
+h1{font-size:1.8rem;margin:.4rem 0}h2{font-size:1.3rem;margin:2.6rem 0 .4rem;padding-top:1.2rem;
+border-top:1px solid #dfe3e7}h3{font-size:1rem;margin:1.4rem 0 .2rem}
+.soft,figcaption{color:#5d656e;font-size:.92rem}
+figure{margin:1.4rem 0}figure img{width:100%;height:auto;max-width:var(--width)}
+dt{font-weight:bold;margin-top:.7rem}dd{margin:0}
+.scroll{overflow:auto;max-height:26rem;margin:.5rem 0}
+table{border-collapse:collapse;font:.85rem/1.4 ui-monospace,monospace}
+th,td{padding:.2rem .7rem;text-align:right;border-bottom:1px solid #e8ebee;white-space:nowrap}
+th{position:sticky;top:0;background:#fff}
+th:first-child,td:first-child{text-align:left}
+.holds{color:#2c7a52}.fails{color:#b3341f;font-weight:bold}
+"""
+DOTS = 96  # per inch, at which a figure is shown at most 1.35 times its size in print
+
+
+def page_text(experiments: Sequence[Experiment]) -> str:
+    """The whole page."""
+    body = "\n".join(_section(experiment) for experiment in experiments)
+    title = ", ".join(experiment.name for experiment in experiments)
+    return PAGE.format(
+        title=escape(f"{title} - Touchline"), style=STYLE, body=body, version=__version__
+    )
+
+
+def _section(experiment: Experiment) -> str:
+    words = (
+        ("What is shown", experiment.shown),
+        ("What the paper says", experiment.paper),
+        ("What we see", experiment.seen),
+    )
+    text = "".join(f"<dt>{head}</dt><dd>{escape(body)}</dd>" for head, body in words)
+    figures = "".join(
+        _figure(drawing.figure, f"{name}. {drawing.caption}")
+        for name, drawing in experiment.drawings.items()
+    )
+    tables = "".join(_table(name, table) for name, table in experiment.tables.items())
+    return (
+        f'<section id="{experiment.name}"><h2>{escape(experiment.title)}</h2>'
+        f"<dl>{text}</dl>{figures}{_checks(experiment.checks)}{tables}</section>"
+    )
+
+
+def _figure(figure: object, caption: str) -> str:
+    data = base64.b64encode(rendered(figure, "svg")).decode("ascii")
+    width = round(1.35 * DOTS * figure.get_figwidth())  # pyright: ignore
+    return (
+        f'<figure><img style="--width:{width}px" alt="{escape(caption)}" '
+        f'src="data:image/svg+xml;base64,{data}"><figcaption>{escape(caption)}</figcaption></figure>'
+    )
+
+
+def _checks(checks: Sequence[Check]) -> str:
+    if not checks:
+        return ""
+    rows = "".join(
+        f"<tr><td>{escape(c.name)}</td><td>{c.value:.3g}</td><td>{c.limit:g}</td>"
+        f'<td class="{_word(c)}">{_word(c)}</td></tr>'
+        for c in checks
+    )
+    head = "<tr><th>must stay below its limit</th><th>value</th><th>limit</th><th></th></tr>"
+    return f'<div class="scroll"><table>{head}{rows}</table></div>'
+
+
+def _word(check: Check) -> str:
+    return "holds" if check.holds else "fails"
+
+
+def _table(name: str, table: Table) -> str:
+    if not table.rows:
+        return ""
+    keys = table.shown or list(table.rows[0])
+    head = "".join(f"<th>{escape(key.replace('_', ' '))}</th>" for key in keys)
+    rows = "".join(f"<tr>{_cells(row, keys)}</tr>" for row in table.rows)
+    return (
+        f'<h3>{escape(name)}.csv</h3><div class="soft">{escape(table.caption)}</div>'
+        f'<div class="scroll"><table><thead><tr>{head}</tr></thead>'
+        f"<tbody>{rows}</tbody></table></div>"
+    )
+
+
+def _cells(row: Row, keys: Sequence[str]) -> str:
+    return "".join(f"<td>{escape(_text(row[key]))}</td>" for key in keys)
+
+
+def _text(value: str | float | int | None) -> str:
+    if value is None or value != value:
+        return ""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
