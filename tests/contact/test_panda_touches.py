@@ -49,7 +49,7 @@ def judged():
     files = sorted(DATA.glob("*.csv.gz"))
     if not files:
         pytest.skip(f"no recordings in {DATA}")
-    pytest.importorskip("example_robot_data")
+    pytest.importorskip("pinocchio", reason="comes with example-robot-data, the arm's model")
     robot = tl.load_robot(ROOT / "examples" / "robots" / "panda_hand.yaml")
     return [(LINKS[f.name[0]], shares(event)) for f in files for event in touches_of(f, robot)]
 

@@ -91,7 +91,10 @@ def _trial(
     columns = pipeline.contacts.columns()
     rows = np.flatnonzero(columns["segment"] == touch.patch.segment)
     if not events or not len(rows):
-        return Trial(touch.patch.body, force, "missed", False, *[np.nan] * 2, False, *[np.nan] * 2)
+        nothing = float("nan")
+        return Trial(
+            touch.patch.body, force, "missed", False, nothing, nothing, False, nothing, nothing
+        )
     event, last = events[0], rows[-1]
     position = event.position if event.position is not None else np.full(3, np.nan)
     row = np.array([columns[axis][last] for axis in "xyz"])

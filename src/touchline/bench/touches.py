@@ -140,7 +140,7 @@ def resting_signals(
         period: between samples [s].
     """
     n, k = len(robot.joint_names), len(robot.sensor_names)
-    time = np.arange(round(duration / period)) * period
+    time = np.arange(round(duration / period), dtype=np.float64) * np.float64(period)
     rest = robot.terms(q, np.zeros(n))[1]
     loads = np.zeros((len(time), n + 6 * k))
     for touch, begin in touches:
