@@ -22,7 +22,7 @@ from touchline.simulation.truth import Simulated
 
 Array = NDArray[np.float64]
 
-PUSHES = 16  # on each link
+PUSHES = 12  # on each link
 STRENGTH = 20.0  # of all pushes [N]
 NEAR, RIGHT = 0.02, 1.0  # what counts as success [m, N]
 SECONDS = 0.7  # of a case
@@ -258,7 +258,8 @@ def _words(cases: list[Case], table: list[Row]) -> tuple[str, str, str]:
         f"median force error {median(table, 'classical'):.2f} N against "
         f"{median(table, 'ours'):.2f} N, for the observer lets velocity noise through, K M qd. "
         "What it gets wrong it gets wrong because the first entry of its line, the paper's rule, "
-        "is on another link or far from the point; ours weighs all entries. Of the pictured contacts ours gets {sum(v.right for v in ours)} of "
+        "is on another link or far from the point; ours weighs all entries. Of the pictured "
+        f"contacts ours gets {sum(v.right for v in ours)} of "
         f"{len(ours)} right, eq. (5) {sum(v.right for v in eq5)}."
     )
     return shows, says, sees
