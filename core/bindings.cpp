@@ -273,7 +273,16 @@ void bind_detector(nb::module_& m) {
   m.def("detect_run", &detect_run);
 }
 
-NB_MODULE(_core, m) {
+// The module is built twice from this source: for any processor, and as `_core_avx2` for those
+// with AVX2. The numbers are the same.
+#ifndef TOUCHLINE_MODULE
+#define TOUCHLINE_MODULE _core
+#endif
+
+NB_MODULE(TOUCHLINE_MODULE, m) {
+#if defined(__AVX2__)
+  if (!__builtin_cpu_supports("avx2")) throw nb::import_error("this processor has no AVX2");
+#endif
   arrays::initialize();
   bind_enums(m);
   bind_rows(m);

@@ -176,7 +176,7 @@ inline nb::tuple follow(tl::Localizer& l, const In& time, const In& rows, const 
       for (std::size_t g = 0; g < m; ++g) {
         const bool touched = levels.data()[i * m + g] > 0.0;
         const int segment = static_cast<int>(g);
-        if (l.enter(segment, touched)) {
+        if (l.enter(segment, touched, time.data()[i])) {
           ended.insert(ended.end(), {static_cast<double>(i), static_cast<double>(g)});
           push_event(l, segment, ended);
         }
@@ -188,7 +188,8 @@ inline nb::tuple follow(tl::Localizer& l, const In& time, const In& rows, const 
         answers[at] = static_cast<double>(i);
         answers[at + 1] = static_cast<double>(g);
         const double* tests = normalized.data() + i * r;
-        write(l, l.locate(segment, rows.data() + i * width, tests), answers.data() + at + 2);
+        write(l, l.locate_next(segment, rows.data() + i * width, tests, time.data()[i]),
+              answers.data() + at + 2);
         l.remember(segment, tests, time.data()[i], q.data() + i * n);
       }
     }
@@ -199,13 +200,15 @@ inline nb::tuple follow(tl::Localizer& l, const In& time, const In& rows, const 
 }
 
 inline tl::NoiseFigures noise(std::vector<double> qd, std::vector<double> tau,
-                              std::vector<double> wrench, double period, double relative) {
+                              std::vector<double> wrench, double period, double wrench_error,
+                              double torque_error) {
   tl::NoiseFigures figures;
   figures.qd = std::move(qd);
   figures.tau = std::move(tau);
   figures.wrench = std::move(wrench);
   figures.period = period;
-  figures.relative = relative;
+  figures.wrench_error = wrench_error;
+  figures.torque_error = torque_error;
   return figures;
 }
 
@@ -222,7 +225,8 @@ inline void bind(nb::module_& m) {
       });
   m.def("mesh", &mesh, "vertices"_a, "faces"_a);
   nb::class_<tl::NoiseFigures>(m, "NoiseFigures");
-  m.def("noise_figures", &noise, "qd"_a, "tau"_a, "wrench"_a, "period"_a, "relative"_a);
+  m.def("noise_figures", &noise, "qd"_a, "tau"_a, "wrench"_a, "period"_a,
+        "wrench_error"_a, "torque_error"_a);
   nb::class_<tl::LocalizerSettings>(m, "LocalizerSettings")
       .def(nb::init<>())
       .def_rw("friction", &tl::LocalizerSettings::friction)

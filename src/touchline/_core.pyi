@@ -1,10 +1,10 @@
-# SPDX-License-Identifier: Apache-2.0
-# Generated: python -m nanobind.stubgen -m touchline._core -o src/touchline/_core.pyi
 import enum
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy
 import numpy.typing
+from numpy.typing import NDArray
 
 class NodeKind(enum.Enum):
     fixed = 0
@@ -151,6 +151,175 @@ class SensorRow:
     def set_axes(self, arg: Sequence[bool], /) -> None: ...
     def set_bias(self, arg: Sequence[float], /) -> None: ...
     def set_range(self, arg: Sequence[float], /) -> None: ...
+
+class DetectionRow:
+    def __init__(
+        self,
+        segment: int,
+        component: int,
+        joint: int,
+        contact: float,
+        collision: float,
+        baseline_limit: float,
+    ) -> None: ...
+
+class DetectionTimes:
+    def __init__(
+        self, min_duration: float, hold: float, baseline: float, release: float
+    ) -> None: ...
+
+class Detector:
+    def __init__(
+        self,
+        observer: Observer,
+        rows: Sequence[DetectionRow],
+        sum_limit: Sequence[float],
+        times: DetectionTimes,
+    ) -> None: ...
+    def baseline(self, row: int) -> float: ...
+
+def detect(
+    arg0: Observer,
+    arg1: Detector,
+    arg2: float,
+    arg3: object,
+    arg4: object,
+    arg5: object,
+    arg6: object,
+    /,
+) -> tuple: ...
+def detect_run(
+    arg0: Observer,
+    arg1: Detector,
+    arg2: object,
+    arg3: object,
+    arg4: object,
+    arg5: object,
+    arg6: object,
+    /,
+) -> tuple: ...
+
+class Mesh:
+    def crossings(
+        self,
+        origin: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)],
+        direction: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)],
+    ) -> NDArray[numpy.float64]: ...
+    def nearest_to_line(
+        self,
+        origin: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)],
+        direction: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)],
+    ) -> NDArray[numpy.float64]: ...
+    def nearest_to_point(
+        self,
+        arg: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)],
+        /,
+    ) -> NDArray[numpy.float64]: ...
+
+def mesh(
+    vertices: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)],
+    faces: Annotated[
+        NDArray[numpy.int64], dict(shape=(None, None), order="C", device="cpu", writable=False)
+    ],
+) -> Mesh: ...
+
+class NoiseFigures:
+    pass
+
+def noise_figures(
+    qd: Sequence[float],
+    tau: Sequence[float],
+    wrench: Sequence[float],
+    period: float,
+    wrench_error: float,
+    torque_error: float,
+) -> NoiseFigures: ...
+
+class LocalizerSettings:
+    def __init__(self) -> None: ...
+    @property
+    def friction(self) -> float: ...
+    @friction.setter
+    def friction(self, arg: float, /) -> None: ...
+    @property
+    def cone_softness(self) -> float: ...
+    @cone_softness.setter
+    def cone_softness(self, arg: float, /) -> None: ...
+    @property
+    def force_scale(self) -> float: ...
+    @force_scale.setter
+    def force_scale(self, arg: float, /) -> None: ...
+    @property
+    def place_scale(self) -> float: ...
+    @place_scale.setter
+    def place_scale(self, arg: float, /) -> None: ...
+    @property
+    def pitch_limit(self) -> float: ...
+    @pitch_limit.setter
+    def pitch_limit(self, arg: float, /) -> None: ...
+    @property
+    def least_force(self) -> float: ...
+    @least_force.setter
+    def least_force(self, arg: float, /) -> None: ...
+    @property
+    def certain(self) -> float: ...
+    @certain.setter
+    def certain(self, arg: float, /) -> None: ...
+    @property
+    def place_radius(self) -> float: ...
+    @place_radius.setter
+    def place_radius(self, arg: float, /) -> None: ...
+    @property
+    def finger(self) -> float: ...
+    @finger.setter
+    def finger(self, arg: float, /) -> None: ...
+    @property
+    def first_entry(self) -> bool: ...
+    @first_entry.setter
+    def first_entry(self, arg: bool, /) -> None: ...
+
+class LinkSurface:
+    def __init__(self, arg0: int, arg1: Mesh, /) -> None: ...
+    @property
+    def node(self) -> int: ...
+
+class Localizer:
+    def __init__(
+        self,
+        observer: Observer,
+        tests: Sequence[DetectionRow],
+        noise: NoiseFigures,
+        surfaces: Sequence[LinkSurface],
+        settings: LocalizerSettings,
+    ) -> None: ...
+    def wrench_covariance(
+        self,
+        arg0: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)],
+        arg1: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)],
+        arg2: int,
+        /,
+    ) -> NDArray[numpy.float64]: ...
+    def locate(
+        self,
+        segment: int,
+        row: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)],
+        normalized: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)]
+        | None,
+        q: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)],
+        qd: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)] | None,
+    ) -> NDArray[numpy.float64]: ...
+    def event(self, segment: int) -> NDArray[numpy.float64]: ...
+    def follow(
+        self,
+        time: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)],
+        rows: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)],
+        normalized: Annotated[
+            NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)
+        ],
+        levels: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)],
+        q: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)],
+        qd: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)],
+    ) -> tuple: ...
 
 class Observer:
     def __init__(

@@ -72,3 +72,17 @@ def test_real_arms_agree_with_pinocchio(name):
 @pytest.mark.parametrize("name", ["sara", "sara-full"])
 def test_shipped_arms_agree_with_pinocchio(name):
     check_against_pinocchio(touchline.load_robot(name))
+
+
+@pytest.mark.parametrize("turns", [1, 1000, 15000, 20000, 100000])  # with both kinds of reduction
+def test_whole_turns_change_nothing(turns):
+    robot = random_robot(2, chain=True)
+    rng = np.random.default_rng(3)
+    q = np.where([node.kind == "revolute" for node in robot.nodes if node.joint], 1.0, 0.0)
+    for _ in range(50):
+        small, qd = rng.uniform(-np.pi, np.pi, 7), rng.normal(size=7)
+        near = robot.terms(small, qd)
+        for sign in (1, -1):
+            far = robot.terms(small + sign * 2 * np.pi * turns * q, qd)
+            np.testing.assert_allclose(far[0], near[0], atol=1e-12 * turns + 1e-11)
+            np.testing.assert_allclose(far[1], near[1], atol=1e-12 * turns + 1e-11)

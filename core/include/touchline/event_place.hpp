@@ -41,14 +41,17 @@ class EventPlace {
     return true;
   }
 
-  // A sample that no point explains.
-  void add_status(int status) {
+  // Explanations of a sample that no single force explains count only as long as there is no other.
+  bool open(int status, bool explained) {
     ++statuses_[status];
-    if (status > 2) ++unexplained_;
-  }
-
-  void open() {
+    if (!explained) ++unexplained_;
+    if (!explained && explained_ > 0) return false;
+    if (explained && explained_ == 0) {
+      count_ = 0;
+      missed_ = 0.0;
+    }
     for (int i = 0; i < count_; ++i) places_[i].last = 0.0;
+    return true;
   }
 
   void add(int surface, const Vec3& point, double probability, double variance, double radius) {
@@ -84,10 +87,13 @@ class EventPlace {
   // the others by probability. `body(surface)` tells what is one body.
   template <class Body>
   void conclude(Body&& body) {
+    // What errs in one sample, the model, errs in the next: they are not that many looks.
+    const double looks = missed_ < 0.0 ? std::min(1.0, kLooks * std::log(kFloor) / missed_) : 1.0;
     double sum = 0.0, most = -1e300;
     for (int i = 0; i < count_; ++i) most = std::max(most, places_[i].evidence);
-    for (int i = 0; i < count_; ++i) sum += std::exp(places_[i].evidence - most);
-    for (int i = 0; i < count_; ++i) places_[i].share = std::exp(places_[i].evidence - most) / sum;
+    for (int i = 0; i < count_; ++i) sum += std::exp(looks * (places_[i].evidence - most));
+    for (int i = 0; i < count_; ++i)
+      places_[i].share = std::exp(looks * (places_[i].evidence - most)) / sum;
     std::sort(places_, places_ + count_,
               [](const Place& a, const Place& b) { return a.share > b.share; });
     int first = 0;
@@ -119,6 +125,7 @@ class EventPlace {
  private:
   static constexpr double kStrong = 0.5;      // of the peak
   static constexpr double kFloor = 1e-3;      // no sample rules a place out
+  static constexpr double kLooks = 3.0;       // that an event is worth at most
   static constexpr double kSmoothness = 1e-8;  // m2; no mesh is smoother
 
   Place* fresh(int surface) {

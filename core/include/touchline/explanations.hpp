@@ -41,6 +41,17 @@ struct View {
   Spatial wrench;      // the pure force that explains best
   bool met = false;    // does its line meet the body, and steeply enough?
   bool steep = false;
+  // How far the body has moved since the time that the filtered wrench speaks of: at the world
+  // origin, and turned.
+  Vec3 shift, turn;
+  double width = 0.0;  // log of how much that adds to the spread of the measurements
+
+  Vec3 earlier(const Vec3& point) const { return point - shift - cross(turn, point); }
+  // A line of points of that time, as it is carried along.
+  ForceLine later(const ForceLine& line) const {
+    const Vec3 direction = line.direction + cross(turn, line.direction);
+    return {line.origin + shift + cross(turn, line.origin), (1.0 / norm(direction)) * direction};
+  }
 };
 
 class Explanations {
@@ -64,8 +75,9 @@ class Explanations {
   Explanations(const Explanations&) = delete;
   Explanations& operator=(const Explanations&) = delete;
 
-  // Finds all that may explain segment g; `measurement` has read it.
-  void find(int g, Measurement& measurement) {
+  // Finds all that may explain segment g; `measurement` has read it. `lag`: the age of what its
+  // wrench speaks of [s].
+  void find(int g, double lag, Measurement& measurement) {
     count_ = used_ = 0;
     best_ = std::numeric_limits<double>::infinity();
     for (const Body& body : bodies_[g]) {
@@ -74,6 +86,9 @@ class Explanations {
       view.node = body.node;
       view.surfaces = &body.surfaces;
       view.q = measurement.quadratic(body.node);
+      view.shift = lag * posture_.twist(body.node).linear;
+      view.turn = lag * posture_.twist(body.node).angular;
+      if (measurement.has_wrench()) allow_for_motion(view, measurement.wrench());
       find_line(view);
     }
     std::sort(views_.begin(), views_.begin() + used_,
@@ -124,9 +139,12 @@ class Explanations {
   }
 
  private:
-  static constexpr int kMost = 192, kSamples = 128, kStarts = 3;
+  static constexpr int kMost = 192, kSamples = 64, kStarts = 2;
   static constexpr double kRelevant = 25.0;  // of chi2: where a search is worth while
+  static constexpr double kRough = 400.0;    // of chi2: where a start may lead to something
+  static constexpr double kArrived = 2e-4;   // length of a step [m]
   static constexpr double kFar = 0.15;       // from the line: not what it speaks of [m]
+  static constexpr double kUncertainWay = 0.1;  // of the way since then
   static constexpr double kGrazing = 4.0;  // cost of the cone beyond which a point is moved
   static constexpr double kSame = 5e-3;    // points nearer than this are one [m]
 
@@ -187,6 +205,14 @@ class Explanations {
     }
   }
 
+  // The way that the point of contact has come since is known but for a part of it.
+  void allow_for_motion(View& view, const double* w) const {
+    const double force = std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+    const double way = norm(view.shift + cross(view.turn, posture_.pose(view.node).p));
+    const double moment = kUncertainWay * way * force;
+    if (moment > 1e-6) view.width = loosen(view.q, moment);
+  }
+
   // The most likely wrench among those of one pure force: f . m = 0.
   void find_line(View& view) {
     double L[36], w[6];
@@ -224,7 +250,7 @@ class Explanations {
 
   // All entries of the line into the body.
   void enter(View& view) {
-    const ForceLine line = line_of(view.wrench);
+    const ForceLine line = view.later(line_of(view.wrench));
     const int before = count_;
     for (int s : *view.surfaces) {
       entries_of(s, line, [&](int surface, const Vec3& point, const Vec3& normal, double) {
@@ -233,7 +259,7 @@ class Explanations {
         k.point = point;
         k.normal = normal;
         k.fit.force = view.wrench.linear;
-        fitter_.judge(view.q, point, normal, k.fit);
+        fitter_.judge(view.q, view.earlier(point), normal, k.fit);
         view.steep = view.steep || k.fit.cone < kGrazing;
         view.met = true;
         if (!known(before, 1e-7)) keep();  // an edge is met twice
@@ -281,22 +307,24 @@ class Explanations {
 
   // The surface nearest to the line, and from there the best explanation nearby.
   void miss(View& view) {
-    const ForceLine line = line_of(view.wrench);
+    const ForceLine line = view.later(line_of(view.wrench));
     for (int s : *view.surfaces) {
       const SurfacePoint p = surfaces_[s].mesh.nearest_to_line(to_node(line, view.node), kFar);
       if (p.face < 0 || count_ == kMost) continue;
+      // At an edge the normal is that of either side: what counts is the wrench alone.
+      if (fitter_.free_chi2(view.q, view.earlier(to_world(p.point, view.node))) > best_ + kRelevant) continue;
       place(view, s, p.point, p.normal);
-      if (candidates_[count_].fit.chi2 > best_ + kRelevant) continue;
       refine(view, candidates_[count_]);
       keep();
     }
   }
 
-  void place(const View& view, int surface, const Vec3& point, const Vec3& normal) {
+  void place(const View& view, int surface, const Vec3& point, const Vec3& normal,
+             double limit = std::numeric_limits<double>::infinity()) {
     Candidate& k = fresh(view, surface);
     k.point = to_world(point, view.node);
     k.normal = posture_.pose(view.node).R * normal;
-    k.fit = fitter_.fit(view.q, k.point, k.normal);
+    k.fit = fitter_.fit(view.q, view.earlier(k.point), k.normal, limit);
   }
 
   // Without a line: the best of the points spread over each link, each improved.
@@ -306,8 +334,9 @@ class Explanations {
       int found = 0;
       for (const Sample& sample : samples_[s]) {
         if (count_ == kMost) return;
-        place(view, s, sample.point, sample.normal);
-        found = insert(starts, found, candidates_[count_]);
+        place(view, s, sample.point, sample.normal, best_ + kRough);
+        if (candidates_[count_].fit.cost() < best_ + kRough)
+          found = insert(starts, found, candidates_[count_]);
       }
       for (int i = 0; i < found && count_ < kMost; ++i) {
         candidates_[count_] = starts[i];
@@ -337,23 +366,26 @@ class Explanations {
     return found;
   }
 
-  // Moves over the surface downhill: Gauss-Newton steps, then smaller and smaller trials around.
+  // Moves over the surface downhill: Gauss-Newton steps, then, where the friction cone or an edge
+  // stands in the way, smaller and smaller trials around.
   void refine(const View& view, Candidate& k) {
-    for (int i = 0; i < 6; ++i) {
+    bool arrived = false;
+    for (int i = 0; i < 8 && !arrived; ++i) {
       double H[25], g[5];
-      fitter_.information(view.q, k.point, k.normal, k.fit.force, H, g);
+      fitter_.information(view.q, view.earlier(k.point), k.normal, k.fit.force, H, g);
       if (!cholesky(H, 5)) break;
       solve_cholesky(H, 5, g);
       Vec3 s, t;
       tangents(k.normal, s, t);
       Vec3 step = g[3] * s + g[4] * t;
       const double length = norm(step);
-      if (length < 1e-5) break;
-      if (length > 0.03) step = (0.03 / length) * step;
-      if (!try_point(view, k, k.point + step)) break;
+      if (length > 0.05) step = (0.05 / length) * step;
+      arrived = length < kArrived;
+      if (!arrived && !try_point(view, k, k.point + step)) break;
     }
-    for (double radius = 0.016; radius > 1e-3; radius *= 0.5) {
-      for (int round = 0; round < 4 && better_around(view, k, radius); ++round) {
+    if (arrived && k.fit.cone < 1.0) return;
+    for (double radius = 0.032; radius > 1e-3; radius *= 0.5) {
+      for (int round = 0; round < 3 && better_around(view, k, radius); ++round) {
       }
     }
   }
@@ -373,10 +405,10 @@ class Explanations {
   bool try_point(const View& view, Candidate& k, const Vec3& target) {
     const Pose& X = posture_.pose(view.node);
     const SurfacePoint p =
-        surfaces_[k.surface].mesh.nearest_to_point(transposed_times(X.R, target - X.p), 0.05);
+        surfaces_[k.surface].mesh.nearest_to_point(transposed_times(X.R, target - X.p), 0.06);
     if (p.face < 0) return false;
     const Vec3 point = to_world(p.point, view.node), normal = X.R * p.normal;
-    const Fit fit = fitter_.fit(view.q, point, normal);
+    const Fit fit = fitter_.fit(view.q, view.earlier(point), normal);
     if (!(fit.cost() < k.fit.cost() - 1e-6)) return false;
     k.point = point;
     k.normal = normal;

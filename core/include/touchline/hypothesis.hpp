@@ -17,9 +17,9 @@ struct LocalizerSettings {
   double cone_softness = 0.1;     // one sigma of the angle beyond the cone [rad]
   double force_scale = 50.0;      // of contact forces, where they cannot be seen [N]
   double place_scale = 0.1;       // of surfaces, where the place cannot be seen [m]
-  double pitch_limit = 4.5;       // sigmas beyond which one force does not explain a segment
+  double pitch_limit = 4.0;       // sigmas beyond which one force does not explain a segment
   double least_force = 0.3;       // below it no place is named [N]
-  double certain = 0.8;           // probability of a place that counts as located
+  double certain = 0.9;           // probability of a place that counts as located
   double place_radius = 0.0225;   // explanations nearer than this are one place [m]
   double finger = 0.03;           // free space that a push comes from [m]
   bool first_entry = false;       // the paper's rule
@@ -52,23 +52,28 @@ class ForceFitter {
   explicit ForceFitter(const LocalizerSettings& settings)
       : settings_(settings), cone_(std::atan(settings.friction)) {}
 
-  // The force at `point` that explains best, in the friction cone of the outward `normal`.
-  Fit fit(const Quadratic& q, const Vec3& point, const Vec3& normal) const {
+  // The force at `point` that explains best, in the friction cone of the outward `normal`. Beyond
+  // a chi2 of `limit` nothing is worked out.
+  Fit fit(const Quadratic& q, const Vec3& point, const Vec3& normal,
+          double limit = std::numeric_limits<double>::infinity()) const {
     double A[9], g[3];
     reduce(q, point, A, g);
-    double factor[9];
-    std::copy(A, A + 9, factor);
     Fit free;
     free.cone = std::numeric_limits<double>::infinity();
-    if (cholesky(factor, 3)) {
-      double f[3] = {g[0], g[1], g[2]};
-      solve_cholesky(factor, 3, f);
-      free.force = {f[0], f[1], f[2]};
-      judge(q, point, normal, free);
-    }
-    if (free.cone < 1.0) return free;
+    if (solve(A, g, free.force)) judge(q, point, normal, free);
+    if (free.cone < 1.0 || free.chi2 > limit) return free;
     const Fit bound = on_cone(q, point, normal, A, g);
     return bound.cost() < free.cost() ? bound : free;
+  }
+
+  // The misfit of the best force at `point`, in whatever direction.
+  double free_chi2(const Quadratic& q, const Vec3& point) const {
+    double A[9], g[3], w[6];
+    reduce(q, point, A, g);
+    Vec3 force;
+    if (!solve(A, g, force)) return std::numeric_limits<double>::infinity();
+    wrench_of(point, force, w);
+    return q(w);
   }
 
   // Fills chi2, cone and cosine of a force that is given.
@@ -152,6 +157,15 @@ class ForceFitter {
     }
   }
 
+  static bool solve(const double* A, const double* g, Vec3& force) {
+    double factor[9], f[3] = {g[0], g[1], g[2]};
+    std::copy(A, A + 9, factor);
+    if (!cholesky(factor, 3)) return false;
+    solve_cholesky(factor, 3, f);
+    force = {f[0], f[1], f[2]};
+    return true;
+  }
+
   // The best force on the edge of the cone: for each direction the size follows in closed form.
   Fit on_cone(const Quadratic& q, const Vec3& point, const Vec3& normal, const double* A,
               const double* g) const {
@@ -160,8 +174,7 @@ class ForceFitter {
     double best = 0.0, at = 0.0;
     Vec3 force;
     const auto offer = [&](double angle) {
-      const double c = settings_.friction * std::cos(angle), d = settings_.friction * std::sin(angle);
-      const Vec3 u = c * s + d * t - normal;
+      const Vec3 u = settings_.friction * (std::cos(angle) * s + std::sin(angle) * t) - normal;
       const double x[3] = {u.x, u.y, u.z};
       double along = 0.0, curve = 0.0;
       for (int i = 0; i < 3; ++i) {
@@ -173,10 +186,10 @@ class ForceFitter {
       at = angle;
       force = (along / curve) * u;
     };
-    constexpr int kDirections = 12;
+    constexpr int kDirections = 8;
     constexpr double kTurn = 6.283185307179586;
     for (int i = 0; i < kDirections; ++i) offer(kTurn * i / kDirections);
-    for (double step = 0.5 * kTurn / kDirections; step > 0.02; step *= 0.5) {
+    for (double step = 0.5 * kTurn / kDirections; step > 0.05; step *= 0.5) {
       const double middle = at;
       offer(middle - step);
       offer(middle + step);

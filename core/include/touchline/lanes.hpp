@@ -10,7 +10,7 @@ namespace touchline {
 
 #if defined(__GNUC__) || defined(__clang__)
 #if defined(__AVX__)
-constexpr int kLanes = 4;
+constexpr int kLanes = 4;  // one AVX register
 #else
 constexpr int kLanes = 2;  // one SSE2 or NEON register, which every x86-64 and AArch64 has
 #endif

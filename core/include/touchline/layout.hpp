@@ -10,12 +10,7 @@
 
 namespace touchline {
 
-// A node that moves with an observed joint: the line along which wrenches load that joint.
-struct Line {
-  int joint, node;
-};
-
-// A pair for projections: the load of a sensor, on a line.
+// A pair for projections: the load of a sensor, on a line: a node that moves with a joint.
 struct Projection {
   int line, sensor;
 };
@@ -37,7 +32,7 @@ class Layout {
       inboard_sensors.push_back(next_inboard(joint));
       outboard_sensors.push_back(next_outboard(joint));
       source_sensors.push_back(on_same_path(joint));
-      for (int node : joint.nodes) lines.push_back({static_cast<int>(inboard_sensors.size()) - 1, node});
+      for (int node : joint.nodes) lines.push_back(node);
     }
   }
 
@@ -50,7 +45,7 @@ class Layout {
   std::vector<Segment> segments;  // one per six-axis sensor in their order, then the root's
   std::vector<int> segment_of_sensor;                // -1: has fewer than six axes
   std::vector<std::vector<int>> segments_outboard;   // per sensor: all of them
-  std::vector<Line> lines;                           // joint by joint
+  std::vector<int> lines;                            // nodes that move, joint by joint
   // Per joint: the nearest six-axis sensor inboard, if any (and if no other joint mimics this
   // one); the next ones outboard; those that the joint is read from.
   std::vector<std::vector<Projection>> inboard_sensors, outboard_sensors, source_sensors;

@@ -75,7 +75,28 @@ class Localizer {
   }
 
   // The contact on segment g, from the observer's row and the detector's normalized rows (or null).
+  // A wrench that has been steady for a while is as old as its filter, 1 / K.
   const Answer& locate(int g, const double* row, const double* normalized) {
+    return locate(g, row, normalized, steady_lag(g));
+  }
+
+  // The same within an event. What a filtered wrench w speaks of is older by
+  //   int K exp(-K a) a w(t - a) da / int K exp(-K a) w(t - a) da,
+  // so that a second filter in series tells its age, also while the force grows.
+  const Answer& locate_next(int g, const double* row, const double* normalized, double time) {
+    Following& f = following_[g];
+    const double* w = row + observer_.row_layout().segment_wrench() + 6 * g;
+    const Vec3 force{w[0], w[1], w[2]};
+    const double size2 = dot(force, force);
+    if (!(size2 > 0.0)) return locate(g, row, normalized, 0.0);
+    const double keep = std::exp(-bandwidth(g) * std::max(0.0, time - f.time));
+    f.twice = keep * f.twice + (1.0 - keep) * force;
+    f.time = time;
+    const double age = std::clamp(dot(f.twice, force) / size2, 0.0, 2.0);
+    return locate(g, row, normalized, age * steady_lag(g));
+  }
+
+  const Answer& locate(int g, const double* row, const double* normalized, double lag) {
     answer_.status = Status::none;
     answer_.count = 0;
     answer_.force = {kNaN, kNaN, kNaN};
@@ -89,7 +110,7 @@ class Localizer {
     } else if (measurement_.has_wrench() && weak()) {
       answer_.status = Status::wrench_only;
     } else {
-      found_.find(g, measurement_);
+      found_.find(g, lag, measurement_);
       weigh();
       conclude(g);
     }
@@ -97,9 +118,13 @@ class Localizer {
   }
 
   // Notes whether segment g is touched; true when its event has just ended.
-  bool enter(int g, bool touched) {
+  bool enter(int g, bool touched, double time) {
     Following& f = following_[g];
-    if (touched && !f.touched) f.event.restart();
+    if (touched && !f.touched) {
+      f.event.restart();
+      f.twice = {};
+      f.time = time;
+    }
     const bool ended = f.touched && !touched;
     f.touched = touched;
     return ended;
@@ -111,15 +136,15 @@ class Localizer {
     const double strength = measurement_.strength(g, normalized);
     if (!f.event.begin_sample(strength, time, 0.5 * period_ * bandwidth(g))) return;
     std::copy(q, q + f.q.size(), f.q.begin());
-    f.event.add_status(static_cast<int>(answer_.status));
-    if (answer_.status != Status::located && answer_.status != Status::ambiguous) return;
-    f.event.open();
+    const bool explained =
+        answer_.status == Status::located || answer_.status == Status::ambiguous;
+    if (!f.event.open(static_cast<int>(answer_.status), explained)) return;
     for (int i = 0; i < answer_.count; ++i) {
       const Candidate& k = answer_.candidates[i];
       f.event.add(k.surface, found_.to_node(k.point, node_of(k)), k.weight,
                   k.along[0] + k.along[2], settings_.place_radius);
     }
-    f.event.close(answer_.spread * answer_.spread);
+    f.event.close(explained ? answer_.spread * answer_.spread : kNaN);
   }
 
   // The event on segment g with its places weighed, those of the most probable body first.
@@ -151,8 +176,14 @@ class Localizer {
   struct Following {
     EventPlace event;
     bool touched = false;
-    std::vector<double> q;
+    std::vector<double> q;  // at the time of the event's position
+    Vec3 twice;             // the force, filtered twice
+    double time = 0.0;      // of the last sample
   };
+
+  double steady_lag(int g) const {
+    return observer_.layout().segments[g].sensor >= 0 ? 1.0 / bandwidth(g) : 0.0;
+  }
 
   double bandwidth(int g) const {
     const int sensor = observer_.layout().segments[g].sensor;
@@ -179,10 +210,11 @@ class Localizer {
       k.weight = -std::numeric_limits<double>::infinity();
       if (!(k.fit.cost() < found_.best() + Explanations::kWindow)) continue;
       double H[25], g[5];
-      found_.fitter().information(found_.view(k).q, k.point, k.normal, k.fit.force, H, g);
+      const View& view = found_.view(k);
+      found_.fitter().information(view.q, view.earlier(k.point), k.normal, k.fit.force, H, g);
       if (!cholesky(H, 5)) continue;
       k.weight = -0.5 * (k.fit.cost() + log_determinant(H, 5)) +
-                 std::log(std::max(k.fit.cosine, 0.02));
+                 std::log(std::max(k.fit.cosine, 0.02)) - view.width;
       most = std::max(most, k.weight);
       covariance_along(H, k.along);
     }
@@ -225,7 +257,7 @@ class Localizer {
       });
     }
     if (inside) return std::max(-6.0, nearest / 3e-3);
-    return std::log(std::clamp(-nearest / settings_.finger, 0.05, 1.0));
+    return 2.0 * std::log(std::clamp(-nearest / settings_.finger, 0.1, 1.0));
   }
 
   void conclude(int g) {

@@ -20,7 +20,8 @@ namespace touchline {
 struct NoiseFigures {
   std::vector<double> qd, tau, wrench;  // n, n, 6 k
   double period = 1e-3;                 // between samples [s]
-  double relative = 0.0;                // error of the model and the gains, as a part of the load
+  // Errors of gains and model, as a part of the load.
+  double wrench_error = 0.0, torque_error = 0.0;
   double force = 2e-3, moment = 5e-4;   // floors [N, Nm]
 };
 
@@ -39,6 +40,29 @@ struct Quadratic {
     return chi2;
   }
 };
+
+// Adds an unknown moment of `sigma` [Nm] about each axis to what is measured of a wrench; returns
+// the logarithm of how much wider the measurements' distribution gets, the half of it.
+inline double loosen(Quadratic& q, double sigma) {
+  double M[9], x[3][7];  // solutions for the information and the vector, by row
+  const double inverse = 1.0 / (sigma * sigma);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j)
+      M[3 * i + j] = q.information[6 * (3 + i) + 3 + j] + (i == j ? inverse : 0.0);
+    for (int j = 0; j < 6; ++j) x[i][j] = q.information[6 * (3 + i) + j];
+    x[i][6] = q.vector[3 + i];
+  }
+  if (!cholesky(M, 3)) return 0.0;
+  for (int j = 0; j < 7; ++j) solve_lower(M, 3, &x[0][j], 7);
+  for (int k = 0; k < 3; ++k) {
+    for (int i = 0; i < 6; ++i) {
+      for (int j = 0; j < 6; ++j) q.information[6 * i + j] -= x[k][i] * x[k][j];
+      q.vector[i] -= x[k][i] * x[k][6];
+    }
+    q.constant -= x[k][6] * x[k][6];
+  }
+  return 0.5 * (log_determinant(M, 3) - 3.0 * std::log(inverse));
+}
 
 class Measurement {
  public:
@@ -297,8 +321,8 @@ class Measurement {
     const Spatial w = wrench_to_child(posture_.pose(observer_.sensors()[sensor].node),
                                       {{wrench_[0], wrench_[1], wrench_[2]},
                                        {wrench_[3], wrench_[4], wrench_[5]}});
-    return {{noise_.relative * norm3(w.linear), 0.0, 0.0},
-            {noise_.relative * norm3(w.angular), 0.0, 0.0}};
+    return {{noise_.wrench_error * norm3(w.linear), 0.0, 0.0},
+            {noise_.wrench_error * norm3(w.angular), 0.0, 0.0}};
   }
   static double norm3(const Vec3& v) { return std::sqrt(dot(v, v)); }
 
@@ -332,7 +356,7 @@ class Measurement {
     const int n = layout_.joints, k = layout_.sensors;
     if (r.joint < 0) {
       const Gains g = gains(observer_.sensors()[r.sensor].bandwidth);
-      const double load = noise_.relative * own_[i];
+      const double load = noise_.wrench_error * own_[i];
       const double filtered = g.reading * noise_.wrench[6 * r.sensor + r.axis];
       out[6 * r.sensor + r.axis] = std::sqrt(filtered * filtered + load * load);
       const Spatial axis = axis_in_world(r.sensor, r.axis);
@@ -343,7 +367,7 @@ class Measurement {
     }
     const JointRow& joint = observer_.joints()[r.joint];
     const Gains g = gains(joint.bandwidth);
-    const double load = noise_.relative * own_[i], filtered = g.reading * noise_.tau[r.joint];
+    const double load = noise_.torque_error * own_[i], filtered = g.reading * noise_.tau[r.joint];
     out[6 * k + r.joint] = std::sqrt(filtered * filtered + load * load);
     for (int node : joint.nodes) {
       const Spatial& s = posture_.subspace(node);
@@ -356,7 +380,7 @@ class Measurement {
 
   void subtract_sensor(const Projection& pair, const Gains& g, double* out) {
     const int n = layout_.joints, k = layout_.sensors;
-    const Spatial& s = posture_.subspace(observer_.layout().lines[pair.line].node);
+    const Spatial& s = posture_.subspace(observer_.layout().lines[pair.line]);
     const int node = observer_.sensors()[pair.sensor].node;
     for (int a = 0; a < 6; ++a)
       out[6 * pair.sensor + a] -=

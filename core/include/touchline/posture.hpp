@@ -22,6 +22,7 @@ class Posture {
         unit_(joints, 0.0),
         poses_(tree.nodes().size()),
         subspaces_(tree.nodes().size()),
+        twists_(tree.nodes().size()),
         momenta_(tree.nodes().size() * joints) {}
 
   // `qd` may be null: at rest.
@@ -45,6 +46,8 @@ class Posture {
   const Pose& pose(int node) const { return poses_[node]; }
   // The twist of a unit velocity of the joint that moves this node.
   const Spatial& subspace(int node) const { return subspaces_[node]; }
+  // Velocity of the body at the world origin, and its angular velocity.
+  const Spatial& twist(int node) const { return twists_[node]; }
   // The momentum of a node and all outboard of it, by a unit velocity of a joint.
   const Spatial& momentum(int node, std::size_t joint) const {
     return momenta_[node * unit_.size() + joint];
@@ -55,6 +58,7 @@ class Posture {
     const NodeState<double>& s = state_.node(static_cast<int>(i));
     const Node& node = tree_.nodes()[i];
     poses_[i] = {s.R, s.p};
+    twists_[i] = {s.velocity + cross(s.p, s.angular), s.angular};
     const Vec3 axis = node.multiplier * s.R.z;
     if (node.kind == NodeKind::revolute) subspaces_[i] = {cross(s.p, axis), axis};
     if (node.kind == NodeKind::prismatic) subspaces_[i] = {axis, {}};
@@ -63,9 +67,9 @@ class Posture {
   const Tree& tree_;
   TreeState<double> state_;
   std::vector<double> unit_;
-  std::vector<Pose> poses_;          // per node
-  std::vector<Spatial> subspaces_;   // per node
-  std::vector<Spatial> momenta_;     // per node and joint
+  std::vector<Pose> poses_;                  // per node
+  std::vector<Spatial> subspaces_, twists_;  // per node
+  std::vector<Spatial> momenta_;             // per node and joint
 };
 
 }  // namespace touchline

@@ -52,6 +52,7 @@ class Projections {
   // out = S^T e for all lines at once.
   static void multiply(const double* __restrict S, std::size_t lines, const double* __restrict e,
                        double* __restrict out) {
+    lines &= ~std::size_t{3};  // it is a multiple of four: tells the compiler
     const double x = e[0], y = e[1], z = e[2], a = e[3], b = e[4], c = e[5];
     for (std::size_t i = 0; i < lines; ++i) {
       out[i] = (S[i] * x + S[i + lines] * y + S[i + 2 * lines] * z) +

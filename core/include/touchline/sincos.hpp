@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sine and cosine of many angles at once, without branches, so that compilers vectorize the loop:
-// about six times faster than the C library's, equally exact (absolute error below 2e-16).
+// about three times faster than the C library's, and as exact: absolute error below 2.3e-16.
 #pragma once
 
 #include <cmath>
@@ -38,21 +38,14 @@ inline void sincos_reduced(double x, double& sine, double& cosine) {
   const double r = ((x - k * 1.57079632673412561417e+00) - k * 6.07710050630396597660e-11) -
                    k * 2.02226624879595063154e-21;
   const double z = r * r;
-  const double s =
-      r + r * z *
-              (-1.66666666666666324348e-01 +
-               z * (8.33333333332248946124e-03 +
-                    z * (-1.98412698298579493134e-04 +
-                         z * (2.75573137070700676789e-06 +
-                              z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)))));
-  const double c =
-      1.0 - 0.5 * z +
-      z * z *
-          (4.16666666666666019037e-02 +
-           z * (-1.38888888888741095749e-03 +
-                z * (2.48015872894767294178e-05 +
-                     z * (-2.75573143513906633035e-07 +
-                          z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)))));
+  const double s3 = -2.50507602534068634195e-08 + z * 1.58969099521155010221e-10;
+  const double s2 = -1.98412698298579493134e-04 + z * (2.75573137070700676789e-06 + z * s3);
+  const double s1 = -1.66666666666666324348e-01 + z * (8.33333333332248946124e-03 + z * s2);
+  const double s = r + r * z * s1;
+  const double c3 = 2.08757232129817482790e-09 + z * -1.13596475577881948265e-11;
+  const double c2 = 2.48015872894767294178e-05 + z * (-2.75573143513906633035e-07 + z * c3);
+  const double c1 = 4.16666666666666019037e-02 + z * (-1.38888888888741095749e-03 + z * c2);
+  const double c = 1.0 - 0.5 * z + z * z * c1;
   // Odd quadrants swap the two; signs follow the quadrant's second bit.
   const std::uint64_t swap = 0 - (quadrant & 1);
   const std::uint64_t a = to_bits(s), b = to_bits(c);

@@ -16,7 +16,7 @@ namespace touchline {
 
 // Where each term stands in the numbers of one instant.
 struct TermsLayout {
-  std::size_t joints, lines, sensors;
+  std::size_t joints, lines, sensors;  // lines: room for them, a multiple of four
 
   std::size_t joint_momentum() const { return 0; }
   std::size_t joint_bias() const { return joints; }
@@ -45,7 +45,7 @@ class Terms {
         joints_(joints),
         sensors_(sensors),
         local_(std::move(local)),
-        at_{joints.size(), layout.lines.size(), sensors.size()},
+        at_{joints.size(), (layout.lines.size() + 3) / 4 * 4, sensors.size()},
         state_(tree.make_state<T>()) {}
 
   const TermsLayout& at() const { return at_; }

@@ -135,8 +135,12 @@ TreeState<T> Tree::make_state() const {
   return state;
 }
 
+// Calls cost as much as the work in them: all are inlined.
 template <class T>
-[[gnu::flatten]] void Tree::sweep(const T* q, const T* qd, TreeState<T>& state) const {
+#if defined(__GNUC__)
+__attribute__((flatten))
+#endif
+void Tree::sweep(const T* q, const T* qd, TreeState<T>& state) const {
   for (std::size_t m = 0; m < moving_.size(); ++m) {
     const Node& node = nodes_[moving_[m]];
     state.positions[m] = node.multiplier * q[node.coordinate] + node.offset;
@@ -149,11 +153,15 @@ template <class T>
   }
   std::size_t m = 0;
   for (int i : carried_) {
-    switch (nodes_[i].kind) {
-      case NodeKind::fixed: place(i, state); break;
-      case NodeKind::revolute: turn(i, state.sines[m], state.cosines[m], qd[nodes_[i].coordinate], state); ++m; break;
-      case NodeKind::prismatic: place(i, state); slide(i, state.positions[m], qd[nodes_[i].coordinate], state.node(i)); ++m; break;
+    const Node& node = nodes_[i];
+    if (node.kind == NodeKind::revolute) {
+      turn(i, state.sines[m], state.cosines[m], qd[node.coordinate], state);
+    } else {
+      place(i, state);
+      if (node.kind == NodeKind::prismatic)
+        slide(i, state.positions[m], qd[node.coordinate], state.node(i));
     }
+    if (node.kind != NodeKind::fixed) ++m;
   }
   for (int i : carried_) add_body(i, state.node(i));
   for (std::size_t i = nodes_.size(); i-- > 0;) pass_inboard(static_cast<int>(i), state);

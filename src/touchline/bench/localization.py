@@ -62,10 +62,11 @@ class TouchSampler:
         areas = np.array([patch.surface.areas.sum() for patch in self._patches])
         self._shares = areas / areas.sum()
 
-    def sample(self, force: float) -> Touch:
-        """A reachable touch of `force` [N]."""
+    def sample(self, force: float, q: Array | None = None) -> Touch:
+        """A reachable touch of `force` [N], at joint positions `q` (n,) or at random ones."""
+        given = q
         while True:
-            q = self._rng.uniform(*_limits(self.robot))
+            q = self._rng.uniform(*_limits(self.robot)) if given is None else given
             patch = self._patches[self._rng.choice(len(self._patches), p=self._shares)]
             point, normal = self._point(patch, q)
             if self._reachable(q, patch, point, normal):
@@ -152,7 +153,9 @@ def resting_signals(
         signals = signals + rng.normal(size=signals.shape) * np.array([*noise.tau, *sensors])
         qd = rng.normal(size=qd.shape) * np.array(noise.qd)
     tau = np.where(_measured(robot), signals[:, :n], np.nan)
-    return Signals(time, np.tile(q, (len(time), 1)), qd, tau, signals[:, n:].reshape(-1, k, 6))
+    return Signals(
+        time, np.tile(q, (len(time), 1)), qd, tau, signals[:, n:].reshape(len(time), k, 6)
+    )
 
 
 def touch_loads(robot: Robot, q: Array, node: int, position: Array, force: Array) -> Array:

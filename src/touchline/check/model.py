@@ -77,16 +77,28 @@ def _parity(robot: Robot, findings: Findings) -> None:
     if parity.rank == 0:
         lines.append("  the sensors cannot check each other: any fault looks like a contact")
     else:
-        once = [name for name in parity.blind_once if name not in parity.blind]
-        lines.append(f"  a constant error is never seen of: {', '.join(parity.blind) or 'none'}")
+        once = tuple(name for name in parity.blind_once if name not in parity.blind)
+        never = _shortened(robot, parity.blind) or "none"
+        lines.append(f"  a constant error is never seen of: {never}")
         if once:
-            lines.append(f"  only some poses show an error of: {', '.join(once)}")
+            lines.append(f"  only some poses show an error of: {_shortened(robot, once)}")
     for body in _first_bodies(robot):
         lines.append(
             f"  an error of sensor {body[0]} alone can always be a push on {body[1]}; only joints "
             "that feel more than that contradict it"
         )
     findings.note("redundancy", *lines)
+
+
+def _shortened(robot: Robot, signals: tuple[str, ...]) -> str:
+    """The signals' names; a sensor all of whose axes are there by its own name."""
+    left = list(signals)
+    for sensor in robot.description.sensors:
+        own = [f"{sensor.name}.{axis}" for axis in sensor.axes]
+        if set(own) <= set(left):
+            left[left.index(own[0])] = f"{sensor.name} (all axes)"
+            left = [name for name in left if name not in own]
+    return ", ".join(left)
 
 
 def _first_bodies(robot: Robot) -> list[tuple[str, str]]:

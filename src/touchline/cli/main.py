@@ -8,7 +8,9 @@ from touchline import __version__
 from touchline.cli.analyze import analyze
 from touchline.cli.bench import bench
 from touchline.cli.check import check
+from touchline.cli.demo import demo
 from touchline.cli.reproduce import reproduce
+from touchline.cli.simulate import simulate
 from touchline.errors import InputError
 from touchline.suggest import did_you_mean
 
@@ -24,10 +26,12 @@ usage: touchline COMMAND ...
 Exit status: 0 done, 1 failure (check: findings), 2 bad input."""
 
 COMMANDS: dict[str, Callable[..., int]] = {
+    "demo": demo,
+    "simulate": simulate,
     "analyze": analyze,
     "check": check,
-    "bench": bench,
     "reproduce": reproduce,
+    "bench": bench,
 }
 
 EXTRAS = {

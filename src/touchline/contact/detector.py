@@ -7,9 +7,9 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline import _core
 from touchline.contact.thresholds import Thresholds, make_thresholds
 from touchline.estimation.observer import Estimate, Observer
+from touchline.native import core
 
 Array = NDArray[np.float64]
 
@@ -50,11 +50,11 @@ class Detector:
         self.observer = observer
         self.thresholds = thresholds or make_thresholds(observer.robot, period)
         settings = observer.robot.description.detection
-        self._core = _core.Detector(
+        self._core = core.Detector(
             observer.kernel,
-            [_core.DetectionRow(**vars(row)) for row in self.thresholds.rows],
+            [core.DetectionRow(**vars(row)) for row in self.thresholds.rows],
             self.thresholds.sum_limit.tolist(),
-            _core.DetectionTimes(
+            core.DetectionTimes(
                 settings.min_duration, settings.hold, settings.baseline.time, settings.release
             ),
         )
@@ -62,7 +62,7 @@ class Detector:
     def update(self, time, q, qd, tau=None, wrench=None) -> tuple[Estimate, Detection]:
         """One sample, arguments as for `Observer.update`."""
         signals = self.observer.arrays((), q, qd, tau, wrench)
-        row, levels, normalized = _core.detect(
+        row, levels, normalized = core.detect(
             self.observer.kernel, self._core, float(time), *signals
         )
         return self.observer.estimate(row), Detection(levels, normalized)
@@ -71,7 +71,7 @@ class Detector:
         """N samples, arguments as for `Observer.run`."""
         stamps = np.ascontiguousarray(time, dtype=float)
         signals = self.observer.arrays(stamps.shape, q, qd, tau, wrench)
-        rows, levels, normalized = _core.detect_run(
+        rows, levels, normalized = core.detect_run(
             self.observer.kernel, self._core, stamps, *signals
         )
         return self.observer.estimate(rows), Detection(levels, normalized)

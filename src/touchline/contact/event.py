@@ -102,9 +102,17 @@ def _place(event: Event, answer: EventAnswer) -> None:
 
 
 class _Strongest:
-    """Mean of rows over the samples that come near the peak, gathered part by part."""
+    """Mean of rows over the samples that come near the peak, gathered part by part.
 
-    def __init__(self, width: int) -> None:
+    Attributes:
+        peak: the largest strength.
+        force: the largest force [N]; `wrench` (6,) and `q` (n,) are those of its sample.
+        torques: (n,) largest external torque of each joint [Nm], NaN where none is known.
+    """
+
+    def __init__(self, width: int, joints: int) -> None:
+        self.force, self.wrench, self.q = -1.0, np.zeros(6), np.zeros(joints)
+        self.torques = np.full(joints, np.nan)
         self.peak = 0.0
         self._sum = np.zeros(width)
         self._count = 0
@@ -118,6 +126,14 @@ class _Strongest:
         strong = strength >= STRONG * self.peak
         self._sum += rows[strong].sum(axis=0)
         self._count += int(strong.sum())
+
+    def add_loads(self, q: Array, wrenches: Array, torques: Array) -> None:
+        """Takes the positions, the segment's wrenches and the joints' torques of a part."""
+        self.torques = np.fmax(self.torques, np.fmax.reduce(np.abs(torques)))
+        norms = np.linalg.norm(np.nan_to_num(wrenches[:, :3]), axis=1)
+        row = int(norms.argmax())
+        if norms[row] > self.force:
+            self.force, self.wrench, self.q = float(norms[row]), wrenches[row], q[row]
 
     @property
     def mean(self) -> Array:
@@ -140,6 +156,7 @@ class EventRecorder:
         self._robot = detector.observer.robot
         self._rows = detector.thresholds.rows
         self._open: dict[int, tuple[Event, _Strongest]] = {}
+        self._announced: dict[tuple[int, int], Event] = {}  # by segment and sample of a part
 
     def open_events(self) -> dict[int, Event]:
         """Events that last, by number of their segment."""
@@ -166,6 +183,7 @@ class EventRecorder:
             (N, m) the number of the event on each segment, -1 where there is none.
         """
         ids = np.full(detection.levels.shape, -1)
+        self._announce(time, detection.levels)
         for g in range(len(self._robot.segment_names)):
             levels = detection.levels[:, g]
             if g in self._open or levels.any():
@@ -180,6 +198,19 @@ class EventRecorder:
         for g, (event, _) in self._open.items():
             _place(event, self._localizer.event(g))
 
+    def _announce(self, time: Array, levels: Array) -> None:
+        """Numbers the events that begin in these samples in the order in which they do."""
+        active = levels > 0
+        before = np.zeros_like(active[:1])
+        before[:, list(self._open)] = True
+        rises = np.argwhere(active & ~np.vstack([before, active[:-1]]))
+        self._announced = {}
+        for row, g in rises.tolist():
+            name = self._robot.segment_names[g]
+            event = Event(len(self.events), name, "contact", float(time[row]))
+            self.events.append(event)
+            self._announced[g, row] = event
+
     def _add_segment(
         self,
         g: int,
@@ -193,21 +224,17 @@ class EventRecorder:
     ) -> None:
         active = levels > 0
         edges = np.flatnonzero(np.diff(active.astype(int), prepend=int(g in self._open)))
-        bounds = [0, *edges.tolist(), len(time)]
+        bounds = sorted({0, *edges.tolist(), len(time)})  # an edge may be the first sample
         for start, stop in zip(bounds[:-1], bounds[1:], strict=True):
             if start in edges and not active[start]:
                 self._close(g, float(time[start]), places)
             if start == stop or not active[start]:
                 continue
             if g not in self._open:
-                self._begin(g, float(time[start]))
+                event = self._announced[g, start]
+                self._open[g] = (event, _Strongest(len(self._rows) + 3, q.shape[1]))
             ids[start:stop, g] = self._open[g][0].id
             self._extend(g, slice(start, stop), levels, q, estimate, detection)
-
-    def _begin(self, g: int, time: float) -> None:
-        event = Event(len(self.events), self._robot.segment_names[g], "contact", time)
-        self.events.append(event)
-        self._open[g] = (event, _Strongest(len(self._rows) + 3))
 
     def _close(self, g: int, time: float, places: list[Array]) -> None:
         event, _ = self._open.pop(g)
@@ -224,16 +251,19 @@ class EventRecorder:
         strength = np.abs(normalized[:, own]).max(axis=1)
         forces = np.nan_to_num(estimate.segment_wrench[part, g, :3])
         strongest.add(strength, np.hstack([normalized, forces]))
+        strongest.add_loads(q[part], estimate.segment_wrench[part, g], estimate.tau_ext[part])
         if levels[part].max() >= Level.COLLISION:
             event.level = "collision"
         if event.segment != "root":
             event.force = strongest.mean[-3:]
-            norms = np.linalg.norm(forces, axis=1)
-            event.force_peak = max(event.force_peak or 0.0, float(norms.max()))
-        self._name_joint(event, g, strongest.mean, q[part][-1], estimate.segment_wrench[part, g])
-        self._measure_torque(event, estimate.tau_ext[part])
+            event.force_peak = strongest.force
+        self._name_joint(event, g, strongest)
+        if event.joint is not None:
+            torque = strongest.torques[self._robot.joint_names.index(event.joint)]
+            event.torque_peak = float(torque) if np.isfinite(torque) else None
 
-    def _name_joint(self, event: Event, g: int, mean: Array, q: Array, wrenches: Array) -> None:
+    def _name_joint(self, event: Event, g: int, strongest: _Strongest) -> None:
+        mean = strongest.mean
         loaded = [
             (row.joint, abs(mean[i]))
             for i, row in enumerate(self._rows)
@@ -243,22 +273,14 @@ class EventRecorder:
         if beyond:
             event.joint = self._robot.joint_names[max(beyond, key=self._robot.joint_depth)]
         elif event.segment != "root":
-            event.joint = self._inboard_joint(event.segment, q, wrenches)
+            event.joint = self._inboard_joint(event.segment, strongest.q, strongest.wrench)
         elif loaded:
             event.joint = self._robot.joint_names[max(loaded, key=lambda pair: pair[1])[0]]
 
-    def _inboard_joint(self, segment: str, q: Array, wrenches: Array) -> str | None:
+    def _inboard_joint(self, segment: str, q: Array, wrench: Array) -> str | None:
         """The most distal joint inboard of a segment that its wrench loads beyond its threshold."""
         limits = {row.joint: row.contact for row in self._rows if row.joint >= 0}
-        peak = wrenches[np.nanargmax(np.linalg.norm(np.nan_to_num(wrenches[:, :3]), axis=1))]
-        for joint, torque in reversed(self._robot.torques_of_wrench(segment, q, peak)):
+        for joint, torque in reversed(self._robot.torques_of_wrench(segment, q, wrench)):
             if joint in limits and abs(torque) > limits[joint]:
                 return self._robot.joint_names[joint]
         return None
-
-    def _measure_torque(self, event: Event, tau_ext: Array) -> None:
-        if event.joint is None:
-            return
-        torque = np.abs(tau_ext[:, self._robot.joint_names.index(event.joint)])
-        if np.isfinite(torque).any():
-            event.torque_peak = max(event.torque_peak or 0.0, float(np.nanmax(torque)))

@@ -6,17 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from touchline import _core
 from touchline.contact.contact import Candidate
 from touchline.contact.detector import Detection
 from touchline.contact.skin import Skin
 from touchline.contact.thresholds import Thresholds
 from touchline.estimation.observer import Estimate, Observer
+from touchline.native import core
 
 Array = NDArray[np.float64]
 
 RULES = ("likelihood", "paper")
 STATUS = (None, "located", "ambiguous", "not_separable", "wrench_only")
+TORQUE_ERROR = 0.02  # a joint's torque sensor is no better, and a touch is no point
 HEAD, PER_CANDIDATE = 23, 6  # numbers of a native answer (see core/contact_bindings.hpp)
 
 
@@ -79,7 +80,8 @@ class Localizer:
         period: time between samples [s]: the noise figures are per sample.
         rule: "likelihood", or "paper": the first entry along the line, on no matter which link.
         friction: coefficient of the friction cone.
-        relative_error: of model and gains, as a part of the load; what noise figures do not cover.
+        wrench_error: of the gains of six-axis sensors and of the model, as a part of the load.
+        torque_error: the same of joint torques; what noise figures do not cover.
         skin: the robot's surfaces, if already at hand.
 
     Raises:
@@ -93,7 +95,8 @@ class Localizer:
         period: float = 1e-3,
         rule: str = "likelihood",
         friction: float = 0.8,
-        relative_error: float = 0.0,
+        wrench_error: float = 0.0,
+        torque_error: float = TORQUE_ERROR,
         skin: Skin | None = None,
     ) -> None:
         if rule not in RULES:
@@ -101,15 +104,15 @@ class Localizer:
         self.observer, self.robot = observer, observer.robot
         self.skin = skin or Skin(self.robot)
         self._body_names = {body.node: body.name for body in self.robot.bodies}
-        settings = _core.LocalizerSettings()
+        settings = core.LocalizerSettings()
         settings.friction = friction
         settings.first_entry = rule == "paper"
         rows = thresholds.rows if thresholds else ()
-        self.core = _core.Localizer(
+        self.core = core.Localizer(
             observer.kernel,
-            [_core.DetectionRow(**vars(row)) for row in rows],
-            self._noise(period, relative_error),
-            [_core.LinkSurface(patch.node, patch.mesh) for patch in self.skin.patches],
+            [core.DetectionRow(**vars(row)) for row in rows],
+            self._noise(period, wrench_error, torque_error),
+            [core.LinkSurface(patch.node, patch.mesh) for patch in self.skin.patches],
             settings,
         )
 
@@ -237,11 +240,11 @@ class Localizer:
             for surface, node, weight, *_, position in ((*part[:3], part[3:]) for part in parts)
         )
 
-    def _noise(self, period: float, relative_error: float) -> _core.NoiseFigures:
+    def _noise(self, period: float, wrench_error: float, torque_error: float) -> core.NoiseFigures:
         noise = self.robot.description.noise
         sensors = [x for name in self.robot.sensor_names for x in noise.sensors[name]]
-        return _core.noise_figures(
-            list(noise.qd), list(noise.tau), sensors, period, relative_error
+        return core.noise_figures(
+            list(noise.qd), list(noise.tau), sensors, period, wrench_error, torque_error
         )
 
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from touchline.contact.contact import Contact
 from touchline.contact.detector import Detection, Detector
 from touchline.contact.event import Event, EventRecorder
-from touchline.contact.localizer import Localizer
+from touchline.contact.localizer import TORQUE_ERROR, Localizer
 from touchline.contact.table import ContactTable
 from touchline.estimation.observer import Estimate, Observer
 from touchline.model.robot import Robot
@@ -45,7 +45,8 @@ class Pipeline:
         method: of the observer, "segment" or "paper".
         period: time between samples [s], for thresholds and weights that follow from the noise.
         rule: of the localizer, "likelihood" or "paper" (the first entry of the line).
-        relative_error: of model and gains, as a part of the load, for the localizer.
+        wrench_error: of gains and model, as a part of the load, and `torque_error`, for the
+            localizer's weights.
     """
 
     def __init__(
@@ -55,7 +56,8 @@ class Pipeline:
         method: str = "segment",
         period: float = 1e-3,
         rule: str = "likelihood",
-        relative_error: float = 0.0,
+        wrench_error: float = 0.0,
+        torque_error: float = TORQUE_ERROR,
     ) -> None:
         self.robot = robot
         self.observer = Observer(robot, bandwidth, method)
@@ -65,10 +67,11 @@ class Pipeline:
             self.detector.thresholds,
             period,
             rule=rule,
-            relative_error=relative_error,
+            wrench_error=wrench_error,
+            torque_error=torque_error,
         )
         self.recorder = EventRecorder(self.detector, self.localizer)
-        self.contacts: ContactTable | None = None
+        self.contacts = ContactTable.empty(self.localizer)
         self._pending: list[tuple] = []
         self._touched = b""
         self._idle = np.zeros(len(robot.segment_names)).tobytes()

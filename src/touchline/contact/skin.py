@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from touchline import _core
 from touchline.model.robot import Robot
 from touchline.model.surface import Surface, mechanism_surfaces
 from touchline.model.tree import invert
+from touchline.native import core
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class Patch:
     segment: str | None
     T_node_link: Array
     surface: Surface
-    mesh: _core.Mesh
+    mesh: core.Mesh
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ def _patch(
     place = robot.places[link]
     T = place.T_node_link
     vertices = surface.vertices @ T[:3, :3].T + T[:3, 3]
-    mesh = _core.mesh(np.ascontiguousarray(vertices), np.ascontiguousarray(surface.faces, np.int64))
+    mesh = core.mesh(np.ascontiguousarray(vertices), np.ascontiguousarray(surface.faces, np.int64))
     # What stands on the world inboard of all joints and sensors is felt by nothing.
     felt = segment in segments and (segment != "root" or _moves(robot, place.node))
     return Patch(link, body, place.node, segment if felt else None, T, surface, mesh)

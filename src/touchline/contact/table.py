@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.localizer import STATUS, Localizer
+from touchline.contact.localizer import HEAD, STATUS, Localizer
 
 Array = NDArray[np.float64]
 
@@ -32,6 +32,12 @@ class ContactTable:
     event: NDArray[np.int64]
     answers: Array
     localizer: Localizer
+
+    @staticmethod
+    def empty(localizer: Localizer) -> "ContactTable":
+        """No contacts."""
+        none = np.empty(0, dtype=np.int64)
+        return ContactTable(none, none, none, np.empty((0, HEAD)), localizer)
 
     def __len__(self) -> int:
         return len(self.sample)

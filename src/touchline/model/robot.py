@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline import _core
 from touchline.errors import InputError
 from touchline.model.description import RobotDescription
+from touchline.model.kernel import native_observer
 from touchline.model.mechanism import Mechanism
-from touchline.model.native import native_observer
 from touchline.model.tree import Node, Place, TreeBuilder
+from touchline.native import core
 from touchline.suggest import did_you_mean
 
 Array = NDArray[np.float64]
@@ -175,12 +175,12 @@ class Robot:
         method: str = "segment",
         discretization: str = "automatic",
         bandwidth: float | None = None,
-    ) -> _core.Observer:
+    ) -> core.Observer:
         """A new native observer for this robot; `bandwidth` [rad/s] overrides the description's."""
         return native_observer(self, method, discretization, bandwidth)
 
     @cached_property
-    def _kernel(self) -> _core.Observer:
+    def _kernel(self) -> core.Observer:
         return self.kernel()
 
     def _segment_of(self, node: int) -> str:

@@ -16,8 +16,9 @@ from touchline.estimation.observer import METHODS
 from touchline.estimation.samples import Samples
 from touchline.logs import Log, open_log
 from touchline.model.robot import Robot, load_robot
-from touchline.report.contact_rows import ContactRows
+from touchline.report.comparison import Comparison, compare_log
 from touchline.report.curves import Curves
+from touchline.report.event_pictures import EventPoses
 from touchline.report.facts import bandwidth_warnings, bandwidths
 from touchline.report.outputs import REPORT, Outputs, prepare_directory, write_text
 from touchline.report.statistics import Statistics
@@ -40,6 +41,8 @@ class Analysis:
         statistics: of all samples.
         curves: for plots.
         events: all events.
+        poses: how the robot stood at the first of them.
+        comparisons: of the events with the truth of a simulated log.
         warnings: what the user should know.
     """
 
@@ -53,6 +56,8 @@ class Analysis:
     statistics: Statistics
     curves: Curves
     events: list[Event]
+    poses: EventPoses
+    comparisons: list[Comparison]
     warnings: list[str]
 
 
@@ -96,10 +101,10 @@ def analyze(
 
 
 def typical_period(time: np.ndarray) -> float:
-    """Median step of time stamps [s] that go forward; 1 ms where there is none."""
+    """Median step of time stamps [s] that go forward, to six digits; 1 ms where there is none."""
     steps = np.diff(time[np.isfinite(time)])
     steps = steps[steps > 0]
-    return float(np.median(steps)) if len(steps) else 1e-3
+    return float(f"{np.median(steps):.6g}") if len(steps) else 1e-3
 
 
 def _check_options(bandwidth: float | None, method: str) -> None:
@@ -118,19 +123,21 @@ class _Run:
         robot = pipeline.robot
         self._out = out
         self._outputs = Outputs(out, robot)
-        self._contacts = ContactRows(robot)
         self._statistics = Statistics.of(len(robot.joint_names), len(robot.segment_names))
         self._curves = Curves(pipeline, self.period)
+        self._poses = EventPoses()
 
     def add(self, part: Samples) -> None:
         """Take the next samples."""
-        time, events = part.time, self.pipeline.events
+        time = part.time
         estimate, detection = self.pipeline.run(time, part.q, part.qd, part.tau, part.wrench)
         self._statistics.add(time, estimate, detection)
         self._curves.add(time, estimate, detection)
         self._outputs.estimates(time, estimate)
-        self._outputs.contacts(self._contacts.rows(time, estimate, detection, events))
-        self._outputs.events(events)
+        if self.pipeline.contacts is not None:
+            self._outputs.contacts(time, estimate, self.pipeline.contacts)
+        self._outputs.events(self.pipeline.events)
+        self._poses.add(time, part.q, self.pipeline.events)
 
     def finish(
         self, log: Path, method: str, bandwidth: float | None, warnings: list[str]
@@ -149,6 +156,8 @@ class _Run:
             statistics=self._statistics,
             curves=self._curves,
             events=events,
+            poses=self._poses,
+            comparisons=compare_log(events, log),
             warnings=warnings,
         )
 

@@ -150,5 +150,5 @@ def event_where(event: Event) -> str:
     """The best word there is for where an event was: a link, else the most distal loaded joint."""
     link = getattr(event, "link", None)
     if link is not None:
-        return f"link {link}"
+        return str(link)
     return f"beyond {event.joint}" if event.joint else ""

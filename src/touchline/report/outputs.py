@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 
 from touchline.contact.event import Event
+from touchline.contact.table import ContactTable
 from touchline.errors import InputError
+from touchline.estimation.observer import Estimate
 from touchline.logs import EstimateWriter, TableWriter
+from touchline.model.description import AXES
 from touchline.model.robot import Robot
-from touchline.report.contact_rows import CONTACT_SCHEMA
 
 ESTIMATES, CONTACTS, EVENTS, REPORT = (
     "estimates.parquet",
@@ -24,6 +26,12 @@ ESTIMATES, CONTACTS, EVENTS, REPORT = (
 )
 NAMES = (ESTIMATES, CONTACTS, EVENTS, REPORT)
 PARTS = ("estimates.parts", "contacts.parts")
+CONTACT_SCHEMA: dict[str, Any] = (
+    {"time": "f8", "health": "u4", "event": "i8", "segment": "str", "link": "str", "body": "str"}
+    | {"body_probability": "f8", "status": "str"}
+    | dict.fromkeys(("x", "y", "z", *AXES, "position_std"), "f8")
+    | dict.fromkeys(("pxx", "pxy", "pxz", "pyy", "pyz", "pzz"), "f8")
+)
 
 
 def prepare_directory(directory: Path, *inputs: Path) -> None:
@@ -93,15 +101,21 @@ class Outputs:
         self._written: list[Any] | None = None
         self.events([])
 
-    def estimates(self, time: np.ndarray, estimate: Any) -> None:
+    def estimates(self, time: np.ndarray, estimate: Estimate) -> None:
         """Append the estimates of N samples."""
         self._estimates.write(
             time, estimate.health, estimate.tau_ext, estimate.sensor_wrench, estimate.segment_wrench
         )
 
-    def contacts(self, rows: dict[str, Any]) -> None:
-        """Append rows of contacts."""
-        self._contacts.write(rows)
+    def contacts(self, time: np.ndarray, estimate: Estimate, table: ContactTable) -> None:
+        """Append the contacts of N samples.
+
+        `fx fy fz` is the contact's force, `mx my mz` the segment's moment about the world origin.
+        """
+        moments = estimate.segment_wrench[table.sample, table.segment, 3:]
+        rows = {"time": time[table.sample], "health": estimate.health[table.sample].astype("u4")}
+        moment_columns = dict(zip(("mx", "my", "mz"), moments.T, strict=True))
+        self._contacts.write(rows | table.columns() | moment_columns)
 
     def events(self, events: Sequence[Event]) -> None:
         """Bring `events.json` up to date: an event is in it as soon as it begins."""

@@ -12,7 +12,9 @@ import numpy as np
 from touchline import __version__
 from touchline.contact.event import Event
 from touchline.report.analysis import Analysis
+from touchline.report.comparison import HEAD, cells, verdict
 from touchline.report.curves import Panel
+from touchline.report.event_pictures import pictures
 from touchline.report.facts import event_where, health_facts, joint_facts, segment_facts
 from touchline.report.html import Cell, note, section, table
 from touchline.report.outputs import strict
@@ -28,7 +30,8 @@ PAGE = """<!doctype html>
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta http-equiv="Content-Security-Policy"
-  content="default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'">
+  content="default-src 'none'; img-src data:; style-src 'unsafe-inline';
+  script-src 'unsafe-inline'">
 <title>{title}</title>
 <style>
 {style}</style>
@@ -54,6 +57,8 @@ def page_text(analysis: Analysis) -> str:
         _header(analysis),
         _warnings(analysis),
         _events(analysis),
+        _comparisons(analysis),
+        pictures(analysis.robot, analysis.events, analysis.poses, analysis.comparisons),
         _plots(analysis),
         _residuals(analysis),
         _health(analysis),
@@ -115,6 +120,14 @@ def _events(analysis: Analysis) -> str:
         '<div class="plot" data-strip><svg role="img" aria-label="events over time"></svg></div>'
     )
     return section("Events", strip, table([*head, "where", "located"], rows, marks), note(words))
+
+
+def _comparisons(analysis: Analysis) -> str:
+    rows = analysis.comparisons
+    if not rows:
+        return ""
+    words = f"{verdict(rows, analysis.events)}. The truth is the simulation's own."
+    return section("Against the truth", table(HEAD, [cells(row) for row in rows]), note(words))
 
 
 def _event_row(event: Event, origin: float) -> list[Any]:

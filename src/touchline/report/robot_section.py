@@ -4,6 +4,8 @@
 from html import escape
 from typing import Any
 
+import numpy as np
+
 from touchline.model.description import JointDescription, SensorDescription
 from touchline.model.robot import Robot
 from touchline.report.analysis import Analysis
@@ -69,7 +71,7 @@ def _joints(analysis: Analysis) -> str:
                 limit.collision if limit else None,
                 _friction(joint),
                 _conversion(joint),
-                joint.range,
+                joint.range if np.isfinite(joint.range) else None,
                 Cell(f"{model.lower:.4g}&nbsp;to&nbsp;{model.upper:.4g}"),
                 description.noise.tau[j],
                 description.noise.qd[j],

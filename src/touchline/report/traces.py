@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+ROUNDING = 1e-3  # of a piece, at first
 ASTRAY = 1.0  # s; a stamp that is further ahead of a later one is wrong
 
 
@@ -27,6 +28,7 @@ class Traces:
             raise ValueError(f"buckets is {buckets}, but must be even")
         self.start = np.nan
         self.width = width
+        self._early = ROUNDING * width
         self.low = np.full((buckets, columns), np.nan)
         self.high = np.full((buckets, columns), np.nan)
 
@@ -45,7 +47,8 @@ class Traces:
         if not len(time):
             return
         self._make_room(float(time.max()))
-        index = ((time - self.start) / self.width).astype(int)
+        # Pieces as wide as the period hold one sample each, whatever the rounding of the stamps.
+        index = ((time - self.start + self._early) / self.width).astype(int)
         if (np.diff(index) < 0).any():
             order = np.argsort(index, kind="stable")
             index, values = index[order], values[order]
@@ -55,7 +58,7 @@ class Traces:
         self.high[where] = np.fmax(self.high[where], np.fmax.reduceat(values, begins, axis=0))
 
     def _make_room(self, last: float) -> None:
-        while last - self.start >= self.width * len(self.low):
+        while last - self.start + self._early >= self.width * len(self.low):
             half = len(self.low) // 2
             for array, merge in ((self.low, np.fmin), (self.high, np.fmax)):
                 array[:half] = merge(array[0::2], array[1::2])

@@ -89,6 +89,10 @@ class ScriptedContact:
         for name in ("point", "force", "moment"):
             object.__setattr__(self, name, np.array(getattr(self, name), float).reshape(3))
 
+    def vectors(self) -> tuple[Array, Array, Array]:
+        """Point, force and moment, (3,) each, in their own frames."""
+        return np.asarray(self.point), np.asarray(self.force), np.asarray(self.moment)
+
 
 @dataclass(frozen=True)
 class Touch:
@@ -187,9 +191,7 @@ def cross(a: Array, b: Array) -> Array:
 def _touch(contact: ScriptedContact, strength: float, plant: Plant) -> Touch:
     body = plant.bodies[contact.link]
     R = plant.data.xmat[body].reshape(3, 3)
-    point, force, moment = (
-        np.asarray(value, float) for value in (contact.point, contact.force, contact.moment)
-    )
+    point, force, moment = contact.vectors()
     force, moment = strength * force, strength * moment
     if contact.point_frame == "link":
         point = plant.data.xpos[body] + R @ point

@@ -140,13 +140,12 @@ class JointSprings:
 
     Args:
         q: (n,) the pose [rad or m].
-        stiffness: (n,) [Nm/rad]; None: soft for the inertia that each joint moves there.
-        damping: (n,) [Nm s/rad]; None: critical for the same inertia.
+        stiffness, damping: (n,) see `Plant.hold`.
     """
 
-    FREQUENCY = 25.0  # rad/s of a joint alone, where no stiffness is given
-
-    def __init__(self, q: Array, stiffness: Array | None, damping: Array | None) -> None:
+    def __init__(
+        self, q: Array, stiffness: Array | None = None, damping: Array | None = None
+    ) -> None:
         self._q, self._stiffness, self._damping = q, stiffness, damping
         self._weight: Array | None = None
 
@@ -154,11 +153,6 @@ class JointSprings:
         """Motor torques (n,) [Nm or N] beside the springs'."""
         if self._weight is None:
             self._weight = plant.gravity_torque()
-            stiffness, damping = self._stiffness, self._damping
-            if stiffness is None or damping is None:
-                n = len(self._q)
-                inertia = np.array([plant.inertia_times(e)[j] for j, e in enumerate(np.eye(n))])
-                stiffness, damping = inertia * self.FREQUENCY**2, 2 * inertia * self.FREQUENCY
-            plant.set_springs(self._q, stiffness, damping)
+            plant.hold(self._q, self._stiffness, self._damping)
             plant.evaluate()
         return self._weight

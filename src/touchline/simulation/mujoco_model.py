@@ -138,17 +138,15 @@ def _add_mimics(spec: Any, mechanism: Mechanism, step: float) -> None:
     for joint in mechanism.joints.values():
         if joint.mimic is None or f"joint:{joint.name}" not in present:
             continue
-        data = np.zeros(11)
-        data[:2] = joint.mimic.offset, joint.mimic.multiplier
-        spec.add_equality(
+        equality = spec.add_equality(
             type=_mujoco().mjtEq.mjEQ_JOINT,
             objtype=_mujoco().mjtObj.mjOBJ_JOINT,
             name1=f"joint:{joint.name}",
             name2=f"joint:{joint.mimic.joint}",
-            data=data,
             solref=[2 * step, 1.0],
             solimp=[0.999, 0.9999, 0.001, 0.5, 2.0],
         )
+        equality.data[:5] = joint.mimic.offset, joint.mimic.multiplier, 0.0, 0.0, 0.0
 
 
 def _add_sensor(spec: Any, body: Any, name: str, T_link_sensor: Array) -> None:

@@ -20,6 +20,8 @@ from touchline.model.robot import Robot
 from touchline.simulation.mujoco_model import Addition, build_model
 
 Array = NDArray[np.float64]
+HOLDING_FREQUENCY = 25.0  # rad/s of a joint on springs of its own
+FASTEST_DECAY = 1.5  # of a damper, per step; Runge-Kutta's limit is 2.8
 
 
 @dataclass(frozen=True)
@@ -31,11 +33,14 @@ class Reading:
         motor_torque: (n,) torque of the motor, before rotor and friction [Nm or N]; springs and
             dampers set in the model count as the motor's.
         wrench: (k, 6) on the outboard body, sensor frame [N, Nm].
+        motion_torque: (n,) that the motion would take without contact; None where no joint's
+            driver takes it out [Nm or N].
     """
 
     link_torque: Array
     motor_torque: Array
     wrench: Array
+    motion_torque: Array | None = None
 
 
 class Plant:
@@ -68,6 +73,7 @@ class Plant:
         self._dofs = np.array([built.joints[j.name] for j in joints], dtype=int)
         self._set_couplings(built.joints)
         self._site_ids = [self.model.site(f"sensor:{s}").id for s in robot.sensor_names]
+        self._shows_motion = any(j.compensated == "model" for j in joints)
         moved = any(j.torque == "motor" for j in joints)
         self._friction = _Friction(robot) if moved else None
         self._motor_torque = np.zeros(len(joints))
@@ -83,7 +89,8 @@ class Plant:
             mimic = self.robot.mechanism.joints[name].mimic
             self._P[row, index[mimic.joint if mimic else name]] = mimic.multiplier if mimic else 1.0
             self._offset[row] = mimic.offset if mimic else 0.0
-        self._plain = np.array_equal(self._P, np.eye(n)) and self.model.nv == n
+        in_order = np.array_equal(self._dofs, np.arange(self.model.nv))
+        self.plain = in_order and np.array_equal(self._P, np.eye(n))
 
     @property
     def time(self) -> float:
@@ -126,12 +133,33 @@ class Plant:
         self.data.qfrc_applied[self._dofs] = torque - self.friction_torque()
         return True
 
-    def set_springs(self, q: Array, stiffness: Array, damping: Array) -> None:
-        """Springs (n,) [Nm/rad] about `q` (n,) and dampers (n,) [Nm s/rad] in the joints."""
+    def hold(
+        self, q: Array, stiffness: Array | None = None, damping: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Puts springs about `q` (n,) and dampers into the joints, as part of the physics.
+
+        Args:
+            q: pose at which the springs are slack [rad or m].
+            stiffness: (n,) [Nm/rad]; None: HOLDING_FREQUENCY for the inertia that each joint
+                moves at the plant's present state, which has been evaluated.
+            damping: (n,) [Nm s/rad]; None: critical for the same inertia.
+
+        Returns:
+            Stiffness and damping (n,) as set: both less where the physics' step is too long for
+            the dampers at the present inertia.
+        """
+        inertia = np.array([self.inertia_times(e) for e in np.eye(len(q))])
+        if stiffness is None or damping is None:
+            stiffness = np.diag(inertia) * HOLDING_FREQUENCY**2
+            damping = 2 * np.diag(inertia) * HOLDING_FREQUENCY
+        # The fastest decay must be slow against the step, or the integration is unstable.
+        fastest = np.linalg.eigvals(np.linalg.solve(inertia, np.diag(damping))).real.max()
+        softer = min(1.0, FASTEST_DECAY * self.rate / fastest)
+        stiffness, damping = softer * stiffness, softer * damping
         m = self.model
-        joints = m.dof_jntid[self._dofs]
-        m.jnt_stiffness[joints], m.dof_damping[self._dofs] = stiffness, damping
+        m.jnt_stiffness[m.dof_jntid[self._dofs]], m.dof_damping[self._dofs] = stiffness, damping
         m.qpos_spring[self._dofs] = q
+        return stiffness, damping
 
     def accelerate(self) -> None:
         """Computes accelerations and contact forces for the inputs that are set."""
@@ -142,6 +170,11 @@ class Plant:
     def integrate(self) -> None:
         """Moves on by one step; to be called after `accelerate`."""
         self._mj.mj_RungeKutta(self.model, self.data, 4)
+
+    def forward_wrenches(self) -> Array:
+        """Evaluates, accelerates, and returns the sensors' wrenches (6 k,) as in `Reading`."""
+        self._mj.mj_forward(self.model, self.data)
+        return self.data.sensordata[: 6 * len(self._site_ids)].copy()
 
     def read(self) -> Reading:
         """What ideal sensors read; to be called after `accelerate`."""
@@ -156,12 +189,13 @@ class Plant:
             self._P.T @ transmitted,
             self._motor_torque + d.qfrc_passive[self._dofs],
             d.sensordata[: 6 * k].reshape(k, 6).copy(),
+            self._motion_torque() if self._shows_motion else None,
         )
 
     def inertia_times(self, acceleration: Array) -> Array:
         """Mass matrix times `acceleration` (n,), rotors included [Nm or N]."""
         out = np.empty(self.model.nv)
-        if self._plain:
+        if self.plain:
             self._mj.mj_mulM(self.model, self.data, out, acceleration)
             return out
         full = np.zeros(self.model.nv)
@@ -171,7 +205,7 @@ class Plant:
 
     def bias_torque(self) -> Array:
         """Torques (n,) of gravity, Coriolis and centrifugal forces at the state [Nm or N]."""
-        if self._plain:
+        if self.plain:
             return self.data.qfrc_bias.copy()
         return self._P.T @ self.data.qfrc_bias[self._robot_dofs]
 
@@ -192,8 +226,7 @@ class Plant:
         self._mj.mj_fwdVelocity(self.model, self.data)
         return self._P.T @ out[self._robot_dofs]
 
-    def motion_torque(self) -> Array:
-        """Link-side torques (n,) that the motion takes without anything touching [Nm or N]."""
+    def _motion_torque(self) -> Array:
         out = np.empty(self.model.nv)
         self._mj.mj_rne(self.model, self.data, 1, out)
         return self._P.T @ out[self._robot_dofs]

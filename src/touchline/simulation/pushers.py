@@ -57,7 +57,7 @@ class Pusher:
     radius: float = 0.025
     gap: float = 0.004
     speed: float = 0.02
-    stiffness: float = 1000.0
+    stiffness: float = 2000.0
     mass: float = 0.2
     friction: float = 0.5
     contact_stiffness: float = 2e4

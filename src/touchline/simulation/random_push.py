@@ -12,6 +12,7 @@ from touchline.estimation.samples import Samples
 from touchline.model.robot import Robot
 from touchline.simulation.contacts import Profile, ScriptedContact, ScriptedForces
 from touchline.simulation.control import JointSprings
+from touchline.simulation.held_push import can_hold, held_push
 from touchline.simulation.plant import Plant
 from touchline.simulation.scene import Run, describe, make_plant
 from touchline.simulation.sensing import sense
@@ -67,8 +68,8 @@ def random_push_runs(
         timing: of each push.
         links: that are pushed; default: the structure.
         friction: the force's direction is uniform over this friction cone.
-        settings: rates, noise, seed. Without a rate of the controller the joints' springs are part
-            of the physics, which is as good and faster; physics default to 1 kHz here.
+        settings: rates, noise, seed; the default's physics are at 1 kHz, and as long as that is
+            the log's rate too, this is several times faster.
     """
     settings = settings or Run(physics=1000.0)
     timing = timing or Timing()
@@ -130,10 +131,13 @@ def _one(
     settings: Run,
     number: int,
 ) -> Simulated:
-    plant.reset(q, time=-1.0 / settings.rate)
-    held = JointSprings(q, setup.stiffness, setup.damping)
-    rates = Rates(settings.rate, settings.control)
-    readings, truth = run(plant, held, [ScriptedForces([contact])], timing.seconds, rates)
+    if settings.control is None and can_hold(plant, settings.rate):
+        readings, truth = held_push(plant, setup, q, contact, timing.seconds)
+    else:
+        plant.reset(q, time=-1.0 / settings.rate)
+        springs = JointSprings(q, setup.stiffness, setup.damping)
+        rates, forces = Rates(settings.rate, settings.control), ScriptedForces([contact])
+        readings, truth = run(plant, springs, [forces], timing.seconds, rates)
     rng = np.random.default_rng([settings.seed, 5, number])
     samples = sense(plant.robot, readings, settings.noise, rng)
     told = describe(plant.robot, settings) | {"scenario": "random_pushes", "push": number}

@@ -35,10 +35,10 @@ class Readings:
     link_torque: Array
     motor_torque: Array
     wrench: Array
-    gravity_torque: Array | None
-    motion_torque: Array | None
-    weight: Array | None
-    R_log_sensor: Array | None
+    gravity_torque: Array | None = None
+    motion_torque: Array | None = None
+    weight: Array | None = None
+    R_log_sensor: Array | None = None
 
     @classmethod
     def empty(cls, plant: Plant, count: int) -> Self:
@@ -66,17 +66,14 @@ class Readings:
         """Stores the mean of two readings of the plant's present state."""
         self.time[row] = round(plant.time * plant.rate) / plant.rate
         self.q[row], self.qd[row] = plant.q, plant.qd
-        if before is after:
-            self.link_torque[row], self.motor_torque[row] = after.link_torque, after.motor_torque
-            self.wrench[row] = after.wrench
-        else:
-            self.link_torque[row] = (before.link_torque + after.link_torque) / 2
-            self.motor_torque[row] = (before.motor_torque + after.motor_torque) / 2
-            self.wrench[row] = (before.wrench + after.wrench) / 2
+        self.link_torque[row] = (before.link_torque + after.link_torque) / 2
+        self.motor_torque[row] = (before.motor_torque + after.motor_torque) / 2
+        self.wrench[row] = (before.wrench + after.wrench) / 2
+        room, first, second = self.motion_torque, before.motion_torque, after.motion_torque
+        if room is not None and first is not None and second is not None:
+            room[row] = (first + second) / 2
         if self.gravity_torque is not None:
             self.gravity_torque[row] = plant.gravity_torque()
-        if self.motion_torque is not None:
-            self.motion_torque[row] = plant.motion_torque()
         if self.weight is not None:
             self.weight[row] = plant.sensor_weights()
         if self.R_log_sensor is not None:

@@ -5,23 +5,27 @@ All take the robot first and share the settings of `Run`; the same seed gives th
 """
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.errors import InputError
 from touchline.model.robot import Robot
 from touchline.simulation.contacts import Profile, ScriptedContact, ScriptedForces
-from touchline.simulation.control import Trajectory, hold
-from touchline.simulation.places import Place, PlaceFinder, weakest_direction
+from touchline.simulation.control import hold
+from touchline.simulation.places import Place, PlaceFinder
 from touchline.simulation.pushers import CollidingPushers, Pusher
 from touchline.simulation.random_push import random_pushes
 from touchline.simulation.scene import Run, Tracking, impedance, simulate, wandering
 from touchline.simulation.setup import read_setup
-from touchline.simulation.shapes import shapes_for_collisions
-from touchline.simulation.touchable import structure_links
+from touchline.simulation.shapes import CollisionShapes
+from touchline.simulation.touchable import structure, structure_links, touchable_links
 from touchline.simulation.truth import Simulated
 
 Array = NDArray[np.float64]
+PUSHER_TRIES = 100
+ROUGHNESS, ROUGH_WITHIN = 5e-4, 0.012  # m by which colliding shapes may stand off, how far around
 
 
 def free_motion(
@@ -77,17 +81,13 @@ def three_touches(
     end 0.1 s before the log does.
 
     Args:
-        robot: with one six-axis sensor or more.
+        robot: with surfaces.
         speed: of the fastest joint [rad/s]; 0: the arm stands.
         force: of each touch [N].
         seconds: duration.
         settings: rates, noise, seed.
     """
-    segments: dict[str, list[str]] = {}
-    for body in robot.bodies:
-        if body.segment != "root":
-            segments.setdefault(body.segment, []).extend(body.links)
-    groups = list(segments.values())
+    groups = list(touchable_links(robot).values())
     return _touched(robot, groups, speed, force, seconds, settings, "three_touches")
 
 
@@ -109,7 +109,7 @@ def base_touch(
 def singular_push(
     robot: Robot, force: float = 20.0, seconds: float = 1.0, settings: Run | None = None
 ) -> Simulated:
-    """The stretched arm is pushed in the direction in which it cannot move.
+    """The stretched arm is pushed in a direction in which it cannot move: no joint feels it.
 
     Arguments as in `three_touches`.
 
@@ -120,13 +120,11 @@ def singular_push(
     setup = read_setup(robot)
     trajectory = hold(setup.stretched)
     links = structure_links(robot)
-    outer = links[len(links) // 2 :]
-    direction, weakness = weakest_direction(robot, outer[-1], np.zeros(3), setup.stretched)
-    finder = PlaceFinder(robot, trajectory, np.random.default_rng(settings.seed))
-    place = finder.find(outer, 0.0, 0.0, direction=direction)
+    finder = PlaceFinder(robot, trajectory, np.random.default_rng([settings.seed, 3]))
+    place, lever = finder.find_weakest(links[len(links) // 2 :])
     contacts = [ScriptedForces([_contact(place, force, 0.2, seconds - 0.1)])]
     controller = impedance(setup, trajectory)
-    told = {"scenario": "singular_push", "singular_value_ratio": weakness}
+    told = {"scenario": "singular_push", "torque_per_newton": lever}
     return simulate(robot, controller, contacts, seconds, settings, **told)
 
 
@@ -143,7 +141,7 @@ def colliding_pushers(
 
     Args:
         robot: with surfaces.
-        speed: of the fastest joint [rad/s], which moves by 1 cm or so; 0: the arm stands.
+        speed: of the fastest joint [rad/s], which moves by some mm; 0: the arm stands.
         force: of each ball's spring [N].
         hold_time: with full force [s].
         settings: rates, noise, seed.
@@ -152,13 +150,15 @@ def colliding_pushers(
     setup = read_setup(robot)
     trajectory = hold(setup.home)
     if speed:
-        trajectory = wandering(setup, speed, np.random.default_rng(settings.seed), reach=0.02)
-    pushers = _pushers(robot, trajectory, force, hold_time, settings)
+        trajectory = wandering(setup, speed, np.random.default_rng(settings.seed), reach=0.008)
+    shapes = CollisionShapes(robot.mechanism)
+    finder = PlaceFinder(robot, trajectory, np.random.default_rng([settings.seed, 3]))
+    pushers = _pushers(robot, finder, shapes, force, hold_time)
     balls = CollidingPushers(pushers)
-    shapes = shapes_for_collisions(robot.mechanism, {pusher.link for pusher in pushers})
+    add_shapes = shapes.addition(pusher.link for pusher in pushers)
 
-    def add(spec, bodies) -> None:
-        shapes(spec, bodies)
+    def add(spec: Any, bodies: dict[str, Any]) -> None:
+        add_shapes(spec, bodies)
         balls.add(spec, bodies)
 
     controller = impedance(setup, trajectory)
@@ -171,7 +171,7 @@ def demo(robot: Robot, seconds: float = 20.0, settings: Run | None = None) -> Si
     """The arm moves slowly, is touched near its base, then at three places at once, and again.
 
     Args:
-        robot: with one six-axis sensor or more.
+        robot: with surfaces.
         seconds: duration.
         settings: rates, noise, seed.
     """
@@ -180,7 +180,7 @@ def demo(robot: Robot, seconds: float = 20.0, settings: Run | None = None) -> Si
     trajectory = wandering(setup, 0.35, np.random.default_rng(settings.seed))
     finder = PlaceFinder(robot, trajectory, np.random.default_rng([settings.seed, 3]))
     links = structure_links(robot)
-    ends = [body.links for body in robot.bodies if body.segment not in ("root", _structure(robot))]
+    ends = [group for name, group in touchable_links(robot).items() if name != structure(robot)]
     acts = [(links[:1], 0.5), (links[3:6], 3.0), *((e, 3.0) for e in ends), (links[1:3], 6.0)]
     contacts = []
     for begin in np.arange(0.5, seconds - 2.0, 8.0):
@@ -230,25 +230,34 @@ def _contact(place: Place, force: float, begin: float, end: float) -> ScriptedCo
     return ScriptedContact(place.link, place.at.point, force * place.direction, profile)
 
 
-def _structure(robot: Robot) -> str:
-    return robot.body_of(structure_links(robot)[0]).segment
-
-
 def _pushers(
-    robot: Robot, trajectory: Trajectory, force: float, hold_time: float, settings: Run
+    robot: Robot, finder: PlaceFinder, shapes: CollisionShapes, force: float, hold_time: float
 ) -> list[Pusher]:
-    rng = np.random.default_rng([settings.seed, 3])
-    finder = PlaceFinder(robot, trajectory, rng)
-    segments = {body.segment: body.links for body in robot.bodies if body.segment != "root"}
-    groups = segments | {_structure(robot): structure_links(robot)[2:]}
+    """One ball for each segment, setting out one after the other."""
+    groups = touchable_links(robot) | {structure(robot): structure_links(robot)[2:]}
     pushers = []
     for i, (segment, links) in enumerate(groups.items()):
-        place = finder.find(links, 0.0, 0.0, clearance=0.06)
-        T = robot.T_world_links(trajectory(0.0).q)[place.link]
+        place = _true_place(robot, finder, shapes, links)
+        T = finder.poses(0.0)[place.link]
         point = T[:3, :3] @ place.at.point + T[:3, 3]
-        start = 0.1 + 0.6 * i
+        start = 0.1 + 0.3 * i
         pushers.append(Pusher(segment, place.link, point, place.direction, start, hold_time, force))
     return pushers
+
+
+def _true_place(
+    robot: Robot, finder: PlaceFinder, shapes: CollisionShapes, links: Sequence[str]
+) -> Place:
+    """A place where the shapes that collide do not stand off the true surface.
+
+    Raises:
+        InputError: there is none.
+    """
+    for _ in range(PUSHER_TRIES):
+        place = finder.find(links, 0.0, 0.0, clearance=0.06)
+        if shapes.depth(place.link, place.at.point, ROUGH_WITHIN) < ROUGHNESS:
+            return place
+    raise InputError(f"robot {robot.name}: the shapes of {', '.join(links)} are too rough")
 
 
 SCENARIOS: dict[str, Callable[..., Simulated]] = {

@@ -20,7 +20,7 @@ class Setup:
 
     Attributes:
         home: a pose away from singularities [rad].
-        stretched: a singular pose [rad].
+        stretched: a singular pose [rad]; where none is given, all joints at 0 or close to it.
         stiffness: of joint impedance control [Nm/rad]; None: not known.
         damping: [Nm s/rad]; None: not known.
         lower, upper: the range that motions keep to [rad].
@@ -50,7 +50,7 @@ def read_setup(robot: Robot) -> Setup:
     middle = (lower + upper) / 2
     return Setup(
         values.get("home", middle),
-        values.get("stretched", np.zeros(len(joints))),
+        values.get("stretched", np.minimum(np.maximum(lower + margin, 0.0), upper - margin)),
         values.get("stiffness"),
         values.get("damping"),
         lower + margin,

@@ -4,70 +4,100 @@
 MuJoCo collides the convex hull of a mesh, and its rays meet the triangles themselves.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.model.mechanism import Geometry, Link, Mechanism
+from touchline.model.mechanism import Geometry, Mechanism
 from touchline.model.surface import Surface, link_surface
 from touchline.simulation.mujoco_model import Addition, quaternion
 
 Array = NDArray[np.float64]
-PIECES = 12  # of a link at most
+PIECES = 20  # of a link at most
 MIN_TRIANGLES = 4
 ROBOT, OTHER = 1, 2  # who collides: robot with others, never among themselves
 
 
-def surfaces_for_rays(mechanism: Mechanism) -> Addition:
-    """Adds the links' true surfaces, which rays meet and nothing collides with."""
+def surfaces_for_rays(surfaces: Mapping[str, Surface]) -> Addition:
+    """Adds the true surfaces of links, which rays meet and nothing collides with."""
 
     def add(spec: Any, bodies: dict[str, Any]) -> None:
-        for name, link in mechanism.links.items():
-            surface = link_surface(link)
-            if surface is not None:
-                mesh = f"surface:{name}"
-                _add_mesh(spec, mesh, surface.vertices, surface.faces)
-                _add_geom(spec, bodies[name], "mesh", f"link:{name}", meshname=mesh, contype=0)
+        for name, surface in surfaces.items():
+            mesh = f"surface:{name}"
+            _add_mesh(spec, mesh, surface.vertices, surface.faces)
+            _add_geom(spec, bodies[name], "mesh", f"link:{name}", meshname=mesh, contype=0)
 
     return add
 
 
-def shapes_for_collisions(
-    mechanism: Mechanism, links: Iterable[str] | None = None, pieces: int = PIECES
-) -> Addition:
-    """Adds shapes that others collide with: primitives as they are, meshes in convex pieces.
+class CollisionShapes:
+    """Shapes of links that others collide with: primitives as they are, meshes in convex pieces.
 
     Args:
         mechanism: whose links.
-        links: those that can be touched; default: all.
         pieces: convex pieces of a link at most.
     """
-    chosen = set(mechanism.links if links is None else links)
 
-    def add(spec: Any, bodies: dict[str, Any]) -> None:
-        for name in chosen:
-            _add_collision(spec, bodies[name], mechanism.links[name], pieces)
+    def __init__(self, mechanism: Mechanism, pieces: int = PIECES) -> None:
+        self._mechanism, self._count = mechanism, pieces
+        self._cut: dict[str, list[Array]] = {}
 
-    return add
+    def addition(self, links: Iterable[str]) -> Addition:
+        """Adds the shapes of some links to a model."""
+        wanted = set(links)
+        chosen = [link for link in self._mechanism.links if link in wanted]
 
+        def add(spec: Any, bodies: dict[str, Any]) -> None:
+            for name in chosen:
+                self._add(spec, bodies[name], name)
 
-def _add_collision(spec: Any, body: Any, link: Link, pieces: int) -> None:
-    shapes = link.collision or link.visual
-    primitives = [shape for shape in shapes if shape.kind not in ("mesh", "triangles")]
-    if len(primitives) == len(shapes):
-        for i, shape in enumerate(primitives):
-            _add_primitive(spec, body, f"link:{link.name}:{i}", shape)
-        return
-    surface = link_surface(link)
-    if surface is None:
-        return
-    for i, points in enumerate(convex_pieces(surface, pieces)):
-        mesh = f"piece:{link.name}:{i}"
-        spec.add_mesh(name=mesh, uservert=points.ravel())
-        _add_geom(spec, body, "mesh", f"link:{link.name}:{i}", meshname=mesh)
+        return add
+
+    def pieces(self, link: str) -> list[Array]:
+        """The points (P, 3) of each convex piece of a link; none if it is made of primitives."""
+        if link not in self._cut:
+            surface = link_surface(self._mechanism.links[link])
+            if surface is None or self._primitives(link):
+                self._cut[link] = []
+            else:
+                self._cut[link] = convex_pieces(surface, self._count)
+        return self._cut[link]
+
+    def depth(self, link: str, point: Array, around: float) -> float:
+        """How far the pieces stand off a link's surface near a point of it [m].
+
+        Args:
+            link: whose.
+            point: (3,) in the link's frame [m].
+            around: corners of the surface within this distance count too [m].
+        """
+        from scipy.spatial import ConvexHull
+
+        surface, pieces = link_surface(self._mechanism.links[link]), self.pieces(link)
+        if surface is None or not pieces:
+            return 0.0
+        near = np.linalg.norm(surface.vertices - point, axis=1) < around
+        points = np.vstack([surface.vertices[near], point])
+        planes = [ConvexHull(piece).equations for piece in pieces]
+        inside = [-(p[:, :3] @ points.T + p[:, 3:]).max(axis=0) for p in planes]
+        return max(0.0, float(np.max(inside)))
+
+    def _primitives(self, link: str) -> tuple[Geometry, ...]:
+        """A link's shapes if all are primitives."""
+        shapes = self._mechanism.links[link].collision or self._mechanism.links[link].visual
+        meshes = any(shape.kind in ("mesh", "triangles") for shape in shapes)
+        return () if meshes else shapes
+
+    def _add(self, spec: Any, body: Any, link: str) -> None:
+        for i, shape in enumerate(self._primitives(link)):
+            _add_primitive(spec, body, f"link:{link}:{i}", shape)
+        for i, points in enumerate(self.pieces(link)):
+            mesh = f"piece:{link}:{i}"
+            spec.add_mesh(name=mesh, uservert=points.ravel())
+            _add_geom(spec, body, "mesh", f"link:{link}:{i}", meshname=mesh)
 
 
 def _add_primitive(spec: Any, body: Any, name: str, shape: Geometry) -> None:

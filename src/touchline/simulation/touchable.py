@@ -46,13 +46,13 @@ class TouchableSurface:
     def __init__(self, robot: Robot, floor: float = 0.0) -> None:
         self._mj: Any = import_module("mujoco")
         self.robot, self.floor = robot, floor
-        built = build_model(robot, 1e-3, addition=surfaces_for_rays(robot.mechanism))
+        surfaces = {name: link_surface(link) for name, link in robot.mechanism.links.items()}
+        self.surfaces = {name: s for name, s in surfaces.items() if s is not None}
+        built = build_model(robot, 1e-3, addition=surfaces_for_rays(self.surfaces))
         self._model, self._data = built.model, self._mj.MjData(built.model)
         self._bodies = built.bodies
         names = {body: link for link, body in built.bodies.items()}
         self._owner = [names[body] for body in built.model.geom_bodyid]
-        surfaces = {name: link_surface(link) for name, link in robot.mechanism.links.items()}
-        self.surfaces = {name: s for name, s in surfaces.items() if s is not None}
 
     def draw(self, rng: np.random.Generator, links: Sequence[str]) -> SurfacePoint:
         """A point, uniform over the area of the links together.
@@ -132,12 +132,34 @@ def _shares(weights: Array) -> Array:
     return weights / weights.sum()
 
 
-def structure_links(robot: Robot) -> tuple[str, ...]:
-    """The links of the segment that has most of them: the arm itself, without hand or handle."""
-    segments: dict[str, list[str]] = {}
+def touchable_links(robot: Robot) -> dict[str, tuple[str, ...]]:
+    """The links with a shape by segment, without those that no joint moves and no sensor carries.
+
+    Raises:
+        InputError: there are none.
+    """
+    segments: dict[str, tuple[str, ...]] = {}
     for body in robot.bodies:
-        segments.setdefault(body.segment, []).extend(body.links)
-    return tuple(max(segments.values(), key=len))
+        if body.segment == "root" and not robot.joints_inboard_of(body):
+            continue
+        links = (robot.mechanism.links[name] for name in body.links)
+        shaped = tuple(link.name for link in links if link.collision or link.visual)
+        segments[body.segment] = segments.get(body.segment, ()) + shaped
+    segments = {name: links for name, links in segments.items() if links}
+    if not segments:
+        raise InputError(f"robot {robot.name}: no link has a shape that could be touched")
+    return segments
+
+
+def structure(robot: Robot) -> str:
+    """The segment that has most links: the arm itself, without hand or handle."""
+    segments = touchable_links(robot)
+    return max(segments, key=lambda name: len(segments[name]))
+
+
+def structure_links(robot: Robot) -> tuple[str, ...]:
+    """The touchable links of the structure, from the base outwards."""
+    return touchable_links(robot)[structure(robot)]
 
 
 def push_direction(normal: Array, friction: float, rng: np.random.Generator) -> Array:

@@ -136,7 +136,7 @@
     const y = (v) => TOP + ((high - v) / (high - low)) * (height - TOP - BOTTOM);
     const inner = width - LEFT - RIGHT;
     axis(svg, x, width, height);
-    const { list, digits } = ticks(low, high, 4);
+    const { list, digits } = ticks(low, high, 5);
     for (const v of list) {
       const kind = v === 0 ? "zero" : "grid";
       node("line", { x1: LEFT, x2: width - RIGHT, y1: y(v), y2: y(v), class: kind }, svg);

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from touchline import _core
 from touchline.model.description import AXES
 from touchline.model.tree import Node
+from touchline.native import core
 
 if TYPE_CHECKING:
     from touchline.model.robot import Robot
@@ -17,23 +17,23 @@ if TYPE_CHECKING:
 
 def native_observer(
     robot: Robot, method: str, discretization: str, bandwidth: float | None
-) -> _core.Observer:
+) -> core.Observer:
     """A native observer; `bandwidth` [rad/s] overrides the description's."""
-    return _core.Observer(
+    return core.Observer(
         [_node(node) for node in robot.nodes],
         robot.gravity.tolist(),
         [_joint_row(robot, i, bandwidth) for i in range(len(robot.joint_names))],
         [_sensor_row(robot, i, bandwidth) for i in range(len(robot.sensor_names))],
-        getattr(_core.Method, method),
-        getattr(_core.Discretization, discretization),
+        getattr(core.Method, method),
+        getattr(core.Discretization, discretization),
     )
 
 
-def _node(node: Node) -> _core.Node:
+def _node(node: Node) -> core.Node:
     T, body = node.T_parent_node, node.inertia
-    return _core.node(
+    return core.node(
         node.parent,
-        getattr(_core.NodeKind, node.kind),
+        getattr(core.NodeKind, node.kind),
         T[:3, :3].ravel().tolist(),
         T[:3, 3].tolist(),
         body.mass,
@@ -45,11 +45,11 @@ def _node(node: Node) -> _core.Node:
     )
 
 
-def _joint_row(robot: Robot, index: int, bandwidth: float | None) -> _core.JointRow:
+def _joint_row(robot: Robot, index: int, bandwidth: float | None) -> core.JointRow:
     joint = robot.description.joints[index]
-    row = _core.JointRow()
-    row.torque = getattr(_core.Torque, {"from": "from_sensors"}.get(joint.torque, joint.torque))
-    row.compensated = getattr(_core.Compensated, joint.compensated)
+    row = core.JointRow()
+    row.torque = getattr(core.Torque, {"from": "from_sensors"}.get(joint.torque, joint.torque))
+    row.compensated = getattr(core.Compensated, joint.compensated)
     row.sign, row.gain, row.bias, row.range = joint.sign, joint.gain, joint.bias, joint.range
     row.rotor_inertia = joint.rotor_inertia
     row.coulomb = joint.friction.coulomb
@@ -64,9 +64,9 @@ def _joint_row(robot: Robot, index: int, bandwidth: float | None) -> _core.Joint
     return row
 
 
-def _sensor_row(robot: Robot, index: int, bandwidth: float | None) -> _core.SensorRow:
+def _sensor_row(robot: Robot, index: int, bandwidth: float | None) -> core.SensorRow:
     sensor = robot.description.sensors[index]
-    row = _core.SensorRow()
+    row = core.SensorRow()
     row.node = next(i for i, node in enumerate(robot.nodes) if node.sensor == sensor.name)
     row.set_axes([axis in sensor.axes for axis in AXES])
     row.sign = 1.0 if sensor.polarity == "outboard" else -1.0

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`touchline simulate`."""
+
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+
+def simulate(
+    scenario: Annotated[Positional[str], arg(metavar="SCENARIO")],
+    /,
+    out: Annotated[Path, arg(metavar="LOG")],
+    robot: Annotated[str, arg(metavar="ROBOT")] = "sara",
+    seconds: Annotated[float | None, arg(metavar="S")] = None,
+    speed: Annotated[float | None, arg(metavar="RAD/S")] = None,
+    force: Annotated[float | None, arg(metavar="N")] = None,
+    seed: int = 0,
+    rate: float = 1000.0,
+    physics: float = 4000.0,
+    noise: bool = True,
+    model_error: float = 0.0,
+) -> int:
+    """Simulates a touched arm with MuJoCo; writes what its sensors report, and the truth.
+
+    Example: touchline simulate three_touches --out touches.parquet --speed 0.5
+
+    Scenarios: free_motion, three_touches, base_touch, singular_push, colliding_pushers,
+    random_pushes, demo. The log can be analyzed like that of a real robot: the columns truth.* are
+    never read by the estimator.
+
+    Args:
+        scenario: What happens.
+        out: The log: .parquet, .csv or .csv.gz.
+        robot: A robot that ships with Touchline, or a robot.yaml.
+        seconds: Duration.
+        speed: Of the fastest joint [rad/s]; 0: the arm is held.
+        force: Of each touch [N].
+        seed: Of motions, places and noise.
+        rate: Of the log [Hz]; divides physics.
+        physics: Rate of the physics [Hz].
+        noise: White noise and quantization of ordinary sensors.
+        model_error: 1 sigma of the relative error of the real arm's inertias.
+    """
+    from touchline.logs import write_table
+    from touchline.model.robot import load_robot
+    from touchline.simulation.noise import SensorNoise
+    from touchline.simulation.record import simulate_to_log
+    from touchline.simulation.scene import Run
+
+    given = {"seconds": seconds, "speed": speed, "force": force}
+    options = {name: value for name, value in given.items() if value is not None}
+    model = load_robot(robot)
+    sensors = SensorNoise() if noise else None
+    settings = Run(seed, rate, physics, noise=sensors, model_error=model_error)
+    simulated = simulate_to_log(scenario, model, out, write_table, settings, options)
+    truth = simulated.truth
+    links = sorted({truth.links[i] for i in truth.link.flat if i >= 0})
+    touched = f"touched: {', '.join(links)}" if links else "nothing touches the arm"
+    print(f"{out}: {len(simulated.samples)} samples at {rate:g} Hz of {model.name}; {touched}")
+    return 0

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A picture as part of a page: the image, and the words on it as text."""
+
+import base64
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.report.picture import COLOURS, Scene
+from touchline.report.render.camera import Camera, Size
+from touchline.report.render.png import png_bytes
+
+Array = NDArray[np.floating[Any]]
+
+APART = 13.0  # pixels between an arrow's tail and its label
+LINE = 19.0  # pixels between lines of text
+LETTER = 7.3  # pixels, roughly
+
+
+@dataclass(frozen=True)
+class Label:
+    """A text in a picture.
+
+    Attributes:
+        text: of one line.
+        place: (x, y) [pixels] of the middle of its left end, middle or right end.
+        anchor: which of them: "start", "middle" or "end".
+        colour: `#rrggbb`.
+    """
+
+    text: str
+    place: tuple[float, float]
+    anchor: str
+    colour: str
+
+    @property
+    def left(self) -> float:
+        """Where it begins [pixels], roughly."""
+        width = LETTER * len(self.text)
+        return self.place[0] - {"start": 0.0, "middle": 0.5, "end": 1.0}[self.anchor] * width
+
+    def meets(self, other: "Label") -> bool:
+        """Whether the two texts overlap."""
+        width, wide = LETTER * len(self.text), LETTER * len(other.text)
+        beside = self.left > other.left + wide or other.left > self.left + width
+        return not beside and abs(self.place[1] - other.place[1]) < LINE
+
+
+def labels(scene: Scene, camera: Camera, size: Size = (640, 640)) -> list[Label]:
+    """The labels of a scene's contacts, beside the tails of their arrows, none over another.
+
+    Args:
+        scene: with its contacts.
+        camera: that takes the picture.
+        size: of the picture [pixels].
+    """
+    placed: list[Label] = []
+    for mark in scene.marks:
+        if not mark.label:
+            continue
+        (tail, tip), _ = camera.project(np.array(scene.arrow(mark)), size)
+        label = _beside(tail, tail - tip, mark.label, COLOURS[mark.kind], size)
+        step = LINE if label.place[1] >= tail[1] else -LINE
+        while any(label.meets(other) for other in placed) and 0 < label.place[1] < size[1]:
+            place = (label.place[0], label.place[1] + step)
+            label = Label(label.text, place, label.anchor, label.colour)
+        placed.append(label)
+    return placed
+
+
+def _beside(tail: Array, out: Array, text: str, colour: str, size: Size) -> Label:
+    """A label beyond an arrow's tail, inside the picture."""
+    length = float(np.linalg.norm(out))
+    out = out / length if length > 4 else np.array([0.9, -0.44])
+    x, y = tail + APART * out
+    anchor = "start" if out[0] > 0.35 else "end" if out[0] < -0.35 else "middle"
+    width = LETTER * len(text)
+    before = {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor] * width
+    x = float(np.clip(x, 4 + before, max(size[0] - 4 - width + before, 4 + before)))
+    return Label(text, (x, float(np.clip(y, LINE / 2, size[1] - LINE / 2))), anchor, colour)
+
+
+def svg_picture(scene: Scene, camera: Camera, size: Size = (640, 640), title: str = "") -> str:
+    """The picture as an SVG element: the image inside it, the labels as text that stays sharp.
+
+    Args:
+        scene: what it shows.
+        camera: from where.
+        size: of the image [pixels]; the element takes the width of what it stands in.
+        title: what it shows, in words.
+    """
+    data = base64.b64encode(png_bytes(scene.render(camera, size))).decode("ascii")
+    width, height = size
+    words = "".join(_text(label) for label in labels(scene, camera, size))
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" role="img" '
+        f'aria-label="{escape(title)}"><title>{escape(title)}</title>'
+        f'<image width="{width}" height="{height}" href="data:image/png;base64,{data}"/>'
+        f"{words}</svg>"
+    )
+
+
+def _text(label: Label) -> str:
+    style = (
+        "font:600 14px system-ui,sans-serif;stroke:#fbfcfd;stroke-width:3.5px;"
+        f"stroke-linejoin:round;paint-order:stroke;fill:{label.colour}"
+    )
+    x, y = label.place
+    return (
+        f'<text x="{x:.1f}" y="{y + 5:.1f}" text-anchor="{label.anchor}" style="{style}">'
+        f"{escape(label.text)}</text>"
+    )
