@@ -62,7 +62,7 @@ def _picture(axes: Any, part: Application) -> None:
         if np.isfinite(located).all():
             view.point(axes, located, color)
     view.frame(axes, q[None])
-    axes.set_title(NAMES[part.name][0], loc="left", fontweight="bold", pad=3)
+    axes.set_title(NAMES[part.name][0], loc="left", fontweight="bold", pad=9)
     axes.set_anchor("W")
 
 

@@ -63,7 +63,7 @@ class ArmView:
         shade = AMBIENT + (1 - AMBIENT) * np.clip(normals @ towards_light, 0, 1)
         colors = np.clip(base * shade[:, None], 0, 1)[order]
         faces = PolyCollection(
-            triangles[order][:, :, [0, 2]],
+            list(triangles[order][:, :, [0, 2]]),
             facecolors=colors,
             edgecolors=colors,  # closes the hairlines between neighbours
             linewidths=0.25,

@@ -168,7 +168,7 @@ def _sweep(table: list[Row]) -> Any:
     axes[0].set_ylabel("largest false force [N]")
     values = ", ".join(f"{bandwidth:g}" for bandwidth in bandwidths)
     for height, words, method in (
-        (0.67, f"classical, from above\nK = {values}", "classical"),
+        (0.58, f"classical, from above\nK = {values}", "classical"),
         (0.21, "extended: paper's form,\nsegment form (dashed)", "segment"),
     ):
         axes[0].text(0.05, height, words, color=COLORS[method], transform=axes[0].transAxes)

@@ -22,7 +22,7 @@ from touchline.simulation.truth import Simulated
 
 Array = NDArray[np.float64]
 
-PUSHES = 16  # on each link
+PUSHES = 12  # on each link
 STRENGTH = 20.0  # of all pushes [N]
 NEAR, RIGHT = 0.02, 1.0  # what counts as success [m, N]
 SECONDS = 0.7  # of a case

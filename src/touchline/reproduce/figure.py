@@ -23,7 +23,7 @@ COLORS = {
 }
 SHADES = ("#1f5d94", "#c8602c", "#4f9a86", "#8a6bae", "#b8962e", "#6d7780", "#a8485f")
 POINTS = 2000  # of a curve, at most
-STYLE: dict[str, Any] = {
+STYLE: Any = {
     "font.family": "STIXGeneral",
     "mathtext.fontset": "stix",
     "font.size": 8,
