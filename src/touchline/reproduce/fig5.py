@@ -22,7 +22,7 @@ from touchline.simulation.pushers import CollidingPushers, Pusher
 from touchline.simulation.scene import Run, make_plant
 from touchline.simulation.sensing import sense
 from touchline.simulation.setup import read_setup
-from touchline.simulation.shapes import shapes_for_collisions
+from touchline.simulation.shapes import CollisionShapes
 from touchline.simulation.simulator import run as run_plant
 from touchline.simulation.truth import Simulated
 
@@ -112,7 +112,7 @@ def pushed(seed: int = 0) -> Pushes:
         _ball(finder, poses, "hand", "tool", start=0.9, force=150.0, hold_time=1.5),
     ]
     balls = CollidingPushers(pushers)
-    shapes = shapes_for_collisions(robot.mechanism, {pusher.link for pusher in pushers})
+    shapes = CollisionShapes(robot.mechanism).addition(pusher.link for pusher in pushers)
 
     def add(spec, bodies) -> None:
         shapes(spec, bodies)
