@@ -74,8 +74,8 @@ def read_truth(log: Path) -> list[TrueContact]:
     if not columns:
         return []
     table = pq.read_table(log, columns=["time", *columns])
-    data = {name: table.column(name).to_numpy() for name in table.column_names}
-    links = next(
+    data = {name: np.asarray(table.column(name)) for name in table.column_names}
+    links: list[str] = next(
         value["truth.links"]
         for value in map(json.loads, (schema.metadata or {}).values())
         if isinstance(value, dict) and "truth.links" in value
@@ -95,7 +95,7 @@ def _contacts(data: dict[str, Array], slot: int, links: Sequence[str]) -> list[T
             part = slice(start, stop)
             point = np.stack([data[f"{prefix}.{axis}"][part] for axis in "xyz"], axis=1)
             force = np.stack([data[f"{prefix}.f{axis}"][part] for axis in "xyz"], axis=1)
-            found.append(TrueContact(links[link[start]], data["time"][part], point, force))
+            found.append(TrueContact(links[int(link[start])], data["time"][part], point, force))
     return found
 
 
