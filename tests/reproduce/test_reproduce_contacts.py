@@ -43,7 +43,9 @@ def test_only_the_printed_form_leaves_a_ghost_in_recoil(pushes):
 
 
 def test_a_ball_is_drawn_back_at_once_and_out_of_the_way():
-    ball = fig5.QuickRelease("ball", "tool", (0, 0, 0), (0, 1, 0), start=1.0, force=50.0, hold=1.0)
+    ball = fig5.QuickRelease(
+        "ball", "tool", (0, 0, 0), (0, 1, 0), start=1.0, hold=1.0, force=50.0, stiffness=1000.0
+    )
     reach = ball.travel(ball.release)
     assert reach == pytest.approx(0.054) and ball.travel(0.5) == 0.0
     assert ball.travel(ball.release + reach / ball.retreat) == pytest.approx(0.0)

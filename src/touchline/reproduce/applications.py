@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from touchline.estimation.joint_momentum import JointMomentumObserver, tool_wrench
 from touchline.model.robot import Robot, load_robot
+from touchline.reproduce.aim import place_along
 from touchline.reproduce.experiment import Check, Experiment, Row, Table, Tick
 from touchline.reproduce.figure import thin
 from touchline.reproduce.replay import FORCE, Replay
@@ -56,7 +57,7 @@ def screw(robot: Robot, seed: int) -> Application:
     setup = read_setup(robot)
     trajectory = _turning(setup)
     finder = PlaceFinder(robot, trajectory, np.random.default_rng([seed, 31]))
-    elbow = finder.find(("link3", "link4"), 1.5, 4.0, direction=np.array([0.0, 0.0, 1.0]))
+    elbow = place_along(finder, ("link3", "link4"), (0.0, 0.0, -1.0), (1.5, 4.0))
     contacts = [
         ScriptedContact(
             "tool",
@@ -83,7 +84,7 @@ def teaching(robot: Robot, seed: int) -> Application:
     finder = PlaceFinder(robot, trajectory, np.random.default_rng([seed, 32]))
     contacts = []
     for start, axis in ((0.5, (0.0, 1.0, 0.0)), (2.0, (1.0, 0.0, 0.0)), (3.4, (0.0, 0.0, 1.0))):
-        grip = finder.find(("handle",), start, start, direction=np.array(axis))
+        grip = place_along(finder, ("handle",), axis, (start, start))
         profile = Profile(start, hold=0.6, rise=0.25, fall=0.25)
         contacts.append(ScriptedContact("handle", grip.at.point, HAND * grip.direction, profile))
     drag = Profile(1.2, hold=2.6, rise=0.2, fall=0.2)

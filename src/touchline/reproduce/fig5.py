@@ -7,11 +7,13 @@ ghost.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from touchline.model.robot import load_robot
+from touchline.reproduce.aim import place_along
 from touchline.reproduce.experiment import Check, Experiment, Row, Table, Tick
 from touchline.reproduce.figure import thin
 from touchline.reproduce.replay import FORCE, Replay
@@ -112,10 +114,10 @@ def pushed(seed: int = 0) -> Pushes:
         _ball(finder, poses, "hand", "tool", start=0.9, force=150.0, hold_time=1.5),
     ]
     balls = CollidingPushers(pushers)
-    shapes = CollisionShapes(robot.mechanism).addition(pusher.link for pusher in pushers)
+    add_shapes = CollisionShapes(robot.mechanism).addition(pusher.link for pusher in pushers)
 
-    def add(spec, bodies) -> None:
-        shapes(spec, bodies)
+    def add(spec: Any, bodies: dict[str, Any]) -> None:
+        add_shapes(spec, bodies)
         balls.add(spec, bodies)
 
     settings = Run(seed=seed)
@@ -140,11 +142,7 @@ def _ball(
     hold_time: float,
 ) -> QuickRelease:
     """A ball that pushes a link sideways, to the left."""
-    side = np.array([0.0, 1.0, 0.0])
-    while True:
-        place = finder.find((link,), 0.0, 0.0, clearance=0.06, direction=side)
-        if place.direction @ side > 0:
-            break
+    place = place_along(finder, (link,), (0.0, 1.0, 0.0), clearance=0.06, either_way=False)
     T = poses[link]
     point = T[:3, :3] @ place.at.point + T[:3, 3]
     spring = {"stiffness": 600.0, "speed": 0.4, "radius": 0.06}

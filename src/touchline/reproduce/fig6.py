@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.model.robot import Robot, load_robot
+from touchline.reproduce.aim import place_along
 from touchline.reproduce.experiment import Check, Experiment, Row, Table, Tick
 from touchline.reproduce.replay import Replay
 from touchline.reproduce.wrench_routes import METHODS, NAMES, Routes
@@ -90,9 +91,9 @@ def _simulated(name: str, robot: Robot, settings: Run) -> Simulated:
     setup, rng = read_setup(robot), np.random.default_rng([settings.seed, 61])
     stretched = name == "stretched arm"
     pose = setup.stretched if stretched else setup.home
-    direction = np.array([0.0, 0.0, 1.0] if stretched else [0.0, 1.0, 0.0])
+    direction = (0.0, 0.0, 1.0) if stretched else (0.0, 1.0, 0.0)
     finder = PlaceFinder(robot, hold(pose), rng)
-    place = finder.find(OUTER if stretched else ("link1",), 0.0, 0.0, direction=direction)
+    place = place_along(finder, OUTER if stretched else ("link1",), direction)
     force = STRENGTH * place.direction
     contact = ScriptedContact(place.link, place.at.point, force, Profile(0.2, hold=0.4))
     return scripted(robot, [contact], SECONDS, settings=settings, start=pose)

@@ -25,8 +25,8 @@ PAGE = """<!doctype html>
 <p class="soft">M. Iskandar, O. Eiberger, A. Albu-Sch&auml;ffer, A. De Luca, A. Dietrich:
 Collision detection, identification, and localization on the DLR SARA robot with sensing
 redundancy, ICRA 2021. Simulated here on an arm of the same class and layout, whose geometry and
-numbers are not DLR's; forces and lengths are therefore not to be compared with the paper's figure
-by figure. Written by <code>touchline reproduce</code>, version {version}.</p>
+numbers are not DLR's; forces and lengths are therefore not to be compared with the paper's number
+by number. Written by <code>touchline reproduce</code>, version {version}.</p>
 {body}
 </main>
 </body>
