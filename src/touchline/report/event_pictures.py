@@ -19,7 +19,7 @@ from touchline.report.views import views_of_contact
 
 Array = NDArray[np.floating[Any]]
 
-MOST_PICTURED = 12  # events; each brings some 130 kB to the page
+MOST_PICTURED = 6  # events; each brings some 130 kB to the page
 SIZE = (520, 520)
 WORTH_DRAWING = 0.03  # probability of a candidate
 
