@@ -14,7 +14,7 @@ test: .venv/ready
 check: .venv/ready
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
-	.venv/bin/pyright
+	.venv/bin/pyright --pythonpath $(PYTHON)
 	.venv/bin/lint-imports
 
 format: .venv/ready
