@@ -4,10 +4,10 @@
 import os
 import sys
 from collections.abc import Iterator, Sequence
-from importlib.resources import files
 from pathlib import Path
 from urllib.parse import unquote, urlparse
 
+ROBOTS = Path(__file__).parents[1] / "robots"  # that ship with Touchline
 # Distributions on PyPI that bring model files, by the name of their ROS package.
 PYPI_DATA = {"example-robot-data": "example-robot-data"}
 
@@ -55,9 +55,8 @@ def resolve_robot(name: str) -> Path:
 
 def shipped_robots() -> dict[str, Path]:
     """Return the model file of each robot that ships with Touchline, by name."""
-    root = Path(str(files("touchline"))) / "robots"
     found = {}
-    for folder in sorted(root.iterdir()) if root.is_dir() else ():
+    for folder in sorted(ROBOTS.iterdir()) if ROBOTS.is_dir() else ():
         for stem in (folder.name, "model"):
             for suffix in (".xml", ".urdf"):
                 file = folder / f"{stem}{suffix}"
@@ -68,8 +67,7 @@ def shipped_robots() -> dict[str, Path]:
 
 def shipped_descriptions() -> dict[str, Path]:
     """Return the `robot.yaml` of each robot that ships with Touchline, by name."""
-    root = Path(str(files("touchline"))) / "robots"
-    return {file.parent.name: file for file in sorted(root.glob("*/robot.yaml"))}
+    return {file.parent.name: file for file in sorted(ROBOTS.glob("*/robot.yaml"))}
 
 
 def installed_shares(package: str) -> Iterator[Path]:

@@ -4,7 +4,7 @@
 import base64
 import json
 from html import escape
-from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -52,7 +52,7 @@ segments in world axes about the world origin. Not a certified safety function.<
 
 def page_text(analysis: Analysis) -> str:
     """The whole page."""
-    assets = files("touchline.report") / "assets"
+    assets = Path(__file__).parent / "assets"
     body = [
         _header(analysis),
         _warnings(analysis),
