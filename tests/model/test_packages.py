@@ -73,7 +73,7 @@ def test_shipped_robots(tree, monkeypatch):
         (tree / "robots" / name).mkdir(parents=True)
     model = touch(tree / "robots/sara/sara.xml")
     touch(tree / "robots/other/notes.txt")
-    monkeypatch.setattr(packages, "files", lambda _: tree)
+    monkeypatch.setattr(packages, "ROBOTS", tree / "robots")
     assert packages.resolve_robot("sara") == model
     with pytest.raises(FileNotFoundError, match="no robot 'saar' ships with.*there are: sara"):
         packages.resolve_robot("saar")
