@@ -174,3 +174,21 @@ def test_the_demo_finds_every_touch(tmp_path, capsys):
     assert printed.count("located") == 4
     assert (tmp_path / "r" / "report.html").is_file()
     assert main(["demo", "--headless", "--duration", "-1", "--out", out]) == 2
+
+
+def test_a_simulated_log_that_cannot_be_written_is_told_before_the_work(tmp_path, capsys):
+    (tmp_path / "file").touch()
+    for out in (tmp_path / "file" / "log.parquet", tmp_path / "log.foo"):
+        assert main(["simulate", "demo", "--out", str(out)]) == 2
+        assert str(out) in capsys.readouterr().err
+    assert main(["demo", "--headless", "--out", str(tmp_path / "file")]) == 2
+    assert "cannot be written" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "option", ["--seconds=-1", "--seconds=nan", "--rate=0", "--rate=300", "--speed=-1"]
+)
+def test_impossible_numbers_of_a_simulation(option, tmp_path, capsys):
+    out = str(tmp_path / "log.csv")
+    assert main(["simulate", "free_motion", "--out", out, option]) == 2
+    assert option.partition("=")[0] in capsys.readouterr().err

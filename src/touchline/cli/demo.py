@@ -41,7 +41,6 @@ def demo(
     if not 4.0 <= duration <= 600.0:
         raise InputError(f"--duration {duration}: allowed: 4 to 600 s")
     robot = load_robot("sara")
-    out.mkdir(parents=True, exist_ok=True)
     print(f"simulating {duration:g} s of the arm being touched (as long on a slow machine) ...")
     log = out / "demo.parquet"
     settings = Run(seed, noise=SensorNoise())

@@ -6,6 +6,8 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
+from touchline.errors import InputError
+
 
 def simulate(
     scenario: Annotated[Positional[str], arg(metavar="SCENARIO")],
@@ -48,6 +50,11 @@ def simulate(
     from touchline.simulation.record import simulate_to_log
     from touchline.simulation.scene import Run
 
+    _check_numbers(rate=rate, physics=physics, seconds=seconds, force=force)
+    if not (0.0 <= model_error < 1.0 and (speed is None or 0.0 <= speed < float("inf"))):
+        raise InputError("--speed: allowed: 0 or more; --model-error: 0 to below 1")
+    if physics % rate:
+        raise InputError(f"--rate {rate:g}: does not divide --physics {physics:g}")
     given = {"seconds": seconds, "speed": speed, "force": force}
     options = {name: value for name, value in given.items() if value is not None}
     model = load_robot(robot)
@@ -59,3 +66,9 @@ def simulate(
     touched = f"touched: {', '.join(links)}" if links else "nothing touches the arm"
     print(f"{out}: {len(simulated.samples)} samples at {rate:g} Hz of {model.name}; {touched}")
     return 0
+
+
+def _check_numbers(**options: float | None) -> None:
+    for name, value in options.items():
+        if value is not None and not 0.0 < value < float("inf"):
+            raise InputError(f"--{name} {value:g}: must be a positive number")

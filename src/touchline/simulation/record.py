@@ -36,7 +36,7 @@ def simulate_to_log(
         options: further arguments of the scenario, such as `seconds` and `speed`.
 
     Raises:
-        InputError: there is no such scenario, or it has no such option.
+        InputError: there is no such scenario, it has no such option, or the log cannot be written.
     """
     run = find_scenario(scenario)
     options = dict(options or {})
@@ -50,6 +50,7 @@ def simulate_to_log(
             f"allowed: {', '.join(known)}"
             for name in unknown
         )
+    _prepare(Path(out))
     simulated = run(robot, settings=settings or Run(noise=SensorNoise()), **options)
     keeps = Path(out).suffix == ".parquet"
     metadata = simulated.metadata | {"truth.links": list(simulated.truth.links)}
@@ -70,3 +71,14 @@ def find_scenario(name: str) -> Callable[..., Simulated]:
             f"there are: {', '.join(SCENARIOS)}"
         )
     return SCENARIOS[name]
+
+
+def _prepare(out: Path) -> None:
+    """Make the log's folder before the work begins, so that nothing simulated is lost."""
+    if not out.name.endswith((".parquet", ".csv", ".csv.gz")):
+        raise InputError(f"{out}: a table's name ends in .parquet, .csv or .csv.gz")
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        out.open("ab").close()
+    except OSError as error:
+        raise InputError(f"{out}: cannot be written: {error.strerror}") from error
