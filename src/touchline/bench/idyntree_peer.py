@@ -7,14 +7,20 @@ needs the joints' accelerations and the links in contact, and does not filter.
 """
 
 import tempfile
+import warnings
+from collections.abc import Mapping
 from pathlib import Path
 
-import idyntree.swig as idyntree
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.bench.urdf import robot_urdf, sensor_link
+from touchline.bench.urdf import node_link, robot_urdf, sensor_link
+from touchline.errors import InputError
 from touchline.model.robot import Robot
+
+with warnings.catch_warnings():  # its types lack a __module__; as an error that ends Python
+    warnings.simplefilter("ignore")
+    import idyntree.swig as idyntree
 
 Array = NDArray[np.float64]
 
@@ -23,13 +29,15 @@ class IdyntreeEstimator:
     """`ExtWrenchesAndJointTorquesEstimator` with one unknown wrench per part.
 
     Args:
-        robot: the robot; each of its sensors begins a part, whose first link is in contact.
+        robot: the robot; each of its sensors begins a part.
+        contacts: by sensor, the link in contact on its part; default: the first of the part.
 
     Raises:
+        InputError: a link in contact is on another part.
         RuntimeError: if iDynTree refuses the model.
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, contacts: Mapping[str, str] | None = None) -> None:
         self.estimator = idyntree.ExtWrenchesAndJointTorquesEstimator()
         names = idyntree.StringVector()
         for name in robot.joint_names:
@@ -41,7 +49,8 @@ class IdyntreeEstimator:
             if not load(str(path), names):
                 raise RuntimeError("iDynTree refuses the model")
         model, sensors = self.estimator.model(), self.estimator.sensors()
-        self.links = [sensor_link(name) for name in robot.sensor_names]
+        self.nodes = [_contact_node(robot, s, contacts or {}) for s in robot.sensor_names]
+        self.links = [node_link(robot, node) for node in self.nodes]
         self.unknowns = idyntree.LinkUnknownWrenchContacts(model)
         for link in ("world", *self.links):
             contact = idyntree.UnknownWrenchContact()
@@ -79,10 +88,22 @@ class IdyntreeEstimator:
         )
 
     def update(self, q: Array, qd: Array, qdd: Array, wrench: Array) -> list[Array]:
-        """One sample, numpy in and out: the wrench on each part, in its sensor's frame."""
+        """One sample, numpy in and out: the wrench on each part, in the frame of its node.
+
+        Those are `nodes`: the one that carries the link in contact, or the sensor's own.
+        """
         self.estimate(*self.convert(q, qd, qdd, wrench))
         contact = self.wrenches.contactWrench
         return [contact(link, 0).contactWrench.toNumPy() for link in self.link_index]
+
+
+def _contact_node(robot: Robot, sensor: str, contacts: Mapping[str, str]) -> int:
+    if sensor not in contacts:
+        return next(i for i, node in enumerate(robot.nodes) if node.sensor == sensor)
+    body = robot.body_of(contacts[sensor])
+    if body.segment != sensor:
+        raise InputError(f"link {contacts[sensor]} is on part {body.segment}, not on {sensor}")
+    return body.node
 
 
 def _wrench(values: Array) -> object:

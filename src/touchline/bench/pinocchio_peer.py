@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from touchline.bench.urdf import robot_urdf, sensor_joint
 from touchline.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -96,42 +97,18 @@ class PinocchioObserver:
 
 
 def build_model(robot: Robot, sensors: bool = True) -> tuple[pin.Model, dict[str, int]]:
-    """Pinocchio's model of a robot, and its indices of our joints and sensors by name.
+    """Pinocchio's model of a robot's URDF, and its indices of our joints and sensors by name.
 
     Args:
         robot: the robot.
         sensors: keep each sensor as a free joint; False lumps what it carries.
     """
-    model = pin.Model()
+    model = pin.buildModelFromXML(robot_urdf(robot, free_sensors=sensors))
     model.gravity = pin.Motion(robot.gravity, np.zeros(3))
-    ids: dict[str, int] = {}
-    carriers: dict[int, tuple[int, pin.SE3]] = {}  # per node: its joint, and its pose there
-    for index in _depth_first(robot):
-        node = robot.nodes[index]
-        joint, placement = carriers[node.parent] if node.parent >= 0 else (0, pin.SE3.Identity())
-        placement = placement * pin.SE3(node.T_parent_node)
-        name = node.joint or (node.sensor if sensors else None)
-        if name is not None:
-            kinds = {"revolute": pin.JointModelRZ, "prismatic": pin.JointModelPZ}
-            kind = kinds.get(node.kind, pin.JointModelFreeFlyer)
-            joint = ids[name] = model.addJoint(joint, kind(), placement, name)
-            placement = pin.SE3.Identity()
-        body = node.inertia
-        model.appendBodyToJoint(joint, pin.Inertia(body.mass, body.com, body.inertia), placement)
-        carriers[index] = joint, placement
+    ids = {name: model.getJointId(name) for name in robot.joint_names}
+    if sensors:
+        ids |= {name: model.getJointId(sensor_joint(name)) for name in robot.sensor_names}
     return model, ids
-
-
-def _depth_first(robot: Robot) -> list[int]:
-    """The nodes with each subtree in one piece: Pinocchio assumes that and does not check it."""
-    children: dict[int, list[int]] = {}
-    for i, node in enumerate(robot.nodes):
-        children.setdefault(node.parent, []).append(i)
-    order, pending = [], children.get(-1, [])[::-1]
-    while pending:
-        order.append(pending.pop())
-        pending += children.get(order[-1], [])[::-1]
-    return order
 
 
 def _successors(model: pin.Model, sensor_ids: list[int]) -> list[list[int]]:

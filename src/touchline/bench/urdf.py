@@ -13,23 +13,39 @@ from touchline.model.tree import Node
 Array = NDArray[np.float64]
 
 
-def robot_urdf(robot: Robot) -> str:
-    """The robot's nodes as a URDF with its sensors as fixed joints, in iDynTree's dialect."""
+def robot_urdf(robot: Robot, free_sensors: bool = False) -> str:
+    """The robot's nodes as a URDF with its sensors as joints, in iDynTree's dialect.
+
+    Args:
+        robot: the robot; without joints that mimic others.
+        free_sensors: sensors are joints of type `floating` instead of `fixed`.
+    """
     root = ElementTree.Element("robot", name=robot.name)
     # A root without mass would be removed with the sensor on it; this one loads nothing.
     _add_link(root, "world", Inertia(1.0, np.zeros(3), np.eye(3)))
-    names = [_node_name(node, i) for i, node in enumerate(robot.nodes)]
+    carriers = {-1: ("world", np.eye(4))}
     for i, node in enumerate(robot.nodes):
-        _add_link(root, names[i], node.inertia)
-        parent = names[node.parent] if node.parent >= 0 else "world"
-        _add_joint(root, node, parent, names[i])
+        parent, T = carriers[node.parent]
+        T = T @ node.T_parent_node
+        if node.parent < 0 and node.joint is None and node.sensor is None:
+            carriers[i] = parent, T  # stands still, and nothing feels its weight
+            continue
+        carriers[i] = node_link(robot, i), np.eye(4)
+        _add_link(root, node_link(robot, i), node.inertia)
+        _add_joint(root, node, T, parent, node_link(robot, i), free_sensors)
         if node.sensor is not None:
             sensor = ElementTree.SubElement(root, "sensor", name=node.sensor, type="force_torque")
-            ElementTree.SubElement(sensor, "parent", joint=f"{names[i]}_joint")
+            ElementTree.SubElement(sensor, "parent", joint=sensor_joint(node.sensor))
             settings = ElementTree.SubElement(sensor, "force_torque")
             ElementTree.SubElement(settings, "frame").text = "child"
             ElementTree.SubElement(settings, "measure_direction").text = "parent_to_child"
     return ElementTree.tostring(root, encoding="unicode")
+
+
+def node_link(robot: Robot, index: int) -> str:
+    """Name of the link that a node has become; its frame is the node's."""
+    node = robot.nodes[index]
+    return sensor_link(node.sensor) if node.sensor else f"{node.joint}_body"
 
 
 def sensor_link(sensor: str) -> str:
@@ -37,8 +53,9 @@ def sensor_link(sensor: str) -> str:
     return f"{sensor}_body"
 
 
-def _node_name(node: Node, index: int) -> str:
-    return sensor_link(node.sensor) if node.sensor else f"{node.joint or index}_body"
+def sensor_joint(sensor: str) -> str:
+    """Name of the joint that a sensor has become."""
+    return f"{sensor_link(sensor)}_joint"
 
 
 def _add_link(root: ElementTree.Element, name: str, body: Inertia) -> None:
@@ -51,19 +68,18 @@ def _add_link(root: ElementTree.Element, name: str, body: Inertia) -> None:
     ElementTree.SubElement(inertial, "inertia", values)
 
 
-def _add_joint(root: ElementTree.Element, node: Node, parent: str, child: str) -> None:
-    moving = {"revolute": "continuous", "prismatic": "prismatic"}
-    joint = ElementTree.SubElement(
-        root, "joint", name=node.joint or f"{child}_joint", type=moving.get(node.kind, "fixed")
-    )
+def _add_joint(
+    root: ElementTree.Element, node: Node, T: Array, parent: str, child: str, free: bool
+) -> None:
+    moving = {"revolute": "revolute", "prismatic": "prismatic"}
+    kind = moving.get(node.kind, "floating" if free else "fixed")
+    joint = ElementTree.SubElement(root, "joint", name=node.joint or f"{child}_joint", type=kind)
     ElementTree.SubElement(joint, "parent", link=parent)
     ElementTree.SubElement(joint, "child", link=child)
-    T = node.T_parent_node
     origin = {"xyz": _numbers(T[:3, 3]), "rpy": _numbers(_rpy(T[:3, :3]))}
     ElementTree.SubElement(joint, "origin", origin)
     if node.coordinate >= 0:
         ElementTree.SubElement(joint, "axis", xyz="0 0 1")
-    if node.kind == "prismatic":
         ElementTree.SubElement(joint, "limit", lower="-9", upper="9", effort="0", velocity="0")
 
 

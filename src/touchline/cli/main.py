@@ -40,6 +40,7 @@ EXTRAS = {
     "collada": "meshes",
     "matplotlib": "report",
     "pinocchio": "bench",
+    "idyntree": "bench",
     "example_robot_data": "bench",
 }
 INTERRUPTED = 130
