@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.bench.urdf import node_link, robot_urdf, sensor_link
+from touchline.bench.urdf import node_link, robot_urdf
 from touchline.errors import InputError
 from touchline.model.robot import Robot
 
