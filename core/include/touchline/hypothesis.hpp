@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "touchline/dense.hpp"
-#include "touchline/measurement.hpp"
 #include "touchline/mesh.hpp"
+#include "touchline/quadratic.hpp"
 
 namespace touchline {
 
@@ -23,6 +23,9 @@ struct LocalizerSettings {
   double place_radius = 0.0225;   // explanations nearer than this are one place [m]
   double finger = 0.03;           // free space that a push comes from [m]
   bool first_entry = false;       // the paper's rule
+
+  // A place that is less sure than this is not located [m].
+  double spread_limit() const { return 4.0 * place_radius; }
 };
 
 struct Fit {

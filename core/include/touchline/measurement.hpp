@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a segment's sensors say of one contact on one of its bodies, weighed by the covariance of
-// the noise: chi2(w) = constant - 2 vector . w + w^T information w, for the contact's wrench w in
-// world axes about the world origin. The same for every layout: a six-axis sensor at the inboard
-// end, joint torques, sensors of fewer axes, or what there is of them. No allocation per sample.
+// the noise. The same for every layout: a six-axis sensor at the inboard end, joint torques, sensors
+// of fewer axes, or what there is of them. No allocation per sample.
 #pragma once
 
 #include <algorithm>
@@ -13,56 +12,10 @@
 #include "touchline/detector.hpp"
 #include "touchline/observer.hpp"
 #include "touchline/posture.hpp"
+#include "touchline/quadratic.hpp"
+#include "touchline/row_noise.hpp"
 
 namespace touchline {
-
-// One sigma per sample of the signals, and what no filter takes away.
-struct NoiseFigures {
-  std::vector<double> qd, tau, wrench;  // n, n, 6 k
-  double period = 1e-3;                 // between samples [s]
-  // Errors of gains and model, as a part of the load.
-  double wrench_error = 0.0, torque_error = 0.0;
-  double force = 2e-3, moment = 5e-4;   // floors [N, Nm]
-};
-
-struct Quadratic {
-  double information[36];
-  double vector[6];
-  double constant;
-
-  double operator()(const double* w) const {
-    double chi2 = constant;
-    for (int i = 0; i < 6; ++i) {
-      double row = -2.0 * vector[i];
-      for (int j = 0; j < 6; ++j) row += information[6 * i + j] * w[j];
-      chi2 += row * w[i];
-    }
-    return chi2;
-  }
-};
-
-// Adds an unknown moment of `sigma` [Nm] about each axis to what is measured of a wrench; returns
-// the logarithm of how much wider the measurements' distribution gets, the half of it.
-inline double loosen(Quadratic& q, double sigma) {
-  double M[9], x[3][7];  // solutions for the information and the vector, by row
-  const double inverse = 1.0 / (sigma * sigma);
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j)
-      M[3 * i + j] = q.information[6 * (3 + i) + 3 + j] + (i == j ? inverse : 0.0);
-    for (int j = 0; j < 6; ++j) x[i][j] = q.information[6 * (3 + i) + j];
-    x[i][6] = q.vector[3 + i];
-  }
-  if (!cholesky(M, 3)) return 0.0;
-  for (int j = 0; j < 7; ++j) solve_lower(M, 3, &x[0][j], 7);
-  for (int k = 0; k < 3; ++k) {
-    for (int i = 0; i < 6; ++i) {
-      for (int j = 0; j < 6; ++j) q.information[6 * i + j] -= x[k][i] * x[k][j];
-      q.vector[i] -= x[k][i] * x[k][6];
-    }
-    q.constant -= x[k][6] * x[k][6];
-  }
-  return 0.5 * (log_determinant(M, 3) - 3.0 * std::log(inverse));
-}
 
 class Measurement {
  public:
@@ -70,17 +23,16 @@ class Measurement {
       : observer_(observer),
         posture_(observer.tree(), observer.row_layout().joints),
         tests_(std::move(tests)),
-        noise_(std::move(noise)),
         layout_(observer.row_layout()),
+        noise_(observer, posture_, std::move(noise), 6 + layout_.joints + 6 * layout_.sensors),
         joint_offsets_(layout_.joints) {
     for (int g = 0; g < layout_.segments; ++g) rows_.push_back(rows_of(g));
     std::size_t most = 0;
     for (const auto& rows : rows_) most = std::max(most, rows.size());
-    const std::size_t size = 6 + most, sources = 6 * layout_.sensors + 2 * layout_.joints;
+    const std::size_t size = 6 + most;
     used_.resize(most);
     own_.resize(most);
     outboard_.resize(most);
-    coefficients_.resize(size * sources);
     factor_.resize(size * size);
     design_.resize(size * 7);
   }
@@ -261,7 +213,7 @@ class Measurement {
         loaded = true;
       }
     } else if (observer_.layout().is_outboard(node, observer_.sensors()[r.sensor].node)) {
-      sum = axis_in_world(r.sensor, r.axis);
+      sum = posture_.axis(observer_.sensors()[r.sensor].node, r.axis);
       loaded = true;
     }
     // The power of a wrench along a twist [v; w]: f . v + m . w.
@@ -269,131 +221,30 @@ class Measurement {
     return loaded;
   }
 
-  // The twist whose product with a wrench is the sensor's reading of that axis.
-  Spatial axis_in_world(int sensor, int axis) const {
-    const Pose& X = posture_.pose(observer_.sensors()[sensor].node);
-    const Vec3 columns[3] = {X.R.x, X.R.y, X.R.z};
-    const Vec3& a = columns[axis % 3];
-    if (axis < 3) return {a, {}};
-    return {cross(X.p, a), a};
-  }
-
-  // How a first-order filter passes noise: of readings, averaged over each interval, and of
-  // velocities, which enter through a difference of momenta.
-  struct Gains {
-    double reading, velocity;
-  };
-  Gains gains(double bandwidth) const {
-    const double dt = noise_.period, a = pole(bandwidth, dt, Discretization::automatic);
-    return {std::sqrt(std::min(1.0, 0.5 * (1.0 - a))),
-            (1.0 - a) / dt * std::sqrt(2.0 / (1.0 + a))};
-  }
-
   // The covariance of all rows, from the sources of noise, and its Cholesky factor.
   bool weigh() {
-    const int sources = 6 * layout_.sensors + 2 * layout_.joints, first = has_wrench_ ? 6 : 0;
-    std::fill(coefficients_.begin(), coefficients_.end(), 0.0);
-    if (has_wrench_) weigh_wrench(sources);
-    for (int i = 0; i < count_; ++i) weigh_row(i, coefficients_.data() + (first + i) * sources);
-    for (int a = 0; a < size_; ++a) {
-      for (int b = 0; b <= a; ++b) {
-        const double* x = coefficients_.data() + a * sources;
-        const double* y = coefficients_.data() + b * sources;
-        double sum = 0.0;
-        for (int k = 0; k < sources; ++k) sum += x[k] * y[k];
-        factor_[a * size_ + b] = sum;
+    noise_.clear();
+    const int first = has_wrench_ ? 6 : 0;
+    if (has_wrench_) {
+      noise_.add_wrench(0, observer_.layout().segments[segment_],
+                        {{wrench_[0], wrench_[1], wrench_[2]}, {wrench_[3], wrench_[4], wrench_[5]}});
+    }
+    for (int i = 0; i < count_; ++i) {
+      const Row& r = *used_[i];
+      if (r.joint >= 0) {
+        noise_.add_joint(first + i, r.joint, own_[i]);
+      } else {
+        noise_.add_axis(first + i, r.sensor, r.axis, own_[i]);
       }
-      const double least = a < (has_wrench_ ? 3 : 0) ? noise_.force : noise_.moment;
-      factor_[a * size_ + a] += least * least;
     }
-    return cholesky(factor_.data(), size_, 1e-15);
-  }
-
-  void weigh_wrench(int sources) {
-    const Segment& segment = observer_.layout().segments[segment_];
-    const Gains g = gains(observer_.sensors()[segment.sensor].bandwidth);
-    add_sensor(segment.sensor, g, 1.0, sources, load_error(segment.sensor));
-    for (int t : segment.successors) add_sensor(t, g, -1.0, sources, Spatial{});
-  }
-
-  // The error of gains and model, which grows with the load, by the sensor's axes.
-  Spatial load_error(int sensor) const {
-    const Spatial w = wrench_to_child(posture_.pose(observer_.sensors()[sensor].node),
-                                      {{wrench_[0], wrench_[1], wrench_[2]},
-                                       {wrench_[3], wrench_[4], wrench_[5]}});
-    return {{noise_.wrench_error * norm3(w.linear), 0.0, 0.0},
-            {noise_.wrench_error * norm3(w.angular), 0.0, 0.0}};
-  }
-  static double norm3(const Vec3& v) { return std::sqrt(dot(v, v)); }
-
-  void add_sensor(int s, const Gains& g, double sign, int sources, const Spatial& error) {
-    const int node = observer_.sensors()[s].node, n = layout_.joints;
-    for (int a = 0; a < 6; ++a) {
-      const double filtered = g.reading * noise_.wrench[6 * s + a];
-      const double load = a < 3 ? error.linear.x : error.angular.x;
-      add_column(6 * s + a, unit_wrench(node, a),
-                 sign * std::sqrt(filtered * filtered + load * load), sources);
-    }
-    for (int i = 0; i < n; ++i)
-      add_column(6 * layout_.sensors + n + i, posture_.momentum(node, i),
-                 sign * g.velocity * noise_.qd[i], sources);
-  }
-
-  Spatial unit_wrench(int node, int axis) const {
-    double w[6] = {0, 0, 0, 0, 0, 0};
-    w[axis] = 1.0;
-    return wrench_to_parent(posture_.pose(node), {{w[0], w[1], w[2]}, {w[3], w[4], w[5]}});
-  }
-
-  void add_column(int source, const Spatial& w, double scale, int sources) {
-    double values[6];
-    store(w, values);
-    for (int i = 0; i < 6; ++i) coefficients_[i * sources + source] += scale * values[i];
-  }
-
-  void weigh_row(int i, double* out) {
-    const Row& r = *used_[i];
-    const int n = layout_.joints, k = layout_.sensors;
-    if (r.joint < 0) {
-      const Gains g = gains(observer_.sensors()[r.sensor].bandwidth);
-      const double load = noise_.wrench_error * own_[i];
-      const double filtered = g.reading * noise_.wrench[6 * r.sensor + r.axis];
-      out[6 * r.sensor + r.axis] = std::sqrt(filtered * filtered + load * load);
-      const Spatial axis = axis_in_world(r.sensor, r.axis);
-      const int node = observer_.sensors()[r.sensor].node;
-      for (int c = 0; c < n; ++c)
-        out[6 * k + n + c] = g.velocity * noise_.qd[c] * dot(axis, posture_.momentum(node, c));
-      return;
-    }
-    const JointRow& joint = observer_.joints()[r.joint];
-    const Gains g = gains(joint.bandwidth);
-    const double load = noise_.torque_error * own_[i], filtered = g.reading * noise_.tau[r.joint];
-    out[6 * k + r.joint] = std::sqrt(filtered * filtered + load * load);
-    for (int node : joint.nodes) {
-      const Spatial& s = posture_.subspace(node);
-      for (int c = 0; c < n; ++c)
-        out[6 * k + n + c] += g.velocity * noise_.qd[c] * dot(s, posture_.momentum(node, c));
-    }
-    for (const Projection& pair : observer_.layout().outboard_sensors[r.joint])
-      subtract_sensor(pair, g, out);
-  }
-
-  void subtract_sensor(const Projection& pair, const Gains& g, double* out) {
-    const int n = layout_.joints, k = layout_.sensors;
-    const Spatial& s = posture_.subspace(observer_.layout().lines[pair.line]);
-    const int node = observer_.sensors()[pair.sensor].node;
-    for (int a = 0; a < 6; ++a)
-      out[6 * pair.sensor + a] -=
-          g.reading * noise_.wrench[6 * pair.sensor + a] * dot(s, unit_wrench(node, a));
-    for (int c = 0; c < n; ++c)
-      out[6 * k + n + c] -= g.velocity * noise_.qd[c] * dot(s, posture_.momentum(node, c));
+    return noise_.factor(size_, has_wrench_ ? 3 : 0, factor_.data());
   }
 
   const Observer& observer_;
   Posture posture_;
   std::vector<DetectionRow> tests_;
-  NoiseFigures noise_;
   RowLayout layout_;
+  RowNoise noise_;
   std::vector<std::vector<Row>> rows_;  // per segment
   std::vector<double> joint_offsets_;
 
@@ -404,7 +255,7 @@ class Measurement {
   std::vector<const Row*> used_;
   std::vector<double> own_;       // if the contact is inboard of the joint
   std::vector<double> outboard_;  // if it is outboard, less what the wrench says
-  std::vector<double> coefficients_, factor_, design_;
+  std::vector<double> factor_, design_;
 };
 
 }  // namespace touchline

@@ -46,6 +46,15 @@ class Posture {
   const Pose& pose(int node) const { return poses_[node]; }
   // The twist of a unit velocity of the joint that moves this node.
   const Spatial& subspace(int node) const { return subspaces_[node]; }
+  // The twist whose product with a wrench is its component along an axis of the node's frame: of
+  // the force (0 to 2), of the moment about the frame's origin (3 to 5).
+  Spatial axis(int node, int i) const {
+    const Pose& X = poses_[node];
+    const Vec3 columns[3] = {X.R.x, X.R.y, X.R.z};
+    const Vec3& a = columns[i % 3];
+    if (i < 3) return {a, {}};
+    return {cross(X.p, a), a};
+  }
   // Velocity of the body at the world origin, and its angular velocity.
   const Spatial& twist(int node) const { return twists_[node]; }
   // The momentum of a node and all outboard of it, by a unit velocity of a joint.

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// Moves a candidate over its surface to where it explains best. No allocation.
+#pragma once
+
+#include <cmath>
+
+#include "touchline/dense.hpp"
+#include "touchline/hypothesis.hpp"
+#include "touchline/link_surfaces.hpp"
+#include "touchline/view.hpp"
+
+namespace touchline {
+
+class Refinement {
+ public:
+  Refinement(const LinkSurfaces& surfaces, const ForceFitter& fitter)
+      : surfaces_(surfaces), fitter_(fitter) {}
+
+  // Goes downhill: Gauss-Newton steps, then, where the friction cone or an edge stands in the way,
+  // smaller and smaller trials around.
+  void improve(const View& view, Candidate& k) const {
+    bool arrived = false;
+    for (int i = 0; i < 8 && !arrived; ++i) {
+      double H[25], g[5];
+      fitter_.information(view.q, view.earlier(k.point), k.normal, k.fit.force, H, g);
+      if (!cholesky(H, 5)) break;
+      solve_cholesky(H, 5, g);
+      Vec3 s, t;
+      tangents(k.normal, s, t);
+      Vec3 step = g[3] * s + g[4] * t;
+      const double length = norm(step);
+      if (length > 0.05) step = (0.05 / length) * step;
+      arrived = length < kArrived;
+      if (!arrived && !try_point(view, k, k.point + step)) break;
+    }
+    if (arrived && k.fit.cone < 1.0) return;
+    for (double radius = 0.032; radius > 1e-3; radius *= 0.5) {
+      for (int round = 0; round < 3 && better_around(view, k, radius); ++round) {
+      }
+    }
+  }
+
+ private:
+  static constexpr double kArrived = 2e-4;  // length of a step [m]
+
+  bool better_around(const View& view, Candidate& k, double radius) const {
+    Vec3 s, t;
+    tangents(k.normal, s, t);
+    const Vec3 centre = k.point;
+    bool better = false;
+    for (int i = 0; i < 6; ++i) {
+      const double a = 1.0471975511965976 * i;
+      better |= try_point(view, k, centre + radius * (std::cos(a) * s + std::sin(a) * t));
+    }
+    return better;
+  }
+
+  bool try_point(const View& view, Candidate& k, const Vec3& target) const {
+    const SurfacePoint p = surfaces_.nearest(k.surface, target, 0.06);
+    if (p.face < 0) return false;
+    const Fit fit = fitter_.fit(view.q, view.earlier(p.point), p.normal);
+    if (!(fit.cost() < k.fit.cost() - 1e-6)) return false;
+    k.point = p.point;
+    k.normal = p.normal;
+    k.fit = fit;
+    return true;
+  }
+
+  const LinkSurfaces& surfaces_;
+  const ForceFitter& fitter_;
+};
+
+}  // namespace touchline

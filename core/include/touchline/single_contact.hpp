@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: Apache-2.0
+// One contact on a segment: each explanation weighed by its posterior given the measurement, and the
+// answer that follows. No allocation per sample.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "touchline/answer.hpp"
+#include "touchline/explanations.hpp"
+
+namespace touchline {
+
+class SingleContact {
+ public:
+  SingleContact(const Observer& observer, const Posture& posture, const LocalizerSettings& settings,
+                std::vector<LinkSurface> surfaces)
+      : observer_(observer),
+        settings_(settings),
+        found_(observer, posture, settings, std::move(surfaces)) {}
+
+  // The contact on segment g, which `measurement` has read; its wrench is `lag` [s] old.
+  const Answer& locate(int g, double lag, Measurement& measurement) {
+    clear();
+    if (measurement.has_wrench()) {
+      const double* w = measurement.wrench();
+      answer_.force = {w[0], w[1], w[2]};
+    }
+    if (settings_.first_entry) {
+      first_entry(g, measurement);
+    } else if (measurement.has_wrench() && weak(measurement)) {
+      answer_.status = Status::wrench_only;
+    } else {
+      found_.find(g, lag, measurement);
+      weigh();
+      conclude(g, measurement);
+    }
+    return answer_;
+  }
+
+  // Nothing is known.
+  const Answer& clear() {
+    answer_.status = Status::none;
+    answer_.count = 0;
+    answer_.force = {kNaN, kNaN, kNaN};
+    return answer_;
+  }
+
+  const Answer& answer() const { return answer_; }
+  const LinkSurfaces& surfaces() const { return found_.surfaces(); }
+
+ private:
+  static constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  static constexpr double kNegligible = 10.0;  // of the log posterior, below the best
+
+  // Too small a force to draw a line.
+  bool weak(const Measurement& measurement) const {
+    double C[36];
+    measurement.wrench_covariance(C);
+    const double size2 = dot(answer_.force, answer_.force);
+    return size2 < settings_.least_force * settings_.least_force ||
+           size2 < 16.0 * (C[0] + C[7] + C[14]);
+  }
+
+  // Posterior of each candidate: likelihood, the volume of force and surface that explains as well
+  // (Laplace), and how a push comes there.
+  void weigh() {
+    double most = -std::numeric_limits<double>::infinity();
+    for (Candidate& k : found_) {
+      k.weight = -std::numeric_limits<double>::infinity();
+      if (!(k.fit.cost() < found_.best() + Explanations::kWindow)) continue;
+      double H[25], g[5];
+      const View& view = found_.view(k);
+      found_.fitter().information(view.q, view.earlier(k.point), k.normal, k.fit.force, H, g);
+      if (!cholesky(H, 5)) continue;
+      k.weight = -0.5 * (k.fit.cost() + log_determinant(H, 5)) +
+                 std::log(std::max(k.fit.cosine, 0.02)) - view.width;
+      most = std::max(most, k.weight);
+      covariance_along(H, k.along);
+    }
+    double reached = -std::numeric_limits<double>::infinity();
+    for (Candidate& k : found_) {
+      if (k.weight < most - kNegligible) {
+        k.weight = -std::numeric_limits<double>::infinity();
+      } else {
+        k.weight += reachable(k);
+      }
+      reached = std::max(reached, k.weight);
+    }
+    double sum = 0.0;
+    for (Candidate& k : found_) sum += k.weight = std::exp(k.weight - reached);
+    for (Candidate& k : found_) k.weight /= sum;
+  }
+
+  // The last two by two of (L L^T)^-1.
+  static void covariance_along(const double* L, double* out) {
+    const double a = 1.0 / L[18], b = 1.0 / L[24], c = -L[23] * a * b;
+    out[0] = a * a + c * c;
+    out[1] = c * b;
+    out[2] = b * b;
+  }
+
+  // Log of the plausibility that a push arrives at a point along its force: not from inside
+  // another link, and hardly through a narrow gap.
+  double reachable(const Candidate& k) const {
+    const double size = norm(k.fit.force);
+    if (size == 0.0) return 0.0;
+    const ForceLine line{k.point, (1.0 / size) * k.fit.force};
+    double nearest = -std::numeric_limits<double>::infinity();
+    bool inside = false;
+    for (const LinkSurface& surface : found_.surfaces().all()) {
+      const ForceLine local = found_.surfaces().to_node(line, surface.node);
+      surface.mesh.crossings(local, [&](const Crossing& c) {
+        if (c.t > -1e-6 || c.t <= nearest) return;
+        nearest = c.t;
+        inside = dot(c.normal, local.direction) < 0.0;
+      });
+    }
+    if (inside) return std::max(-6.0, nearest / 3e-3);
+    return 2.0 * std::log(std::clamp(-nearest / settings_.finger, 0.1, 1.0));
+  }
+
+  void conclude(int g, const Measurement& measurement) {
+    std::sort(found_.begin(), found_.end(),
+              [](const Candidate& a, const Candidate& b) { return a.weight > b.weight; });
+    if (found_.count() == 0 || !(found_.begin()->weight > 0.0)) {
+      answer_.status = unexplained(g, measurement);
+      return;
+    }
+    lead_with_best_body();
+    const Candidate& best = *found_.begin();
+    const View& view = found_.view(best);
+    answer_.pitch = view.pitch;
+    answer_.chi2 = best.fit.chi2;
+    answer_.degrees = std::max(1, measurement.size() - 5);
+    spread_over_surface(best);
+    copy_candidates();
+    if (std::fabs(view.pitch) > settings_.pitch_limit ||
+        found_.fitter().cone_cost(best.fit.cosine) > 16.0 ||
+        best.fit.chi2 > chi2_limit(answer_.degrees, settings_.pitch_limit)) {
+      answer_.status = unexplained(g, measurement);
+    } else {
+      answer_.force = best.fit.force;
+      answer_.status = certain() ? Status::located : Status::ambiguous;
+    }
+  }
+
+  void copy_candidates() {
+    answer_.count = 0;
+    for (const Candidate& k : found_) {
+      if (answer_.count < Answer::kCandidates && (answer_.count == 0 || k.weight > 1e-3))
+        answer_.candidates[answer_.count++] = k;
+    }
+  }
+
+  // A tool or a handle may be loaded by a moment: then its wrench is the answer.
+  Status unexplained(int g, const Measurement& measurement) const {
+    const Segment& segment = observer_.layout().segments[g];
+    const bool end = segment.sensor >= 0 && segment.successors.empty();
+    return end && measurement.has_wrench() && measurement.scalars() == 0
+               ? Status::wrench_only
+               : Status::not_separable;
+  }
+
+  int node_of(const Candidate& k) const { return found_.surfaces()[k.surface].node; }
+
+  void lead_with_best_body() {
+    double most = 0.0;
+    Candidate* first = found_.begin();
+    for (Candidate& a : found_) {
+      double sum = 0.0;
+      for (const Candidate& b : found_) sum += node_of(a) == node_of(b) ? b.weight : 0.0;
+      if (sum > most + 1e-12) {
+        most = sum;
+        first = &a;
+      }
+    }
+    answer_.body_probability = std::min(most, 1.0);
+    std::rotate(found_.begin(), first, first + 1);
+  }
+
+  // Is nearly all of the probability at one place?
+  bool certain() {
+    if (answer_.spread > settings_.spread_limit()) return false;
+    double here = 0.0;
+    for (const Candidate& k : found_) {
+      if (norm(k.point - found_.begin()->point) < settings_.place_radius) here += k.weight;
+    }
+    return here >= settings_.certain;
+  }
+
+  // Covariance of the point, which stays on its surface.
+  void spread_over_surface(const Candidate& k) {
+    Vec3 s, t;
+    tangents(k.normal, s, t);
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        const double si = component(s, i), sj = component(s, j);
+        const double ti = component(t, i), tj = component(t, j);
+        answer_.covariance[3 * i + j] =
+            k.along[0] * si * sj + k.along[1] * (si * tj + ti * sj) + k.along[2] * ti * tj;
+      }
+    }
+    answer_.spread = std::sqrt(k.along[0] + k.along[2]);
+  }
+
+  // Beyond it lies as much of chi2 as of a normal variable beyond `sigmas` (Wilson-Hilferty).
+  static double chi2_limit(int degrees, double sigmas) {
+    const double n = degrees, c = 2.0 / (9.0 * n);
+    return n * std::pow(1.0 - c + sigmas * std::sqrt(c), 3);
+  }
+
+  // The paper's rule: along the line of the segment's wrench, the first entry into any link.
+  void first_entry(int g, const Measurement& measurement) {
+    if (!measurement.has_wrench()) return;
+    answer_.status = Status::wrench_only;
+    const double* w = measurement.wrench();
+    const Spatial wrench{answer_.force, {w[3], w[4], w[5]}};
+    if (norm(wrench.linear) < 1e-9) return;
+    double first = std::numeric_limits<double>::infinity();
+    Candidate& k = answer_.candidates[0];
+    k = Candidate{};
+    found_.entries(g, line_of(wrench),
+                   [&](int surface, const Vec3& point, const Vec3& normal, double t) {
+                     if (t >= first) return;
+                     first = t;
+                     k.surface = surface;
+                     k.point = point;
+                     k.normal = normal;
+                   });
+    if (!std::isfinite(first)) return;
+    k.weight = answer_.body_probability = 1.0;
+    answer_.count = 1;
+    answer_.status = Status::located;
+    answer_.spread = answer_.pitch = answer_.chi2 = kNaN;
+    answer_.degrees = 0;
+    std::fill(answer_.covariance, answer_.covariance + 9, kNaN);
+  }
+
+  const Observer& observer_;
+  const LocalizerSettings& settings_;
+  Explanations found_;
+  Answer answer_;
+};
+
+}  // namespace touchline

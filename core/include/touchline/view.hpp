@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the measurements say if the contact is on one body: its line of force action, and where the
+// body was when they were true. And a candidate: one point of that body, with its force.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "touchline/dense.hpp"
+#include "touchline/hypothesis.hpp"
+#include "touchline/link_surfaces.hpp"
+#include "touchline/quadratic.hpp"
+
+namespace touchline {
+
+struct Candidate {
+  int surface = -1;  // index of the link's surface
+  Vec3 point, normal;
+  Fit fit;
+  int view = 0;          // of the bodies looked at
+  double weight = 0.0;   // log of the posterior, then the probability
+  double along[3] = {};  // covariance of the two tangent coordinates: 00, 01, 11
+};
+
+// The line of force action of a wrench (19).
+inline ForceLine line_of(const Spatial& w) {
+  const double size2 = dot(w.linear, w.linear);
+  return {(1.0 / size2) * cross(w.linear, w.angular), (1.0 / std::sqrt(size2)) * w.linear};
+}
+
+struct View {
+  int node = -1;
+  const std::vector<int>* surfaces = nullptr;
+  Quadratic q;
+  bool line = false;   // is there a line of force action?
+  double floor = 0.0;  // chi2 that no point of the body goes below
+  double pitch = 0.0;
+  Spatial wrench;      // the pure force that explains best
+  bool met = false;    // does its line meet the body, and steeply enough?
+  bool steep = false;
+  // How far the body has moved since the time that the filtered wrench speaks of: at the world
+  // origin, and turned.
+  Vec3 shift, turn;
+  double width = 0.0;  // log of how much that adds to the spread of the measurements
+
+  Vec3 earlier(const Vec3& point) const { return point - shift - cross(turn, point); }
+  // The line of points of that time, as it is carried along.
+  ForceLine later_line() const {
+    const ForceLine line = line_of(wrench);
+    const Vec3 direction = line.direction + cross(turn, line.direction);
+    return {line.origin + shift + cross(turn, line.origin), (1.0 / norm(direction)) * direction};
+  }
+
+  // The body moves with `twist` (about the world origin, its frame at `centre`), and the wrench of
+  // `force` [N] is `lag` [s] old. The way come since is known but for a part of it.
+  void allow_for_motion(const Spatial& twist, const Vec3& centre, double lag, double force) {
+    shift = lag * twist.linear;
+    turn = lag * twist.angular;
+    const double moment = kUncertainWay * norm(shift + cross(turn, centre)) * force;
+    if (moment > 1e-6) width = loosen(q, moment);
+  }
+
+  // The most likely wrench among those of one pure force: f . m = 0.
+  void find_line() {
+    double L[36], w[6];
+    std::copy(q.information, q.information + 36, L);
+    line = cholesky(L, 6, 1e-9);
+    if (!line) return;
+    std::copy(q.vector, q.vector + 6, w);
+    solve_cholesky(L, 6, w);
+    for (int pass = 0; pass < 3; ++pass) {
+      const double g[6] = {w[3], w[4], w[5], w[0], w[1], w[2]};
+      double step[6];
+      std::copy(g, g + 6, step);
+      solve_cholesky(L, 6, step);
+      double power = 0.0, variance = 0.0;
+      for (int i = 0; i < 3; ++i) power += w[i] * w[3 + i];
+      for (int i = 0; i < 6; ++i) variance += g[i] * step[i];
+      if (!(variance > 0.0)) break;
+      if (pass == 0) pitch = power / std::sqrt(variance);
+      for (int i = 0; i < 6; ++i) w[i] -= power / variance * step[i];
+    }
+    floor = std::max(0.0, q(w));
+    wrench = {{w[0], w[1], w[2]}, {w[3], w[4], w[5]}};
+    line = dot(wrench.linear, wrench.linear) > 1e-12;
+  }
+
+ private:
+  static constexpr double kUncertainWay = 0.1;  // of the way since then
+};
+
+}  // namespace touchline
