@@ -6,12 +6,12 @@ import pytest
 import trimesh
 
 import touchline as tl
-from touchline import _core
 from touchline.contact.skin import Skin
+from touchline.native import core
 
 
 def native(mesh):
-    return _core.mesh(
+    return core.mesh(
         np.ascontiguousarray(mesh.vertices, float), np.ascontiguousarray(mesh.faces, np.int64)
     )
 
@@ -124,4 +124,4 @@ def test_the_skin_of_an_arm_stands_where_its_links_stand():
 
 def test_a_mesh_that_names_a_missing_vertex_is_refused():
     with pytest.raises(ValueError, match="vertex"):
-        _core.mesh(np.zeros((3, 3)), np.array([[0, 1, 3]]))
+        core.mesh(np.zeros((3, 3)), np.array([[0, 1, 3]]))
