@@ -31,7 +31,7 @@ def recording(name):
 
 def analyze(log, robot, out):
     with pytest.MonkeyPatch.context() as patch:  # pictures take longer than all the rest
-        patch.setattr("touchline.report.event_pictures.MOST_PICTURED", 1)
+        patch.setattr("touchline.report.event_figures.MOST_PICTURED", 1)
         assert main(["analyze", str(log), "--robot", str(ROBOTS / robot), "--out", str(out)]) == 0
     return json.loads((out / "events.json").read_text())
 

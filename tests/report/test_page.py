@@ -16,6 +16,7 @@ from free_motion import free_motion
 import touchline as tl
 from touchline.logs import write_table
 from touchline.report.analysis import analyze
+from touchline.report.page import page_text
 from touchline.report.statistics import Moments
 
 VOID = {"meta", "line", "br", "hr", "img", "input", "link"}
@@ -65,7 +66,7 @@ def test_every_tag_is_closed_and_names_are_escaped(page):
 
 def test_nothing_is_fetched(page):
     body = re.sub(r'id="data">.*?</script>', "", page, flags=re.S)
-    body = re.sub(r' href="data:image/png;base64,[A-Za-z0-9+/=]*"', "", body)
+    body = re.sub(r' href="(data:image/webp;base64,[A-Za-z0-9+/=]*|#event-[0-9]+)"', "", body)
     assert "default-src 'none'" in body
     assert not re.search(r"""(src|href)\s*=|@import|url\((?!#)|fetch\(|XMLHttp""", body)
     addresses = set(re.findall(r"https?://[^\"' )]+", body))
@@ -76,11 +77,11 @@ def test_nothing_is_fetched(page):
 def test_curves_are_those_of_the_estimates(analysis, page):
     data = data_of(page)
     torque = data["panels"][1]  # joint2 has a sensor
-    packed = data["curves"][torque["curves"][0]["column"]]
+    packed = data["curves"][torque["columns"][0]]
     numbers = np.frombuffer(base64.b64decode(packed["high"]), "<i2")
     values = np.where(numbers == -32768, np.nan, packed["middle"] + packed["step"] * numbers)
     assert data["count"] == 2000
-    traces = analysis.curves.traces.high[:2000, torque["curves"][0]["column"]]
+    traces = analysis.curves.traces.high[:2000, torque["columns"][0]]
     np.testing.assert_allclose(values, traces, atol=packed["step"])
 
 
@@ -116,7 +117,22 @@ def test_a_browser_draws_every_plot_without_an_error(analysis, page):
         [*command, target], capture_output=True, text=True, timeout=60, check=True
     )
     assert "CONSOLE" not in done.stderr, done.stderr
-    drawn = len(re.findall(r'<path d="M[^"]+" class="curve', done.stdout))
+    drawn = re.findall(r'<path d="M[^"]+" class="curve [^"]*" clip-path', done.stdout)
     panels = analysis.curves.panels
-    assert drawn == sum(len(panel.curves) for panel in panels)
+    assert len(drawn) >= sum(len(panel.curves) for panel in panels)
     assert done.stdout.count('class="event collision ') >= 1
+
+
+def test_a_page_without_room_says_what_was_left_out(analysis, monkeypatch):
+    assert page_text(analysis).count('class="event-figure"') == len(analysis.events)
+    monkeypatch.setattr("touchline.report.event_figures.BUDGET", 1000)
+    small = page_text(analysis)
+    assert "1 of 1 events have a figure" in small and "0 of them have plots" in small
+    assert 'data-window="' not in small
+
+
+def test_plots_are_there_without_the_script(analysis, page):
+    static = re.sub(r"<script.*?</script>", "", page, flags=re.S)
+    drawn = re.findall(r'<path class="curve s\d" d="M[^"]+"', static)
+    panels = analysis.curves.panels + analysis.curves.event_panels("base")
+    assert len(drawn) == sum(len(panel.curves) for panel in panels)

@@ -19,11 +19,13 @@ from touchline.model.robot import Robot, load_robot
 from touchline.report.comparison import Comparison, compare_log
 from touchline.report.curves import Curves
 from touchline.report.event_pictures import EventPoses
+from touchline.report.event_windows import EventWindows
 from touchline.report.facts import bandwidth_warnings, bandwidths
 from touchline.report.outputs import REPORT, Outputs, prepare_directory, write_text
 from touchline.report.statistics import Statistics
 
 CHUNK = 1 << 15  # samples; bounds the memory
+EPOCH = 1e6  # s; stamps beyond it are dates
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,8 @@ class Analysis:
         statistics: of all samples.
         curves: for plots.
         events: all events.
-        poses: how the robot stood at the first of them.
+        poses: how the robot stood at each of them.
+        windows: the curves around them.
         comparisons: of the events with the truth of a simulated log.
         warnings: what the user should know.
     """
@@ -57,8 +60,15 @@ class Analysis:
     curves: Curves
     events: list[Event]
     poses: EventPoses
+    windows: EventWindows
     comparisons: list[Comparison]
     warnings: list[str]
+
+    @property
+    def origin(self) -> float:
+        """From where the report counts time [s]: 0, or the first sample where stamps are dates."""
+        first = self.statistics.clock.first
+        return first if abs(first) > EPOCH else 0.0
 
 
 def analyze(
@@ -126,13 +136,20 @@ class _Run:
         self._statistics = Statistics.of(len(robot.joint_names), len(robot.segment_names))
         self._curves = Curves(pipeline, self.period)
         self._poses = EventPoses()
+        columns = {
+            name: [c.column for p in self._curves.event_panels(name) for c in p.curves]
+            for name in robot.segment_names
+        }
+        self._windows = EventWindows(columns, self.period)
 
     def add(self, part: Samples) -> None:
         """Take the next samples."""
         time = part.time
         estimate, detection = self.pipeline.run(time, part.q, part.qd, part.tau, part.wrench)
         self._statistics.add(time, estimate, detection)
-        self._curves.add(time, estimate, detection)
+        values = self._curves.values(estimate, detection)
+        self._curves.traces.add(time, values)
+        self._windows.add(time, values, self.pipeline.events)
         self._outputs.estimates(time, estimate)
         if self.pipeline.contacts is not None:
             self._outputs.contacts(time, estimate, self.pipeline.contacts)
@@ -157,6 +174,7 @@ class _Run:
             curves=self._curves,
             events=events,
             poses=self._poses,
+            windows=self._windows,
             comparisons=compare_log(events, log),
             warnings=warnings,
         )

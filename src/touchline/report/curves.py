@@ -13,7 +13,7 @@ from touchline.report.traces import Traces
 
 Array = NDArray[np.float64]
 
-POINTS = 480_000  # pieces of time times curves: bounds the report's size
+POINTS = 240_000  # pieces of time times curves: bounds the report's size, 5.3 bytes each
 MOST_BUCKETS = 1 << 14
 
 
@@ -99,12 +99,18 @@ class Curves:
             for name in self._robot.segment_names
         ]
 
-    def add(self, time: Array, estimate: Estimate, detection: Detection) -> None:
-        """Take N samples."""
+    def event_panels(self, segment: str) -> list[Panel]:
+        """What is plotted around an event on a segment: its wrench, its test, all joint torques."""
+        own = [p for p in self.panels if p.kind != "joint" and p.segment == segment]
+        joints = [p for p in self.panels if p.kind == "joint"]
+        curves = tuple(Curve(p.title, p.curves[0].column) for p in joints)
+        return [*own, Panel("joint", "external joint torques", "Nm", None, curves)]
+
+    def values(self, estimate: Estimate, detection: Detection) -> Array:
+        """All columns (N, c) of N samples."""
         parts = [*self._joint_values(estimate, detection)]
         parts += [estimate.segment_wrench[:, g] for g in self._segments]
-        parts += [*self._test_values(detection)]
-        self.traces.add(time, np.hstack(parts))
+        return np.hstack([*parts, *self._test_values(detection)])
 
     def _joint_values(self, estimate: Estimate, detection: Detection) -> list[Array]:
         values = []

@@ -2,7 +2,6 @@
 """Two pictures of an event: where the arm was touched, and how hard."""
 
 from collections.abc import Sequence
-from html import escape
 from typing import Any
 
 import numpy as np
@@ -12,20 +11,18 @@ from touchline.contact.event import Event
 from touchline.model.robot import Robot
 from touchline.report.comparison import Comparison
 from touchline.report.figure import svg_picture
-from touchline.report.html import note, section
-from touchline.report.picture import SIGMAS, Scene
-from touchline.report.render.skin import robot_skin
+from touchline.report.picture import Scene
+from touchline.report.render.camera import Size
 from touchline.report.views import views_of_contact
 
 Array = NDArray[np.floating[Any]]
 
-MOST_PICTURED = 6  # events; each brings some 130 kB to the page
-SIZE = (520, 520)
+SIZE = (520, 390)
 WORTH_DRAWING = 0.03  # probability of a candidate
 
 
 class EventPoses:
-    """Remembers, while a recording streams by, how the arm stood at each of the first events."""
+    """Remembers, while a recording streams by, how the arm stood at each event."""
 
     def __init__(self) -> None:
         self._poses: dict[int, Array] = {}
@@ -36,7 +33,7 @@ class EventPoses:
         if not len(usable):
             return
         first, last = time[usable].min(), time[usable].max()
-        for event in events[:MOST_PICTURED]:
+        for event in events:
             wanted = event.detected if event.time_of_position is None else event.time_of_position
             if first <= wanted <= last:
                 nearest = usable[np.abs(time[usable] - wanted).argmin()]
@@ -47,48 +44,30 @@ class EventPoses:
         return self._poses.get(event.id)
 
 
-def pictures(
-    robot: Robot,
-    events: Sequence[Event],
-    poses: EventPoses,
-    comparisons: Sequence[Comparison] = (),
-) -> str:
-    """The section of the report with the pictures of the first events; empty without any."""
-    if not robot_skin(robot):
-        return ""
-    shown = [(event, poses.get(event)) for event in events]
-    figures = [
-        event_pictures(robot, event, q, _truth_of(event, comparisons))
-        for event, q in shown
-        if q is not None
-    ]
-    if not figures:
-        return ""
-    words = (
-        "The arm as it stood at the event, from two sides. The arrow ends where the arm was "
-        "touched and points along the force on it; the line goes on along the force. The disc is "
-        f"{SIGMAS:g} standard deviations of the point; where they are small the ball hides it. "
-        "What the arm hides is drawn fainter."
-    )
-    if comparisons:
-        words += " Blue is the truth of the simulation."
-    more = (
-        f" The first {len(figures)} of {len(events)} events." if len(figures) < len(events) else ""
-    )
-    return section("Where it was touched", note(words + more), *figures, anchor="pictures")
-
-
-def _truth_of(event: Event, comparisons: Sequence[Comparison]) -> list[tuple[Array, Array]]:
+def truth_of(event: Event, comparisons: Sequence[Comparison]) -> list[tuple[Array, Array]]:
     """Point and force of the true contact that an event found, at the event's time."""
     found = [row for row in comparisons if row.event is event]
     time = event.time_of_position or event.detected
     return [(row.truth.point_at(time), row.truth.mean_force) for row in found]
 
 
-def event_pictures(
+def event_pictures(scene: Scene, event: Event, size: Size = SIZE) -> str:
+    """Two pictures of an event from two sides, as SVG elements.
+
+    Args:
+        scene: what they show, as of `event_scene`.
+        event: what was found.
+        size: of each [pixels].
+    """
+    name = f"event {event.id}: {caption(event)}"
+    cameras = views_of_contact(scene, size[0] / size[1])
+    return "".join(svg_picture(scene, camera, size, name) for camera in cameras)
+
+
+def event_scene(
     robot: Robot, event: Event, q: Array, truth: Sequence[tuple[Array, Array]] | None = None
-) -> str:
-    """A figure with two pictures of an event from two sides, as HTML.
+) -> Scene:
+    """What the pictures of an event show.
 
     Args:
         robot: the robot.
@@ -96,19 +75,6 @@ def event_pictures(
         q: joint positions (n,) [rad] at the event.
         truth: points (3,) [m] and forces (3,) [N] on the robot, in world, where they are known.
     """
-    scene = event_scene(robot, event, q, truth)
-    name = f"event {event.id}: {_caption(event)}"
-    pictures = [svg_picture(scene, camera, SIZE, name) for camera in views_of_contact(scene)]
-    return (
-        f'<figure class="pictures" id="event-{event.id}"><figcaption><b>{event.id}</b> '
-        f"{escape(_caption(event))}</figcaption><div>{''.join(pictures)}</div></figure>"
-    )
-
-
-def event_scene(
-    robot: Robot, event: Event, q: Array, truth: Sequence[tuple[Array, Array]] | None = None
-) -> Scene:
-    """What the pictures of an event show; arguments as of `event_pictures`."""
     scene = Scene(robot, q)
     for point, force in truth or ():
         scene.add_contact(point, force, "truth")
@@ -174,8 +140,9 @@ def _middle(scene: Scene, links: set[str], force: Array, points: list[Array]) ->
     return middle + back * reach
 
 
-def _caption(event: Event) -> str:
-    words = [event.level, f"at {event.detected:.3f} s on {event.link or event.segment}"]
+def caption(event: Event, origin: float = 0.0) -> str:
+    """What was found, in a line; times count from `origin` [s]."""
+    words = [event.level, f"at {event.detected - origin:.3f} s on {event.link or event.segment}"]
     if event.force is not None:
         words.append(f"{float(np.linalg.norm(event.force)):.1f} N")
     if event.position_std is not None and event.link is not None:

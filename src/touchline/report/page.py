@@ -14,15 +14,22 @@ from touchline.contact.event import Event
 from touchline.report.analysis import Analysis
 from touchline.report.comparison import HEAD, cells, verdict
 from touchline.report.curves import Panel
-from touchline.report.event_pictures import pictures
+from touchline.report.event_figures import figures
 from touchline.report.facts import event_where, health_facts, joint_facts, segment_facts
 from touchline.report.html import Cell, note, section, table
 from touchline.report.outputs import strict
+from touchline.report.plots import plot
 from touchline.report.robot_section import robot_section
 
 MOST_EVENTS, MOST_SHADED = 1000, 5000
-EPOCH = 1e6  # s; stamps beyond it are dates, and plots count from their first sample
 STEPS = 32767
+DRAWN = 400  # pieces of time of a plot without the script
+PLOT = (1030, 120)  # pixels
+HELP = (
+    "Each point of a curve spans the least and the largest value of its piece of time. Drag over "
+    "a plot to zoom in, with Shift to move; the wheel zooms a plot that was clicked; arrow keys, "
+    "plus and minus do the same; double-click or 0 shows all. Events are shaded."
+)
 
 PAGE = """<!doctype html>
 <html lang="en">
@@ -53,12 +60,13 @@ segments in world axes about the world origin. Not a certified safety function.<
 def page_text(analysis: Analysis) -> str:
     """The whole page."""
     assets = Path(__file__).parent / "assets"
+    shown, pictured = figures(analysis)
     body = [
         _header(analysis),
         _warnings(analysis),
-        _events(analysis),
+        _events(analysis, pictured),
         _comparisons(analysis),
-        pictures(analysis.robot, analysis.events, analysis.poses, analysis.comparisons),
+        shown,
         _plots(analysis),
         _residuals(analysis),
         _health(analysis),
@@ -72,11 +80,6 @@ def page_text(analysis: Analysis) -> str:
         data=json.dumps(strict(_data(analysis)), allow_nan=False).replace("<", "\\u003c"),
         script=(assets / "report.js").read_text(encoding="utf-8"),
     )
-
-
-def _origin(analysis: Analysis) -> float:
-    start = analysis.statistics.clock.first
-    return start if abs(start) > EPOCH else 0.0
 
 
 def _header(analysis: Analysis) -> str:
@@ -105,19 +108,20 @@ def _warnings(analysis: Analysis) -> str:
     return f'<div class="warnings"><ul>{items}</ul></div>'
 
 
-def _events(analysis: Analysis) -> str:
+def _events(analysis: Analysis, pictured: set[int]) -> str:
     events = analysis.events
     if not events:
         return section("Events", "<p>None.</p>")
     head = ["", "detected [s]", "lasted [s]", "level", "segment", "force [N]", "torque [Nm]"]
-    rows = [_event_row(event, _origin(analysis)) for event in events[:MOST_EVENTS]]
+    rows = [_event_row(e, analysis.origin, e.id in pictured) for e in events[:MOST_EVENTS]]
     marks = [f' data-event="{i}"' for i in range(len(rows))]
     hidden = len(events) - MOST_EVENTS
-    words = "Peaks of force and of the torque on the named joint. A click shows the event below."
+    words = "Peaks of force and of the torque on the named joint. A click shows the event."
     if hidden > 0:
         words += f" {hidden} more are in events.json."
     strip = (
-        '<div class="plot" data-strip><svg role="img" aria-label="events over time"></svg></div>'
+        '<div class="plot screen" data-strip><svg role="img" viewBox="0 0 1030 60" '
+        'aria-label="events over time"></svg></div>'
     )
     return section("Events", strip, table([*head, "where", "located"], rows, marks), note(words))
 
@@ -130,11 +134,12 @@ def _comparisons(analysis: Analysis) -> str:
     return section("Against the truth", table(HEAD, [cells(row) for row in rows]), note(words))
 
 
-def _event_row(event: Event, origin: float) -> list[Any]:
+def _event_row(event: Event, origin: float, pictured: bool) -> list[Any]:
     lasted = "to the end" if event.cleared is None else f"{event.cleared - event.detected:.3f}"
     peak = event.force_peak, event.torque_peak
+    number = f'<a href="#event-{event.id}">{event.id}</a>' if pictured else str(event.id)
     return [
-        event.id,
+        Cell(number),
         f"{event.detected - origin:.3f}",
         lasted,
         Cell(f'<span class="level {event.level}">{event.level}</span>'),
@@ -152,28 +157,31 @@ def _plots(analysis: Analysis) -> str:
         '<div class="tools"><button id="reset">whole recording</button><span id="shown"></span>'
         '<span id="at"></span></div>'
     )
-    origin = _origin(analysis)
+    origin = analysis.origin
     since = f" Times count from {origin:.3f} s." if origin else ""
     words = (
-        "Each point of a curve spans the least and the largest value of its piece of time. Drag "
-        "over a plot to zoom in, double-click to see all; events are shaded. The band is the slow "
-        f"baseline with the contact threshold on either side.{since}"
+        f"{HELP} The band is the slow baseline with the contact threshold on either side.{since}"
     )
-    figures = "".join(_figure(panel, index) for index, panel in panels)
-    return section("Plots", note(words), tools, figures, anchor="plots")
+    drawn = "".join(_panel_plot(analysis, panel, index) for index, panel in panels)
+    return section("The whole recording", note(words), tools, drawn, anchor="plots")
 
 
-def _figure(panel: Panel, index: int) -> str:
-    keys = "".join(
-        f'<span class="key s{i}">{escape(curve.name)} '
-        f'<span class="value" data-curve="{curve.column}"></span></span>'
-        for i, curve in enumerate(panel.curves)
-    )
-    return (
-        f'<div class="plot" data-panel="{index}"><header><b>{escape(panel.title)}</b>'
-        f'<span class="soft">{escape(panel.unit)}</span>{keys}</header>'
-        f'<svg role="img" aria-label="{escape(panel.title)} over time"></svg></div>'
-    )
+def _panel_plot(analysis: Analysis, panel: Panel, index: int) -> str:
+    """A plot that shows the recording coarsely; the script draws it from all the data."""
+    traces = analysis.curves.traces
+    used = max(traces.used, 1)
+    step = -(-used // DRAWN)
+    starts = np.arange(0, used, step)
+    curves = [
+        (
+            np.fmin.reduceat(traces.low[:used, curve.column], starts),
+            np.fmax.reduceat(traces.high[:used, curve.column], starts),
+        )
+        for curve in panel.curves
+    ]
+    begin = traces.start - analysis.origin
+    span = (begin, begin + len(starts) * step * traces.width)
+    return plot(panel, curves, span, (), PLOT, None, f' data-panel="{index}"')
 
 
 def _residuals(analysis: Analysis) -> str:
@@ -240,7 +248,7 @@ def _data(analysis: Analysis) -> dict[str, Any]:
     columns = range(traces.low.shape[1])
     return {
         "start": start,
-        "origin": _origin(analysis),
+        "origin": analysis.origin,
         "width": traces.width,
         "count": used,
         "curves": [_packed(traces.low[:used, i], traces.high[:used, i]) for i in columns],
@@ -248,6 +256,7 @@ def _data(analysis: Analysis) -> dict[str, Any]:
         "segments": list(analysis.robot.segment_names),
         "events": [
             {
+                "id": event.id,
                 "segment": event.segment,
                 "level": event.level,
                 "from": event.detected - start,
@@ -260,10 +269,9 @@ def _data(analysis: Analysis) -> dict[str, Any]:
 
 
 def _panel_data(panel: Panel) -> dict[str, Any]:
-    curves = [{"name": curve.name, "column": curve.column} for curve in panel.curves]
     return {
         "segment": panel.segment,
-        "curves": curves,
+        "columns": [curve.column for curve in panel.curves],
         "band": panel.band,
         "limit": panel.limit,
     }

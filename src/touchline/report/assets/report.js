@@ -1,19 +1,42 @@
 "use strict";
-// Draws the plots of the report as SVG. Every curve is a least and a largest value per piece of time.
+// Makes the plots of the report zoomable. Every curve is a least and a largest value per piece of
+// time. Plots of events carry theirs in the paths that are drawn without this script; those of
+// the whole recording come with more pieces than are drawn, packed. Plots of one group move together.
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
-  const LEFT = 58, RIGHT = 10, TOP = 8, BOTTOM = 20;
-  const whole = [0, Math.max(data.count * data.width, 1e-9)];
-  let view = whole;
+  const LEFT = 58, RIGHT = 10, TOP = 8, BOTTOM = 20, TURN = 1.25, STEP = 0.2;
+  const clock = (t) => data.start - data.origin + t;  // of seconds since the first sample
 
-  const decode = (text, curve) => {
-    const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-    const whole = new Int16Array(bytes.buffer);
-    return Float64Array.from(whole, (v) => (v === -32768 ? NaN : curve.middle + v * curve.step));
+  const unpack = (curve) => {
+    const decode = (text) => {
+      const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+      const numbers = new Int16Array(bytes.buffer);
+      return Float64Array.from(numbers, (v) =>
+        (v === -32768 ? NaN : curve.middle + v * curve.step));
+    };
+    return { low: decode(curve.low), high: decode(curve.high) };
   };
-  const curves = data.curves.map((c) => ({ low: decode(c.low, c), high: decode(c.high, c) }));
+  // A path as the report writes it: "Mx yv dy l1 dy v dy ..."; x counts pieces, y the steps from
+  // the top of the range downwards.
+  const readPath = (path, plot) => {
+    const low = new Float64Array(plot.count).fill(NaN), high = new Float64Array(plot.count).fill(NaN);
+    const value = (y) => plot.high - (y / plot.steps) * (plot.high - plot.low);
+    let x = 0, y = 0;
+    const meet = () => {
+      const v = value(y);
+      if (!(low[x] <= v)) low[x] = v;
+      if (!(high[x] >= v)) high[x] = v;
+    };
+    for (const [, command, rest] of path.matchAll(/([Mlv])([^Mlv]*)/g)) {
+      const numbers = rest.match(/-?\d+/g).map(Number);
+      if (command === "M") [x, y] = numbers;
+      else if (command === "l") { x += numbers[0]; y += numbers[1]; }
+      else y += numbers[0];
+      meet();
+    }
+    return { low, high };
+  };
 
-  const clock = (t) => data.start - data.origin + t;
   const node = (name, attributes, parent) => {
     const made = document.createElementNS("http://www.w3.org/2000/svg", name);
     for (const key in attributes) made.setAttribute(key, attributes[key]);
@@ -28,233 +51,322 @@
     return { list, digits: Math.max(0, -Math.floor(Math.log10(step) + 1e-9)) };
   };
 
-  // Least and largest of pieces [from, to) of a curve.
-  const extremes = (column, from, to) => {
-    const { low, high } = curves[column];
+  // What is shown of a plot, and where: `x` and `y` take seconds and values to the picture.
+  class Frame {
+    constructor(plot, height) {
+      this.plot = plot;
+      this.width = Math.max(plot.svg.clientWidth, 240);
+      this.height = height;
+      this.inner = this.width - LEFT - RIGHT;
+      [this.from, this.to] = plot.group.view;
+      plot.svg.replaceChildren();
+      plot.svg.setAttribute("viewBox", `0 0 ${this.width} ${height}`);
+    }
+    x(t) { return LEFT + ((t - this.from) / (this.to - this.from)) * this.inner; }
+    clip(t) { return Math.min(Math.max(this.x(t), LEFT), this.width - RIGHT); }
+    range(low, high) {
+      this.y = (v) => TOP + ((high - v) / (high - low)) * (this.height - TOP - BOTTOM);
+    }
+  }
+
+  // Numbers of the pieces in view, and groups of them, one per pixel where there are more.
+  const pieces = (source, frame) => [
+    Math.max(0, Math.floor((frame.from - source.start) / source.width) - 1),
+    Math.min(source.count, Math.ceil((frame.to - source.start) / source.width) + 1),
+  ];
+  const groups = (source, frame) => {
+    const [from, to] = pieces(source, frame);
+    const size = Math.max(1, Math.floor((to - from) / Math.max(frame.inner, 1)));
+    const list = [];
+    for (let i = from - (from % size); i < to; i += size) list.push([i, i + size]);
+    return list;
+  };
+  const extremes = (source, column, from, to) => {
+    const { low, high } = source.curves[column];
     let least = Infinity, largest = -Infinity;
-    for (let i = Math.max(from, 0); i < Math.min(to, data.count); i++) {
+    for (let i = Math.max(from, 0); i < Math.min(to, source.count); i++) {
       if (low[i] < least) least = low[i];
       if (high[i] > largest) largest = high[i];
     }
     return [least, largest];
   };
-  const pieces = () => [
-    Math.max(0, Math.floor(view[0] / data.width) - 1),
-    Math.min(data.count, Math.ceil(view[1] / data.width) + 1),
-  ];
-
-  const range = (panel) => {
-    const [from, to] = pieces();
+  const range = (source, panel, frame) => {
+    const [from, to] = pieces(source, frame);
     let low = 0, high = 0;
-    for (const curve of panel.curves) {
-      const [a, b] = extremes(curve.column, from, to);
+    for (const column of panel.columns) {
+      const [a, b] = extremes(source, column, from, to);
       low = Math.min(low, a); high = Math.max(high, b);
     }
     if (panel.band !== null) {
-      const [a, b] = extremes(panel.band, from, to);
+      const [a, b] = extremes(source, panel.band, from, to);
       if (a <= b) { low = Math.min(low, a - panel.limit); high = Math.max(high, b + panel.limit); }
     } else if (panel.limit !== null) high = Math.max(high, panel.limit * 1.2);
     const room = (high - low || 1) * 0.06;
     return [panel.band === null && panel.limit !== null ? 0 : low - room, high + room];
   };
 
-  const steps = (width) => {  // groups of pieces, one per pixel where there are more than pixels
-    const [from, to] = pieces();
-    const size = Math.max(1, Math.floor((to - from) / Math.max(width, 1)));
-    const list = [];
-    for (let i = from - (from % size); i < to; i += size) list.push([i, i + size]);
-    return list;
-  };
-  const outline = (column, x, y, width) => {
-    const groups = steps(width);
-    const wide = groups.length > 0 && x(data.width) - x(0) > 3;
+  const outline = (source, column, frame) => {
+    const at = (piece) => frame.x(source.start + piece * source.width).toFixed(1);
+    const wide = (source.width / (frame.to - frame.from)) * frame.inner > 3;
     let path = "", up = true, broken = true;
-    for (const [from, to] of groups) {
-      const [low, high] = extremes(column, from, to);
+    for (const [from, to] of groups(source, frame)) {
+      const [low, high] = extremes(source, column, from, to);
       if (low > high) { broken = true; continue; }
       if (wide && low !== high) {  // a box: where in it the values lie is not known
-        path += `M${x(from * data.width).toFixed(1)} ${y(low).toFixed(1)}` +
-          `H${x(to * data.width).toFixed(1)}V${y(high).toFixed(1)}` +
-          `H${x(from * data.width).toFixed(1)}Z`;
+        path += `M${at(from)} ${frame.y(low).toFixed(1)}H${at(to)}V${frame.y(high).toFixed(1)}` +
+          `H${at(from)}Z`;
         broken = true;
         continue;
       }
-      const at = x(((from + to) / 2) * data.width).toFixed(1);
       const ends = up ? [low, high] : [high, low];
-      path += `${broken ? "M" : "L"}${at} ${y(ends[0]).toFixed(1)}`;
-      if (low !== high) { path += `L${at} ${y(ends[1]).toFixed(1)}`; up = !up; }
+      path += `${broken ? "M" : "L"}${at((from + to) / 2)} ${frame.y(ends[0]).toFixed(1)}`;
+      if (low !== high) {
+        path += `L${at((from + to) / 2)} ${frame.y(ends[1]).toFixed(1)}`;
+        up = !up;
+      }
       broken = false;
     }
     return { path, wide };
   };
-  const band = (panel, x, y, width) => {
+  const band = (source, panel, frame) => {
     const top = [], bottom = [];
-    for (const [from, to] of steps(width)) {
-      const [low, high] = extremes(panel.band, from, to);
+    for (const [from, to] of groups(source, frame)) {
+      const [low, high] = extremes(source, panel.band, from, to);
       if (low > high) continue;
-      const at = x(((from + to) / 2) * data.width).toFixed(1);
-      top.push(`${at} ${y(high + panel.limit).toFixed(1)}`);
-      bottom.unshift(`${at} ${y(low - panel.limit).toFixed(1)}`);
+      const at = frame.x(source.start + ((from + to) / 2) * source.width).toFixed(1);
+      top.push(`${at} ${frame.y(high + panel.limit).toFixed(1)}`);
+      bottom.unshift(`${at} ${frame.y(low - panel.limit).toFixed(1)}`);
     }
     return top.length ? `M${top.join("L")}L${bottom.join("L")}Z` : "";
   };
 
-  const frame = (svg, width, height) => {
-    svg.replaceChildren();
-    svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
-    const scale = (width - LEFT - RIGHT) / (view[1] - view[0]);
-    return (t) => LEFT + (t - view[0]) * scale;
-  };
-  const axis = (svg, x, width, height) => {
-    const { list, digits } = ticks(clock(view[0]), clock(view[1]), Math.max(width / 110, 2));
+  const axis = (svg, frame) => {
+    const { list, digits } = ticks(clock(frame.from), clock(frame.to), Math.max(frame.width / 110, 2));
     for (const value of list) {
-      const at = x(value - clock(0));
-      node("line", { x1: at, x2: at, y1: TOP, y2: height - BOTTOM, class: "grid" }, svg);
-      const label = { x: at, y: height - 5, "text-anchor": "middle" };
+      const at = frame.x(value - clock(0));
+      node("line", { x1: at, x2: at, y1: TOP, y2: frame.height - BOTTOM, class: "grid" }, svg);
+      const label = { x: at, y: frame.height - 5, "text-anchor": "middle" };
       node("text", label, svg).textContent = value.toFixed(digits);
     }
   };
-  const clip = (t, x, width) => Math.min(Math.max(x(t), LEFT), width - RIGHT);
-  const shade = (svg, x, width, event, y, height, more) => {
-    const from = clip(event.from, x, width), to = clip(event.to, x, width);
-    if (event.to < view[0] || event.from > view[1]) return;
+  const rule = (svg, frame, v, kind) => node("line",
+    { x1: LEFT, x2: frame.width - RIGHT, y1: frame.y(v), y2: frame.y(v), class: kind }, svg);
+  const scale = (svg, frame, low, high) => {
+    const { list, digits } = ticks(low, high, 5);
+    for (const v of list) {
+      rule(svg, frame, v, v === 0 ? "zero" : "grid");
+      const label = { x: LEFT - 8, y: frame.y(v) + 4, "text-anchor": "end" };
+      node("text", label, svg).textContent = v.toFixed(digits);
+    }
+  };
+  const shade = (svg, frame, event, y, height, more) => {
+    if (event.to < frame.from || event.from > frame.to) return;
+    const from = frame.clip(event.from), to = frame.clip(event.to);
     const size = { x: from, y, width: Math.max(to - from, 1), height };
     const rect = node("rect", { ...size, class: `event ${event.level} ${more}` }, svg);
     node("title", {}, rect).textContent = event.title;
   };
-
   let clips = 0;
-  const clipTo = (svg, width, height) => {
-    const id = `clip${clips++}`;
-    node("rect", { x: LEFT, y: TOP, width, height }, node("clipPath", { id }, svg));
+  const clipTo = (svg, frame) => {
+    const id = `clip${clips++}`, height = frame.height - TOP - BOTTOM;
+    const holder = node("clipPath", { id }, svg);
+    node("rect", { x: LEFT, y: TOP, width: frame.inner, height }, holder);
     return { "clip-path": `url(#${id})` };
   };
 
-  const drawPanel = (panel, svg) => {
-    const width = Math.max(svg.clientWidth, 320), height = 120;
-    const x = frame(svg, width, height), [low, high] = range(panel);
-    const y = (v) => TOP + ((high - v) / (high - low)) * (height - TOP - BOTTOM);
-    const inner = width - LEFT - RIGHT;
-    axis(svg, x, width, height);
-    const { list, digits } = ticks(low, high, 5);
-    for (const v of list) {
-      const kind = v === 0 ? "zero" : "grid";
-      node("line", { x1: LEFT, x2: width - RIGHT, y1: y(v), y2: y(v), class: kind }, svg);
-      const label = { x: LEFT - 8, y: y(v) + 4, "text-anchor": "end" };
-      node("text", label, svg).textContent = v.toFixed(digits);
-    }
+  const drawPanel = (plot) => {
+    const { svg, source, panel } = plot, frame = new Frame(plot, plot.height);
+    const [low, high] = range(source, panel, frame);
+    frame.range(low, high);
+    axis(svg, frame);
+    scale(svg, frame, low, high);
     for (const event of data.events)
       if (panel.segment === null || event.segment === panel.segment)
-        shade(svg, x, width, event, TOP, height - TOP - BOTTOM, "");
-    const clipped = clipTo(svg, inner, height - TOP - BOTTOM);
+        shade(svg, frame, event, TOP, frame.height - TOP - BOTTOM, "");
+    const clipped = clipTo(svg, frame);
     if (panel.band !== null)
-      node("path", { d: band(panel, x, y, inner), class: "band", ...clipped }, svg);
-    else if (panel.limit !== null)
-      node("line", { x1: LEFT, x2: width - RIGHT, y1: y(panel.limit), y2: y(panel.limit),
-        class: "limit" }, svg);
+      node("path", { d: band(source, panel, frame), class: "band", ...clipped }, svg);
+    else if (panel.limit !== null) rule(svg, frame, panel.limit, "limit");
     // Drawn last to first: the first curve is the one that matters most.
-    panel.curves.map((c, i) => [c, i]).reverse().forEach(([curve, i]) =>
-{
-      const { path, wide } = outline(curve.column, x, y, inner);
+    for (let i = panel.columns.length - 1; i >= 0; i--) {
+      const { path, wide } = outline(source, panel.columns[i], frame);
       node("path", { d: path, class: `curve s${i}${wide ? " boxes" : ""}`, ...clipped }, svg);
-    });
+    }
   };
-
-  const drawStrip = (svg) => {
+  const drawStrip = (plot) => {
     const rows = data.segments, each = 20;
-    const width = Math.max(svg.clientWidth, 320), height = TOP + rows.length * each + BOTTOM;
-    const x = frame(svg, width, height);
-    axis(svg, x, width, height);
+    const frame = new Frame(plot, TOP + rows.length * each + BOTTOM);
+    axis(plot.svg, frame);
     rows.forEach((name, row) => {
       const label = { x: LEFT - 8, y: TOP + row * each + 14, "text-anchor": "end" };
-      node("text", label, svg).textContent = name;
+      node("text", label, plot.svg).textContent = name;
       for (const event of data.events)
         if (event.segment === name)
-          shade(svg, x, width, event, TOP + row * each + 4, each - 8, "strip");
+          shade(plot.svg, frame, event, TOP + row * each + 4, each - 8, "strip");
     });
   };
 
-  const plots = [];
-  const addPlot = (holder, draw) => {
-    const svg = holder.querySelector("svg");
-    plots.push({ svg, draw: () => draw(svg) });
-    interact(svg);
-    return svg;
-  };
-  const redraw = () => {
-    plots.forEach((plot) => plot.draw());
-    const shown = document.getElementById("shown");
-    if (shown) shown.textContent =
-      `${clock(view[0]).toFixed(2)} s to ${clock(view[1]).toFixed(2)} s`;
-  };
-  const show = (from, to) => {
-    const least = Math.min(4 * data.width, whole[1]);
-    const room = Math.max(0, (least - (to - from)) / 2);
-    const low = Math.max(whole[0], from - room), high = Math.min(whole[1], to + room);
-    view = high > low ? [low, high] : whole;
-    redraw();
+  // Plots that show the same time.
+  class Group {
+    constructor(whole, least) {
+      this.whole = whole;
+      this.least = Math.min(least, whole[1] - whole[0]);
+      this.view = whole;
+      this.plots = [];
+    }
+    draw() { this.plots.forEach((plot) => plot.draw(plot)); shown(this); }
+    show(from, to) {
+      const size = Math.min(Math.max(to - from, this.least), this.whole[1] - this.whole[0]);
+      const middle = (from + to) / 2;
+      const low = Math.min(Math.max(middle - size / 2, this.whole[0]), this.whole[1] - size);
+      this.view = [low, low + size];
+      this.draw();
+    }
+    zoom(factor, around) {
+      const [from, to] = this.view;
+      const size = Math.min((to - from) * factor, this.whole[1] - this.whole[0]);
+      const low = around - ((around - from) * Math.max(size, this.least)) / (to - from);
+      this.show(low, low + Math.max(size, this.least));
+    }
+    move(part) {
+      const by = part * (this.view[1] - this.view[0]);
+      this.show(this.view[0] + by, this.view[1] + by);
+    }
+    reset() { this.show(...this.whole); }
+  }
+  const shown = (group) => {
+    const field = document.getElementById("shown");
+    if (field && group === recording)
+      field.textContent = `${clock(group.view[0]).toFixed(2)} s to ${clock(group.view[1]).toFixed(2)} s`;
   };
 
-  const timeAt = (svg, event) => {
-    const box = svg.getBoundingClientRect();
-    const part = (event.clientX - box.left - LEFT) / (box.width - LEFT - RIGHT);
-    return view[0] + Math.min(Math.max(part, 0), 1) * (view[1] - view[0]);
+  const timeAt = (plot, event) => {
+    const box = plot.svg.getBoundingClientRect(), [from, to] = plot.group.view;
+    const width = plot.svg.viewBox.baseVal.width;
+    const part = (((event.clientX - box.left) / box.width) * width - LEFT) / (width - LEFT - RIGHT);
+    return from + Math.min(Math.max(part, 0), 1) * (to - from);
   };
-  let begun = null;
-  const interact = (svg) => {
+  let begun = null;  // a drag: where it began, and whether it moves or frames
+  const finish = (plot, event) => {
+    if (!begun) return;
+    const [a, b] = [begun.time, timeAt(plot, event)].sort((p, q) => p - q);
+    const { moves } = begun, [from, to] = plot.group.view;
+    begun = null;
+    if (!moves && b - a > (to - from) / 200) plot.group.show(a, b);
+    else plot.group.draw();
+  };
+  const KEYS = {
+    "+": (g, t) => g.zoom(1 / TURN, t), "=": (g, t) => g.zoom(1 / TURN, t),
+    "-": (g, t) => g.zoom(TURN, t), ArrowLeft: (g) => g.move(-STEP), ArrowRight: (g) => g.move(STEP),
+    0: (g) => g.reset(), Home: (g) => g.reset(), Escape: (g) => g.reset(),
+  };
+  const interact = (plot) => {
+    const { svg, group } = plot;
+    svg.setAttribute("tabindex", "0");
     svg.addEventListener("pointerdown", (e) => {
       if (e.button !== 0 || e.pointerType === "touch") return;
-      begun = { svg, time: timeAt(svg, e) };
+      begun = { time: timeAt(plot, e), moves: e.shiftKey };
       svg.setPointerCapture(e.pointerId);
     });
-    svg.addEventListener("pointermove", (e) => cursor(svg, timeAt(svg, e)));
-    svg.addEventListener("pointerup", (e) => {
-      if (!begun) return;
-      const [a, b] = [begun.time, timeAt(svg, e)].sort((p, q) => p - q);
-      begun = null;
-      if ((b - a) > (view[1] - view[0]) / 200) show(a, b); else redraw();
+    svg.addEventListener("pointermove", (e) => {
+      if (begun && begun.moves) {
+        const by = begun.time - timeAt(plot, e);
+        group.show(group.view[0] + by, group.view[1] + by);
+      } else cursor(group, timeAt(plot, e));
     });
-    svg.addEventListener("dblclick", () => show(...whole));
-    svg.addEventListener("pointerleave", () => cursor(svg, null));
+    svg.addEventListener("pointerup", (e) => finish(plot, e));
+    svg.addEventListener("dblclick", () => group.reset());
+    svg.addEventListener("pointerleave", () => cursor(group, null));
+    svg.addEventListener("wheel", (e) => {
+      // A page full of plots must scroll: the wheel zooms the plot that was clicked, or with Ctrl.
+      if (!e.ctrlKey && document.activeElement !== svg) return;
+      e.preventDefault();
+      if (Math.abs(e.deltaX) > Math.abs(e.deltaY)) group.move(Math.sign(e.deltaX) * 0.05);
+      else group.zoom(TURN ** Math.sign(e.deltaY), timeAt(plot, e));
+    }, { passive: false });
+    svg.addEventListener("keydown", (e) => {
+      const act = KEYS[e.key];
+      if (!act || e.ctrlKey || e.metaKey || e.altKey) return;
+      e.preventDefault();
+      act(group, (group.view[0] + group.view[1]) / 2);
+    });
   };
-  const cursor = (source, time) => {
-    for (const { svg } of plots) {
+  const cursor = (group, time) => {
+    for (const plot of group.plots) {
+      const { svg, source } = plot;
       svg.querySelectorAll(".cursor, .drag").forEach((old) => old.remove());
+      plot.values.forEach((span, i) => {
+        const at = time === null || !source ? -1 : Math.floor((time - source.start) / source.width);
+        const { low, high } = source.curves[plot.panel.columns[i]];
+        const value = at >= 0 && at < source.count ? (low[at] + high[at]) / 2 : NaN;
+        span.textContent = Number.isFinite(value) ? value.toFixed(3) : "";
+      });
       if (time === null) continue;
-      const box = svg.viewBox.baseVal, scale = (box.width - LEFT - RIGHT) / (view[1] - view[0]);
-      const x = (t) => LEFT + (t - view[0]) * scale;
+      const box = svg.viewBox.baseVal, [from, to] = group.view;
+      const x = (t) => LEFT + ((t - from) / (to - from)) * (box.width - LEFT - RIGHT);
       node("line", { x1: x(time), x2: x(time), y1: TOP, y2: box.height - BOTTOM,
         class: "cursor" }, svg);
-      if (begun) {
+      if (begun && !begun.moves) {
         const [a, b] = [begun.time, time].sort((p, q) => p - q);
         node("rect", { x: x(a), y: TOP, width: x(b) - x(a), height: box.height - TOP - BOTTOM,
           class: "drag" }, svg);
       }
     }
-    const at = time === null ? -1 : Math.floor(time / data.width);
-    document.querySelectorAll("[data-curve]").forEach((span) => {
-      const { low, high } = curves[Number(span.dataset.curve)];
-      const value = at >= 0 && at < data.count ? (low[at] + high[at]) / 2 : NaN;
-      span.textContent = Number.isFinite(value) ? value.toFixed(3) : "";
-    });
     const readout = document.getElementById("at");
-    if (readout) readout.textContent = time === null ? "" : `at ${clock(time).toFixed(3)} s`;
+    if (readout && group === recording)
+      readout.textContent = time === null ? "" : `at ${clock(time).toFixed(3)} s`;
   };
 
+  const length = Math.max(data.count * data.width, 1e-9);
+  const recording = new Group([0, length], 4 * data.width);
+  const overall = { start: 0, width: data.width, count: data.count, curves: data.curves.map(unpack) };
+  const add = (holder, group, source, panel, draw) => {
+    const svg = holder.querySelector("svg"), values = panel ? holder.querySelectorAll(".value") : [];
+    const plot = { svg, group, source, panel, draw, values, height: svg.viewBox.baseVal.height };
+    group.plots.push(plot);
+    interact(plot);
+  };
   document.querySelectorAll("[data-panel]").forEach((holder) => {
     const panel = data.panels[Number(holder.dataset.panel)];
-    addPlot(holder, (svg) => drawPanel(panel, svg));
+    add(holder, recording, overall, panel, drawPanel);
   });
-  document.querySelectorAll("[data-strip]").forEach((holder) => addPlot(holder, drawStrip));
+  document.querySelectorAll("[data-strip]").forEach((holder) =>
+    add(holder, recording, null, null, drawStrip));
+  const besides = [];
+  const takeOver = (figure) => {
+    const [start, width, count] = JSON.parse(figure.dataset.window);
+    const group = new Group([start, start + width * count], 4 * width);
+    besides.push(group);
+    figure.querySelectorAll("[data-plot]").forEach((holder) => {
+      const plot = JSON.parse(holder.dataset.plot);
+      const paths = [...holder.querySelectorAll("path.curve")];
+      const read = (path) => readPath(path.getAttribute("d"), { ...plot, count });
+      const curves = paths.map(read), columns = paths.map((_, i) => i);
+      const panel = { segment: plot.segment, columns, band: null, limit: plot.limit };
+      add(holder, group, { start, width, count, curves }, panel, drawPanel);
+    });
+    group.draw();
+  };
+  // There may be hundreds; each is drawn anew once it comes near the window.
+  const watch = new IntersectionObserver((entries) => {
+    for (const { isIntersecting, target } of entries)
+      if (isIntersecting) { watch.unobserve(target); takeOver(target); }
+  }, { rootMargin: "300px" });
+  document.querySelectorAll("[data-window]").forEach((figure) => watch.observe(figure));
+
+  const goTo = (row) => {
+    const event = data.events[Number(row.dataset.event)];
+    if (event === undefined) return;
+    const room = 0.5 * (event.to - event.from) + 0.2;
+    recording.show(event.from - room, event.to + room);
+    const place = document.getElementById(`event-${event.id}`) || document.getElementById("plots");
+    place.scrollIntoView({ behavior: "smooth" });
+  };
   document.querySelectorAll("[data-event]").forEach((row) =>
-    row.addEventListener("click", () => {
-      const event = data.events[Number(row.dataset.event)];
-      const room = 0.5 * (event.to - event.from) + 0.2;
-      show(event.from - room, event.to + room);
-      document.getElementById("plots").scrollIntoView({ behavior: "smooth" });
-    }));
-  const reset = document.getElementById("reset");
-  if (reset) reset.addEventListener("click", () => show(...whole));
+    row.addEventListener("click", () => goTo(row)));
+  const button = document.getElementById("reset");
+  if (button) button.addEventListener("click", () => recording.reset());
+  const redraw = () => [recording, ...besides].forEach((group) => group.draw());
   let late = 0;
   window.addEventListener("resize", () => { clearTimeout(late); late = setTimeout(redraw, 120); });
   redraw();
