@@ -3,7 +3,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +10,8 @@ from numpy.typing import NDArray
 from touchline.contact.event import Event
 from touchline.report.traces import Traces
 
-Array = NDArray[np.floating[Any]]
+Array = NDArray[np.float64]
+Array32 = NDArray[np.float32]
 
 PIECES = 512
 BEFORE, AFTER, LONGEST = 0.4, 0.6, 20.0  # s; of an event, at most so much after it began
@@ -33,8 +33,8 @@ class Window:
     start: float
     width: float
     columns: tuple[int, ...]
-    low: Array
-    high: Array
+    low: Array32
+    high: Array32
 
     def coarser(self, most: int) -> "Window":
         """The same with at most so many pieces, each of several."""
@@ -45,7 +45,7 @@ class Window:
         high = np.fmax.reduceat(self.high, starts, axis=0)
         return Window(self.start, self.width * step, self.columns, low, high)
 
-    def of(self, column: int) -> tuple[Array, Array]:
+    def of(self, column: int) -> tuple[Array32, Array32]:
         """Smallest and largest values (P,) of one column."""
         i = self.columns.index(column)
         return self.low[:, i], self.high[:, i]
@@ -96,7 +96,7 @@ class EventWindows:
     def _take(self, event: Event, traces: Traces, time: Array, values: Array) -> None:
         rows = (time >= event.detected - BEFORE) & (time <= _end(event))
         if rows.any():
-            traces.add(time[rows], values[np.ix_(rows, self._columns[event.segment])])
+            traces.add(time[rows], values[rows][:, list(self._columns[event.segment])])
 
     def _finish(self, now: float) -> None:
         for number, (event, traces) in list(self._growing.items()):
