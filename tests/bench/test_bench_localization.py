@@ -1,52 +1,95 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The localization benchmark, small."""
+"""The localization benchmark, small: signals, places, judgement, tables."""
 
 import csv
 
 import numpy as np
 import pytest
+from oracle import PinocchioTwin
 
 import touchline as tl
-from touchline.bench.localization import run_trials, table, write
+from touchline.bench.arm import TIERS, load_arm
+from touchline.bench.credibility import mixture_level
+from touchline.bench.localization import Plan, main, run_plan
+from touchline.bench.localization_table import wilson
+from touchline.bench.localization_trial import Cell, make_scene, pair_rank, run_trial
+from touchline.bench.matching import distances, match
 from touchline.bench.touches import TouchSampler, touch_loads
 from touchline.contact.skin import Skin
+from touchline.errors import InputError
 
 
-@pytest.fixture(scope="module")
-def trials():
-    return list(run_trials(tl.load_robot("sara"), (20.0,), 60, seed=4))
+def panda(tier=0):
+    try:
+        return load_arm("panda", tier)
+    except InputError as error:
+        pytest.skip(str(error))
 
 
-def test_touches_of_20_newton_are_found(trials):
+def test_single_touches_are_found():
+    trials = [run_trial(Cell("sara", tier=1), run) for run in range(60)]
     assert sum(trial.found for trial in trials) >= 59
-    assert sum(trial.row_found for trial in trials) >= 58
-    assert np.median([trial.error for trial in trials]) < 1e-3
+    assert sum(trial.event_found for trial in trials) >= 59
+    assert np.median([trial.touches[0].error for trial in trials]) < 1e-3
 
 
-def test_the_table_and_the_file_hold_every_trial(trials, tmp_path):
-    lines = table(trials).splitlines()
-    assert lines[-1].split()[:2] == ["all", "60"]
-    bodies = {trial.body for trial in trials}
-    assert bodies <= {line.split()[0] for line in lines if line}
-    write(tmp_path / "trials.csv", trials)
-    with (tmp_path / "trials.csv").open() as file:
-        assert len(list(csv.DictReader(file))) == 60
+def test_statics_are_pinocchios():
+    """Weight and touches at rest, against rnea and Jacobians of a tree with free joints."""
+    robot = panda()
+    twin = PinocchioTwin(robot.description, robot.mechanism)
+    for run in range(5):
+        scene = make_scene(Cell("panda", 2, together=True), run)
+        q = scene.signals.q[-1]
+        expected = twin.loads(q, 0 * q, 0 * q)
+        first = np.r_[scene.signals.tau[0], scene.signals.wrench[0].ravel()]
+        np.testing.assert_allclose(first, expected, atol=1e-10)
+        for touch, _ in scene.touches:
+            outboard = robot.joints_inboard_of(robot.body_of(touch.patch.body))
+            body = outboard[-1] if outboard else "base"
+            expected -= touch.force @ twin.jacobian_world(q, body, touch.position)
+        last = np.r_[scene.signals.tau[-1], scene.signals.wrench[-1].ravel()]
+        np.testing.assert_allclose(last, expected, atol=1e-10)
+
+
+def test_motion_is_pinocchios():
+    robot = panda()
+    twin = PinocchioTwin(robot.description, robot.mechanism)
+    scene = make_scene(Cell("panda", 1, speed=1.0), 3)
+    s = scene.signals
+    assert np.abs(s.qd).max() == pytest.approx(1.0)
+    np.testing.assert_allclose(np.diff(s.q, axis=0), s.qd[1:] * 1e-3, atol=1e-12)
+    loads = np.r_[s.tau[20], s.wrench[20].ravel()]  # before the touch
+    np.testing.assert_allclose(loads, twin.loads(s.q[20], s.qd[20], 0 * s.q[20]), atol=1e-9)
 
 
 def test_sampled_touches_can_be_reached():
     robot = tl.load_robot("sara")
     skin = Skin(robot)
     sampler = TouchSampler(skin, np.random.default_rng(3), clearance=0.03)
-    for _ in range(30):
-        touch = sampler.sample(20.0)
-        assert np.linalg.norm(touch.force) == pytest.approx(20.0)
-        assert -touch.normal @ touch.force / 20.0 >= 1 / np.sqrt(1.25) - 1e-9
-        assert touch.position[2] >= 0.0
-        assert skin.nearest(touch.q, touch.patch.link, touch.position)[0] < 1e-9
-        for patch in skin.patches:
-            if patch.link != touch.patch.link:
-                outside = touch.position + 1e-6 * touch.normal
-                assert patch.link not in skin.links_around(touch.q, outside)
+    for _ in range(15):
+        for touch in (touches := sampler.sample_several(2, 20.0)):
+            assert np.linalg.norm(touch.force) == pytest.approx(20.0)
+            assert -touch.normal @ touch.force / 20.0 >= 1 / np.sqrt(1.25) - 1e-9
+            assert touch.position[2] >= 0.0
+            assert skin.nearest(touch.q, touch.patch.link, touch.position)[0] < 1e-9
+            for way in (touch.normal, -touch.force / 20.0):
+                for step in (1e-6, 0.01, 0.0299):
+                    assert skin.links_around(touch.q, touch.position + step * way) == []
+        assert touches[0].patch.body != touches[1].patch.body
+
+
+def test_points_are_uniform_over_the_area():
+    """Without rules that reject, the share of each link is that of its area."""
+    robot = tl.load_robot("sara")
+    skin = Skin(robot)
+    sampler = TouchSampler(skin, np.random.default_rng(5), clearance=0.0, floor=-9.0)
+    sampler._reachable = lambda *args: True
+    sampler._free = lambda *args: True
+    links = [sampler.sample(20.0).patch.link for _ in range(3000)]
+    areas = {p.link: p.surface.areas.sum() for p in skin.patches if p.segment is not None}
+    for link, area in areas.items():
+        share = area / sum(areas.values())
+        assert np.mean([x == link for x in links]) == pytest.approx(share, abs=0.035)
 
 
 def test_the_loads_of_a_touch_are_its_virtual_work():
@@ -63,3 +106,86 @@ def test_the_loads_of_a_touch_are_its_virtual_work():
         ends = [robot.poses(touch.q + s * step)[touch.patch.node] @ local for s in (-1, 1)]
         column = (ends[1] - ends[0])[:3] / 2e-6
         assert loads[j] == pytest.approx(column @ touch.force, abs=1e-6)
+
+
+def test_the_description_says_how_noisy_the_sensors_are():
+    for tier in (0, 2):
+        noise = load_arm("sara", tier).description.noise
+        assert set(noise.tau) == {TIERS[tier].torque}
+        assert noise.sensors["base"] == (TIERS[tier].force,) * 3 + (TIERS[tier].moment,) * 3
+    rest = make_scene(Cell("sara", tier=2), 0).signals
+    assert rest.wrench[:50, 0, :3].std(axis=0) == pytest.approx(0.2, rel=0.4)
+    assert rest.wrench[:50, 0, 3:].std(axis=0) == pytest.approx(0.05, rel=0.4)
+    assert rest.tau[:50, 1].std() == pytest.approx(0.1, rel=0.4)
+
+
+def test_tiers_and_timing_share_poses_and_places():
+    a = make_scene(Cell("sara", 2, 0), 7).touches
+    b = make_scene(Cell("sara", 2, 3, together=True), 7).touches
+    for (one, _), (other, _) in zip(a, b, strict=True):
+        np.testing.assert_array_equal(one.position, other.position)
+
+
+def test_rank_of_pairs():
+    robot = tl.load_robot("sara-full")
+    assert pair_rank(robot, ["link1", "link5"]) == 10
+    assert pair_rank(robot, ["link3", "link2"]) == 7
+    assert pair_rank(robot, ["link1", "tool"]) == 0
+    assert pair_rank(robot, ["link1"]) == 0
+    sixteen = tl.load_robot("sara")
+    assert pair_rank(sixteen, ["link1", "link5"]) == 10
+    assert pair_rank(sixteen, ["link0", "link5"]) == 10  # joint 1 has no sensor of its own
+
+
+def test_matching_takes_the_least_sum():
+    places = np.array([[0.0, 0, 0], [1.0, 0, 0]])
+    assert match(distances(places, [np.array([0.9, 0, 0]), None, np.array([0.1, 0, 0])])) == [2, 0]
+    assert match(distances(places, [np.array([0.2, 0, 0])])) == [0, None]
+    assert match(distances(places, [])) == [None, None]
+
+
+def test_credibility_of_truths_from_the_posterior_is_uniform():
+    """Places drawn from two normal distributions on two bodies, the wrong body 20 % of the time."""
+    chance = np.random.default_rng(0)
+    weights = np.array([0.8, 0.2])
+    means = np.array([[0.0, 0, 0], [0.1, 0, 0]])
+    spread = np.diag([0.01**2, 0.02**2, 0.0])
+    covariances = np.array([spread, 4 * spread])
+    levels = []
+    for _ in range(500):
+        k = chance.choice(2, p=weights)
+        place = means[k] + chance.normal(size=3) * np.sqrt(np.diag(covariances[k]))
+        levels.append(mixture_level(weights, means, covariances, "ab", place, "ab"[k]))
+    levels = np.array(levels)
+    for share in (0.25, 0.5, 0.9):
+        assert np.mean(levels < share) == pytest.approx(share, abs=0.05)
+    doubled = [
+        mixture_level(weights, means, covariances / 4, "ab", means[0] + 0.02 * x, "a")
+        for x in chance.normal(size=(50, 3)) * [0.5, 1, 0]
+    ]
+    assert np.mean(np.array(doubled) < 0.9) < 0.6  # a posterior that is too sure is seen
+
+
+def test_wilson_interval():
+    low, high = wilson(10, 10)
+    assert (low, high) == pytest.approx((0.7225, 1.0), abs=1e-4)  # Wilson 1927, 95 %
+    low, high = wilson(5, 10)
+    assert (low, high) == pytest.approx((0.2366, 0.7634), abs=1e-4)
+
+
+def test_processes_do_not_change_the_trials():
+    plan = Plan(("sara",), (1, 2), (1,), ("apart",), runs=27, seed=2)
+    alone = [trial for chunk in run_plan(plan, 0) for trial in chunk]
+    shared = [trial for chunk in run_plan(plan, 2) for trial in chunk]
+    assert {(t.cell, t.run): repr(t) for t in alone} == {(t.cell, t.run): repr(t) for t in shared}
+    assert len(alone) == 54
+
+
+def test_tables_and_files_hold_every_trial(tmp_path, capsys):
+    plan = Plan(("sara",), (1, 2), (0, 1), ("apart", "together"), runs=3)
+    main(plan, tmp_path, processes=0)
+    printed = capsys.readouterr().out
+    assert "sara, noise-free" in printed and "Han and Kim" in printed
+    assert (tmp_path / "tables.txt").read_text() == printed
+    with (tmp_path / "trials.csv").open() as file:
+        assert len(list(csv.DictReader(file))) == 2 * 3 * (1 + 2 + 2)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.contact.skin import Patch, Skin
+from touchline.estimation.dynamics import gravity_loads
 from touchline.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -39,7 +40,7 @@ class TouchSampler:
         rng: source of chance.
         segments: only links of these segments; default: all that are felt.
         friction: forces are uniform in this friction cone.
-        clearance: free space along the outward normal [m].
+        clearance: free space along the outward normal and along the way the push comes [m].
         floor: points lie above this height [m].
     """
 
@@ -62,16 +63,33 @@ class TouchSampler:
         areas = np.array([patch.surface.areas.sum() for patch in self._patches])
         self._shares = areas / areas.sum()
 
-    def sample(self, force: float, q: Array | None = None) -> Touch:
-        """A reachable touch of `force` [N], at joint positions `q` (n,) or at random ones."""
+    def sample(self, force: float, q: Array | None = None, taken: tuple[str, ...] = ()) -> Touch:
+        """A reachable touch of `force` [N], at joint positions `q` (n,) or at random ones.
+
+        Args:
+            force: [N].
+            q: joint positions (n,) [rad or m].
+            taken: rigid bodies that are not to be touched.
+        """
         given = q
         while True:
             q = self._rng.uniform(*_limits(self.robot)) if given is None else given
             patch = self._patches[self._rng.choice(len(self._patches), p=self._shares)]
+            if patch.body in taken:
+                continue
             point, normal = self._point(patch, q)
-            if self._reachable(q, patch, point, normal):
-                push = force * _in_cone(-normal, self._friction, self._rng)
-                return Touch(q, patch, point, normal, push)
+            if self._reachable(q, point, normal):
+                way = _in_cone(-normal, self._friction, self._rng)
+                if self._free(q, point, -way):
+                    return Touch(q, patch, point, normal, force * way)
+
+    def sample_several(self, count: int, force: float) -> list[Touch]:
+        """Reachable touches of an arm in one random pose, at most one per rigid body."""
+        touches = [self.sample(force)]
+        while len(touches) < count:
+            taken = tuple(touch.patch.body for touch in touches)
+            touches.append(self.sample(force, touches[0].q, taken))
+        return touches
 
     def _point(self, patch: Patch, q: Array) -> tuple[Array, Array]:
         surface = patch.surface
@@ -84,11 +102,14 @@ class TouchSampler:
         local = a + u * (b - a) + v * (c - a)
         return T[:3, :3] @ local + T[:3, 3], T[:3, :3] @ surface.normals[face]
 
-    def _reachable(self, q: Array, patch: Patch, point: Array, normal: Array) -> bool:
+    def _reachable(self, q: Array, point: Array, normal: Array) -> bool:
         if point[2] < self._floor or self.skin.links_around(q, point + 1e-6 * normal):
             return False
-        ahead = [c.distance for c in self.skin.crossings(q, point, normal) if c.distance > 1e-6]
-        return not ahead or min(ahead) > self._clearance
+        return self._free(q, point, normal)
+
+    def _free(self, q: Array, point: Array, direction: Array) -> bool:
+        crossings = self.skin.crossings(q, point, direction)
+        return all(not 1e-6 < c.distance < self._clearance for c in crossings)
 
 
 def _limits(robot: Robot) -> tuple[Array, Array]:
@@ -141,21 +162,40 @@ def resting_signals(
     """
     n, k = len(robot.joint_names), len(robot.sensor_names)
     time = np.arange(round(duration / period), dtype=np.float64) * np.float64(period)
-    rest = robot.terms(q, np.zeros(n))[1]
+    weight = gravity_loads(robot, q)
+    rest = np.concatenate([weight.torque, weight.wrench.ravel()])
     loads = np.zeros((len(time), n + 6 * k))
     for touch, begin in touches:
         loads[time >= begin] += touch_loads(robot, q, touch.patch.node, touch.position, touch.force)
     signals = rest - loads  # at rest: 0 = tau - n + tau_ext
-    qd = np.zeros((len(time), n))
+    still = np.zeros((len(time), n))
+    exact = Signals(
+        time,
+        np.tile(q, (len(time), 1)),
+        still,
+        signals[:, :n],
+        signals[:, n:].reshape(len(time), k, 6),
+    )
+    return add_noise(robot, exact, rng)
+
+
+def add_noise(robot: Robot, exact: Signals, rng: np.random.Generator | None) -> Signals:
+    """Signals with the noise of the robot's description, and NaN where it has no sensor.
+
+    Args:
+        robot: the robot.
+        exact: signals of ideal sensors.
+        rng: source of the noise; None: without noise.
+    """
+    tau, wrench, qd = exact.tau, exact.wrench, exact.qd
     if rng is not None:
         noise = robot.description.noise
-        sensors = [x for name in robot.sensor_names for x in noise.sensors[name]]
-        signals = signals + rng.normal(size=signals.shape) * np.array([*noise.tau, *sensors])
-        qd = rng.normal(size=qd.shape) * np.array(noise.qd)
-    tau = np.where(_measured(robot), signals[:, :n], np.nan)
-    return Signals(
-        time, np.tile(q, (len(time), 1)), qd, tau, signals[:, n:].reshape(len(time), k, 6)
-    )
+        axes = np.array([noise.sensors[name] for name in robot.sensor_names]).reshape(-1, 6)
+        tau = tau + rng.normal(size=tau.shape) * np.array(noise.tau)
+        wrench = wrench + rng.normal(size=wrench.shape) * axes
+        qd = qd + rng.normal(size=qd.shape) * np.array(noise.qd)
+    tau = np.where(_measured(robot), tau, np.nan)
+    return Signals(exact.time, exact.q, qd, tau, wrench)
 
 
 def touch_loads(robot: Robot, q: Array, node: int, position: Array, force: Array) -> Array:

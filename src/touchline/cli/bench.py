@@ -1,19 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """`touchline bench`."""
 
-from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
-BENCHMARKS = {
-    "observer": "touchline.bench.observer",
-    "localization": "touchline.bench.localization",
-}
-
-
-Name = Literal["observer", "localization"]
+NAMES = ("observer", "localization")
 
 
 def bench(
@@ -23,19 +16,41 @@ def bench(
     /,
     output: Annotated[Path | None, arg(metavar="FILE")] = None,
     rounds: int = 40,
+    robots: tuple[Literal["panda", "sara", "sara-full", "ur10"], ...] = ("panda",),
+    contacts: tuple[Literal[1, 2, 3], ...] = (1, 2, 3),
+    noise: tuple[Literal[0, 1, 2, 3], ...] = (0, 1, 2, 3),
+    begin: tuple[Literal["apart", "together"], ...] = ("apart", "together"),
+    speeds: tuple[float, ...] = (0.0,),
+    runs: int = 1000,
+    seed: int = 0,
+    out: Annotated[Path | None, arg(metavar="DIR")] = None,
 ) -> int:
     """Measures speed and accuracy beside the peers that are installed.
 
-    Example: touchline bench observer
+    Example: touchline bench localization --robots panda sara --runs 10000 --out figures
 
     Args:
         names: What to measure (observer, localization); default: everything.
-        output: Writes the figures here as well (.json or .csv), one file per name.
-        rounds: How often each candidate is timed; ten touches with each force.
+        output: observer: writes the figures here as well (.json or .csv).
+        rounds: observer: how often each candidate is timed.
+        robots: localization: the arms; panda and ur10 need the package example-robot-data.
+        contacts: localization: how many contacts at once, at most one per rigid body.
+        noise: localization: tiers of sensor noise, 0 is none.
+        begin: localization: several contacts begin 0.1 s apart, or at the same instant.
+        speeds: localization: of every joint [rad/s]; 0 is an arm at rest.
+        runs: localization: random poses and places per line of the tables.
+        seed: localization: of all that is random.
+        out: localization: folder for the tables, every run, and figures.
     """
-    wanted = names or tuple(BENCHMARKS)
-    for name in wanted:
-        several = output is not None and len(wanted) > 1
-        file = output.with_stem(f"{output.stem}-{name}") if output and several else output
-        import_module(BENCHMARKS[name]).main(file, rounds)
+    wanted = names or NAMES
+    if "observer" in wanted:
+        from touchline.bench.observer import main as measure_observer
+
+        measure_observer(output, rounds)
+    if "localization" in wanted:
+        from touchline.bench.localization import Plan
+        from touchline.bench.localization import main as measure_localization
+
+        plan = Plan(robots, contacts, noise, begin, speeds, runs, seed)
+        measure_localization(plan, out)
     return 0

@@ -1,0 +1,296 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One run of the localization benchmark: touches, signals, the pipeline, and what it made of them.
+
+Everything random follows from the seed, the cell and the number of the run, so that the result
+does not depend on how runs are spread over processes.
+"""
+
+from dataclasses import astuple, dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.bench.arm import load_arm
+from touchline.bench.credibility import credibility
+from touchline.bench.matching import distances, match
+from touchline.bench.moving import moving_signals
+from touchline.bench.touches import Signals, Touch, TouchSampler, resting_signals
+from touchline.contact.event import Event
+from touchline.contact.localizer import Answer
+from touchline.contact.pipeline import Pipeline
+from touchline.contact.skin import Skin
+from touchline.model.robot import Robot
+
+Array = NDArray[np.float64]
+
+FORCE = 20.0  # N
+NEAR, GROSS = 0.0225, 0.1  # m: what counts as found, and as grossly wrong
+FIRST, APART = 0.06, 0.1  # s: the first onset, after settling, and from one onset to the next
+FRICTION = 0.5
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What is varied.
+
+    Attributes:
+        arm: name of the arm.
+        contacts: how many.
+        tier: of noise.
+        together: all begin at the same instant; otherwise 0.1 s apart.
+        speed: of every joint [rad/s]; 0: at rest.
+    """
+
+    arm: str
+    contacts: int = 1
+    tier: int = 0
+    together: bool = False
+    speed: float = 0.0
+
+
+@dataclass(frozen=True)
+class Touched:
+    """One of a run's touches and what was made of it; NaN and "" where nothing was located.
+
+    Attributes:
+        link: the touched link, `body` its rigid body, x, y, z the point in the link's frame [m].
+        error: distance of the located point from the true one at the last sample [m].
+        force_error: of the force [N].
+        found_link: that was named, on `found_body`.
+        status: of the contact that was matched with this touch.
+        std: root of the trace of its covariance [m].
+        level: smallest credible region that holds the truth, 0 to 1 (`credibility`).
+        event_error: distance of the event's position at its own time [m].
+        event_body: of the event.
+        candidate: probability of the best candidate within reach of the truth; 0: there is none.
+        candidate_error: distance of the candidate nearest to the truth [m].
+    """
+
+    link: str
+    body: str
+    x: float
+    y: float
+    z: float
+    error: float = np.nan
+    force_error: float = np.nan
+    found_link: str = ""
+    found_body: str = ""
+    status: str = "missed"
+    std: float = np.nan
+    level: float = np.nan
+    event_error: float = np.nan
+    event_body: str = ""
+    candidate: float = 0.0
+    candidate_error: float = np.nan
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One run: its touches, how many places the last sample names, and how many events there are.
+
+    `rank` is the number of independent equations of a pair on one segment, which needs ten; 0
+    where the touches do not share one. `statuses` are those of all contacts at the last sample.
+    """
+
+    cell: Cell
+    run: int
+    q: tuple[float, ...]
+    touches: tuple[Touched, ...]
+    named: int
+    events: int
+    statuses: tuple[str, ...]
+    rank: int
+    baselines: tuple[tuple[str, tuple[float, ...]], ...] = ()
+
+    @property
+    def found(self) -> bool:
+        """Every touch is found at the last sample, and nothing else is named."""
+        return self.named == len(self.touches) and all(t.error < NEAR for t in self.touches)
+
+    @property
+    def event_found(self) -> bool:
+        """Every touch is found as an event."""
+        return all(t.event_error < NEAR for t in self.touches)
+
+    @property
+    def in_set(self) -> bool:
+        """Every touch is near one of the explanations that are returned."""
+        return all(t.error < NEAR or t.candidate > 0 for t in self.touches)
+
+    @property
+    def confidently_wrong(self) -> bool:
+        """As many places as touches, all of them called located, and one of them is wrong."""
+        sure = all(status == "located" for status in self.statuses)
+        return sure and self.named >= len(self.touches) and not self.found
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The touches of a run with their onsets [s], and the signals they make."""
+
+    touches: list[tuple[Touch, float]]
+    signals: Signals
+
+
+@lru_cache(maxsize=8)
+def arm_and_skin(arm: str, tier: int) -> tuple[Robot, Skin]:
+    """An arm and its surfaces, kept from run to run."""
+    robot = load_arm(arm, tier)
+    return robot, Skin(robot)
+
+
+def make_scene(cell: Cell, run: int, seed: int = 0) -> Scene:
+    """The touches and signals of one run; tiers and timing do not change pose and places."""
+    robot, skin = arm_and_skin(cell.arm, cell.tier)
+    chance = np.random.default_rng([seed, run, cell.contacts, *cell.arm.encode()])
+    touches = TouchSampler(skin, chance, friction=FRICTION).sample_several(cell.contacts, FORCE)
+    step = 0.0 if cell.together else APART
+    onsets = [(touch, FIRST + i * step) for i, touch in enumerate(touches)]
+    duration = onsets[-1][1] + APART
+    noise = np.random.default_rng([seed, run, cell.tier, 1]) if cell.tier else None
+    if cell.speed:
+        signals = moving_signals(robot, onsets, duration, cell.speed, chance, noise)
+    else:
+        signals = resting_signals(robot, touches[0].q, onsets, duration, noise)
+    return Scene(onsets, signals)
+
+
+def run_trial(cell: Cell, run: int, seed: int = 0) -> Trial:
+    """One run through the whole pipeline."""
+    robot, skin = arm_and_skin(cell.arm, cell.tier)
+    scene = make_scene(cell, run, seed)
+    pipeline = make_pipeline(robot, skin)
+    s = scene.signals
+    pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+    touches = tuple(_judge(pipeline, scene))
+    answers = _last_answers(pipeline, scene)
+    named = sum(answer.position is not None for answer in answers)
+    return Trial(
+        cell,
+        run,
+        tuple(scene.touches[0][0].q),
+        touches,
+        named,
+        len(pipeline.events),
+        tuple(answer.status or "" for answer in answers),
+        pair_rank(robot, [touch.body for touch in touches]),
+    )
+
+
+def make_pipeline(robot: Robot, skin: Skin, rule: str = "likelihood") -> Pipeline:
+    """The pipeline as the benchmark uses it: all errors are those of the noise figures."""
+    return Pipeline(robot, skin=skin, rule=rule, torque_error=0.0)
+
+
+def pair_rank(robot: Robot, bodies: list[str]) -> int:
+    """Independent equations for a contact on each of two bodies of one segment, 0 for others.
+
+    Six of the segment's sensor and one for each joint between the two that has a sensor of its
+    own; two contacts need ten (one has five unknowns).
+    """
+    if len(bodies) != 2:
+        return 0
+    first, second = (robot.body_of(name) for name in bodies)
+    if first.segment != second.segment:
+        return 0
+    between = set(robot.joints_inboard_of(first)) ^ set(robot.joints_inboard_of(second))
+    own = {j.name for j in robot.description.joints if j.torque in ("sensor", "motor")}
+    return 6 + len(between & own)
+
+
+def true_places(robot: Robot, scene: Scene, q: Array) -> Array:
+    """The touched points (m, 3) [m] in world at joint positions `q` (n,)."""
+    start, now = robot.poses(scene.touches[0][0].q), robot.poses(q)
+    places = []
+    for touch, _ in scene.touches:
+        node = touch.patch.node
+        local = start[node][:3, :3].T @ (touch.position - start[node][:3, 3])
+        places.append(now[node][:3, :3] @ local + now[node][:3, 3])
+    return np.array(places)
+
+
+def _last_answers(pipeline: Pipeline, scene: Scene) -> list[Answer]:
+    table = pipeline.contacts
+    last = table.answers[table.sample == len(scene.signals.time) - 1]
+    return [pipeline.localizer.answer(row) for row in last]
+
+
+def _judge(pipeline: Pipeline, scene: Scene) -> list[Touched]:
+    robot, signals = pipeline.robot, scene.signals
+    places = true_places(robot, scene, signals.q[-1])
+    answers = _last_answers(pipeline, scene)
+    mine = match(distances(places, [answer.position for answer in answers]))
+    apart = _event_distances(pipeline.events, robot, scene)
+    my_event = match(apart)
+    judged = []
+    for i, (touch, _) in enumerate(scene.touches):
+        about: dict[str, Any] = {}
+        if (k := my_event[i]) is not None:
+            body = pipeline.events[k].body or ""
+            about |= {"event_error": float(apart[i, k]), "event_body": body}
+        if (k := mine[i]) is not None:
+            about |= _of_answer(answers[k], touch, places[i])
+        about |= _of_candidates(answers, touch, places[i])
+        here = touch.patch
+        T = robot.poses(touch.q)[here.node] @ here.T_node_link
+        x, y, z = (T[:3, :3].T @ (touch.position - T[:3, 3])).tolist()
+        judged.append(Touched(here.link, here.body, x, y, z, **about))
+    return judged
+
+
+def _event_distances(events: list[Event], robot: Robot, scene: Scene) -> Array:
+    """Distances (m, k) [m] of the events' positions from the places at their times."""
+    signals, columns = scene.signals, []
+    for event in events:
+        time = np.inf if event.time_of_position is None else event.time_of_position
+        row = min(int(np.searchsorted(signals.time, time)), len(signals.time) - 1)
+        places = true_places(robot, scene, signals.q[row])
+        columns.append(distances(places, [event.position])[:, 0])
+    return np.array(columns).reshape(len(events), -1).T.reshape(len(scene.touches), len(events))
+
+
+def _of_answer(answer: Answer, touch: Touch, place: Array) -> dict:
+    """What is said of a touch by an answer with a position."""
+    covariance = np.full((3, 3), np.nan) if answer.covariance is None else answer.covariance
+    position, force = (
+        np.full(3, np.nan) if x is None else x for x in (answer.position, answer.force)
+    )
+    return {
+        "error": float(np.linalg.norm(position - place)),
+        "force_error": float(np.linalg.norm(force - touch.force)),
+        "found_link": answer.link or "",
+        "found_body": answer.body or "",
+        "status": answer.status or "",
+        "std": float(np.sqrt(np.trace(covariance))),
+        "level": credibility(answer, touch.patch.body, place),
+    }
+
+
+def _of_candidates(answers: list[Answer], touch: Touch, place: Array) -> dict:
+    known = [k for answer in answers for k in answer.candidates if k.body == touch.patch.body]
+    if not known:
+        return {}
+    errors = [float(np.linalg.norm(k.position - place)) for k in known]
+    near = [k.probability for k, error in zip(known, errors, strict=True) if error < NEAR]
+    return {"candidate": max(near, default=0.0), "candidate_error": min(errors)}
+
+
+def flat(trial: Trial) -> list[dict]:
+    """One row per touch, for a table."""
+    cell = dict(
+        zip(("arm", "contacts", "tier", "together", "speed"), astuple(trial.cell), strict=True)
+    )
+    common = {
+        "run": trial.run,
+        "rank": trial.rank,
+        "named": trial.named,
+        "events": trial.events,
+        "found": trial.found,
+    }
+    rows = []
+    for i, touch in enumerate(trial.touches):
+        other = {f"error_{name}": errors[i] for name, errors in trial.baselines}
+        rows.append({**cell, **common, "contact": i, **vars(touch), **other})
+    return rows
