@@ -10,16 +10,23 @@ fail() {
   exit 1
 }
 
-# need WHAT PACKAGE TEST...: installs the Debian package unless the test passes.
-need() {
-  local what=$1 package=$2
-  shift 2
+# obtain PACKAGE TEST...: installs the Debian package unless the test passes; whether it does then.
+obtain() {
+  local package=$1
+  shift
   if "$@" >/dev/null 2>&1; then return; fi
   if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
     echo "touchline: installing $package" >&2
     (apt-get update -qq && apt-get install -y -qq "$package") >/dev/null 2>&1 || true
   fi
-  "$@" >/dev/null 2>&1 || fail "$what is missing; on Debian: apt-get install $package"
+  "$@" >/dev/null 2>&1
+}
+
+# need WHAT PACKAGE TEST...: the same, and nothing goes without it.
+need() {
+  local what=$1 package=$2
+  shift 2
+  obtain "$package" "$@" || fail "$what is missing; on Debian: apt-get install $package"
 }
 
 need "python3" python3 command -v python3
@@ -29,8 +36,11 @@ need "Python's venv module" python3-venv python3 -c 'import ensurepip, venv'
 need "Python's header files" python3-dev python3 -c \
   'import os, sysconfig; os.stat(os.path.join(sysconfig.get_paths()["include"], "Python.h"))'
 
+obtain chromium sh -c 'command -v chromium || command -v google-chrome' || echo \
+  "touchline: no Chromium, so pages are not tested; on Debian: apt-get install chromium" >&2
+
 [ -x .venv/bin/python ] || python3 -m venv .venv
 .venv/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
 .venv/bin/python -m pip install --quiet --disable-pip-version-check \
-  --editable ".[logs,report]" --group test --group check
+  --editable ".[logs,report,view]" --group test --group check
 touch .venv/ready

@@ -39,6 +39,8 @@ EXTRAS = {
     "rosbags": "logs",
     "collada": "meshes",
     "matplotlib": "report",
+    "viser": "view",
+    "websockets": "view",
     "pinocchio": "bench",
     "idyntree": "bench",
     "example_robot_data": "bench",

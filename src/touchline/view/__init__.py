@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pages in the browser: the robot in three dimensions, touched live or replayed."""

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A robot on the page: its links as meshes that follow the joints."""
+
+from dataclasses import replace
+
+import numpy as np
+import trimesh
+import viser
+from numpy.typing import NDArray
+
+from touchline.model.mechanism import Geometry, Link
+from touchline.model.robot import Robot
+from touchline.model.surface import Surface, link_surface
+from touchline.view.pose import quaternions
+
+Array = NDArray[np.float64]
+Colour = tuple[int, int, int]
+
+SHELL, TRIM, TINT = (241, 242, 244), (93, 100, 109), (255, 190, 110)
+CREASE = np.deg2rad(35.0)  # edges sharper than this stay sharp
+GROUND = 4.0  # m
+
+
+class RobotScene:
+    """The links of a robot.
+
+    Args:
+        scene: of a viser server.
+        robot: that is drawn, at first with all joints at 0.
+
+    Attributes:
+        meshes: handles of the drawn shapes by link.
+    """
+
+    def __init__(self, scene: viser.SceneApi, robot: Robot) -> None:
+        self.robot, self._scene = robot, scene
+        self.meshes: dict[str, list[viser.MeshHandle]] = {}
+        self._frames: dict[str, viser.FrameHandle] = {}
+        self._tinted: frozenset[str] = frozenset()
+        for link in robot.mechanism.links.values():
+            self._add(link)
+        self.place(np.zeros(len(robot.joint_names)))
+
+    def _add(self, link: Link) -> None:
+        name = f"/robot/{link.name}"
+        self._frames[link.name] = self._scene.add_frame(name, show_axes=False)
+        self.meshes[link.name] = []
+        for i, (surface, colour) in enumerate(_drawn(link)):
+            vertices, faces = sharp(surface)
+            handle = self._scene.add_mesh_simple(f"{name}/{i}", vertices, faces, color=colour)
+            self.meshes[link.name].append(handle)
+
+    def place(self, q: Array) -> None:
+        """Moves the links to where joint positions `q` (n,) [rad or m] put them."""
+        poses = self.robot.T_world_links(q)
+        turns = quaternions(np.array([poses[name][:3, :3] for name in self._frames]))
+        for (name, frame), wxyz in zip(self._frames.items(), turns, strict=True):
+            frame.wxyz, frame.position = wxyz, poses[name][:3, 3]
+
+    def tint(self, links: frozenset[str]) -> None:
+        """Colours links, and gives the others their own colours back."""
+        for link in links ^ self._tinted:
+            for mesh, (_, own) in zip(
+                self.meshes[link], _colours(self.robot.mechanism.links[link]), strict=True
+            ):
+                mesh.color = TINT if link in links else own
+        self._tinted = links
+
+
+def dress(page: viser.ViserServer) -> None:
+    """Light, floor and camera for an arm that stands at the origin and reaches about a metre."""
+    scene = page.scene
+    scene.configure_environment_map(None)  # the light below is enough, and costs less
+    scene.configure_default_lights(True, cast_shadow=False)
+    scene.add_light_ambient("/light/ambient", intensity=1.2)
+    scene.add_grid("/ground", GROUND, GROUND, cell_color=(225, 228, 232))
+    page.initial_camera.position = (1.75, 1.25, 1.15)
+    page.initial_camera.look_at = (0.2, 0.0, 0.55)
+
+
+def _drawn(link: Link) -> list[tuple[Surface, Colour]]:
+    """The shapes of a link that can be drawn, with their colours."""
+    found = []
+    for shape, colour in _colours(link):
+        surface = link_surface(replace(link, visual=(shape,), collision=()), "visual")
+        if surface is not None:
+            found.append((surface, colour))
+    return found
+
+
+def _colours(link: Link) -> list[tuple[Geometry, Colour]]:
+    """Shapes that only decorate others are darker."""
+    shapes = link.visual or link.collision
+    solid = {(shape.kind, shape.path) for shape in link.collision}
+    touchable = [(shape.kind, shape.path) in solid for shape in shapes]
+    return [
+        (shape, SHELL if touched or not any(touchable) else TRIM)
+        for shape, touched in zip(shapes, touchable, strict=True)
+    ]
+
+
+def sharp(surface: Surface) -> tuple[Array, NDArray[np.int64]]:
+    """Vertices and faces, the vertices doubled along sharp edges so that these are not rounded."""
+    mesh = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
+    shaded = trimesh.graph.smooth_shade(mesh, angle=CREASE)
+    return np.asarray(shaded.vertices, np.float64), np.asarray(shaded.faces, np.int64)

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page's server: viser behind a guard, for this machine alone unless asked otherwise."""
+
+import contextlib
+import io
+import secrets
+import socket
+import sys
+from typing import Any
+from unittest import mock
+
+import viser
+import websockets.asyncio.server
+from websockets.http11 import Request, Response
+
+from touchline.errors import InputError
+from touchline.view.guard import LOCAL_NAMES, Guard, is_local
+
+HOST, PORT = "127.0.0.1", 8080
+PORTS = 100  # that are tried from the wanted one on
+
+
+class PageServer:
+    """A viser server that answers nobody but its own page and programs on this machine.
+
+    Args:
+        label: heading of the page's panel.
+        host: address to listen at; another than a loopback address needs a token, and prints a
+            warning.
+        port: the first that is tried; 0: any.
+
+    Attributes:
+        page: the viser server, to add things to.
+        url: address to open in a browser, with the token where one is needed.
+
+    Raises:
+        InputError: nothing can be listened at there.
+    """
+
+    def __init__(self, label: str, host: str = HOST, port: int = PORT) -> None:
+        local = is_local(host)
+        self.token = "" if local else secrets.token_urlsafe(24)
+        names = LOCAL_NAMES if local else LOCAL_NAMES | _own_names(host)
+        self.guard = Guard(names, self.token)
+        if not local:
+            print(WARNING.format(host=host), file=sys.stderr)
+        self.page = _guarded(self.guard, label, host, _free_port(host, port))
+        self.url = _url(host, self.page.get_port(), self.token)
+
+    def stop(self) -> None:
+        """Ends the server; its pages show that they have lost it."""
+        with contextlib.redirect_stdout(io.StringIO()):
+            self.page.stop()
+
+    def __enter__(self) -> "PageServer":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+
+WARNING = """\
+touchline: WARNING: listening at {host}, so other machines can see and move what the page shows.
+The connection is not encrypted; whoever has the address below with its token is let in."""
+
+
+def _own_names(host: str) -> frozenset[str]:
+    return frozenset(name.lower() for name in (host, socket.gethostname(), socket.getfqdn()))
+
+
+def _free_port(host: str, port: int) -> int:
+    """The first port that can be listened at; viser itself would hang where there is none."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    problem: OSError | None = None
+    for candidate in [port] if port == 0 else range(port, min(port + PORTS, 65536)):
+        with socket.socket(family, socket.SOCK_STREAM) as trial:
+            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                trial.bind((host, candidate))
+                return candidate
+            except (OSError, OverflowError) as error:
+                problem = error if isinstance(error, OSError) else OSError(str(error))
+    raise InputError(f"--host {host} --port {port}: cannot listen there: {problem}")
+
+
+def _guarded(guard: Guard, label: str, host: str, port: int) -> viser.ViserServer:
+    """Starts viser with the guard in front of its handler of requests.
+
+    viser has no hook for that, so the function by which it starts to listen is replaced while it
+    does. Without the guard in place there is no server.
+    """
+    serve, installed = websockets.asyncio.server.serve, []
+
+    def serve_guarded(handler: Any, *args: Any, process_request: Any, **options: Any) -> Any:
+        installed.append(True)
+        answer = _answering(guard, process_request)
+        return serve(handler, *args, process_request=answer, **options)
+
+    quiet = contextlib.redirect_stdout(io.StringIO())  # viser prints its own address
+    with mock.patch.object(websockets.asyncio.server, "serve", serve_guarded), quiet:
+        page = viser.ViserServer(host=host, port=port, label=label, verbose=False)
+    if not installed:
+        page.stop()
+        raise RuntimeError(f"viser {viser.__version__} cannot be guarded")
+    page.request_share_url = _no_sharing  # a visitor's message would open a tunnel to elsewhere
+    page.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
+    return page
+
+
+def _answering(guard: Guard, answer: Any) -> Any:
+    def process(connection: Any, request: Request) -> Response | None:
+        address = connection.local_address or ("",)
+        refusal = guard.refusal(request.path, request.headers, str(address[0]))
+        if refusal:
+            return connection.respond(403, f"{refusal}\n")
+        response = answer(connection, request)
+        if response is not None:
+            response.headers.update(guard.page_headers(request.path))
+        return response
+
+    return process
+
+
+def _no_sharing(*_: Any, **__: Any) -> None:
+    return None
+
+
+def _url(host: str, port: int, token: str) -> str:
+    shown = "127.0.0.1" if host in ("0.0.0.0", "::") else host
+    if not is_local(host) and shown != host:
+        shown = socket.gethostname()
+    name = f"[{shown}]" if ":" in shown else shown
+    return f"http://{name}:{port}/" + (f"?token={token}" if token else "")

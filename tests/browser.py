@@ -1,0 +1,284 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A headless Chromium, driven by its DevTools protocol over a web socket."""
+
+import base64
+import io
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from websockets.sync.client import connect
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
+FLAGS = (
+    "--headless",
+    "--no-sandbox",
+    "--no-first-run",
+    "--no-default-browser-check",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-quic",
+    "--disable-dev-shm-usage",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",  # draws in software
+    "--remote-debugging-port=0",
+    "--remote-allow-origins=*",
+    "about:blank",
+)
+MISSING = "these tests need Chromium; on Debian: apt-get install chromium"
+DOMAINS = ("Page", "Runtime", "Network", "Log")
+PATIENCE = 30.0  # s
+
+
+def chromium() -> str | None:
+    """The program, if it is installed."""
+    return next((path for name in NAMES if (path := shutil.which(name))), None)
+
+
+class Browser:
+    """One window; everything that its page asks for and complains about is kept.
+
+    Attributes:
+        requests: addresses of all requests and web sockets, in their order.
+        complaints: errors in the console, and exceptions that nothing caught.
+    """
+
+    def __init__(self, width: int = 1200, height: int = 760) -> None:
+        program = chromium()
+        assert program is not None, MISSING
+        self._folder = tempfile.mkdtemp(prefix="touchline-browser-")
+        self._process = subprocess.Popen(
+            [program, *FLAGS, f"--user-data-dir={self._folder}", f"--window-size={width},{height}"],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "HOME": self._folder},
+        )
+        self.requests: list[str] = []
+        self.complaints: list[str] = []
+        self._handlers: dict[str, Callable[[dict], None]] = {
+            "Network.requestWillBeSent": lambda p: self.requests.append(p["request"]["url"][:200]),
+            "Network.webSocketCreated": lambda p: self.requests.append(p["url"]),
+            "Runtime.exceptionThrown": lambda p: self._complain(p["exceptionDetails"]),
+            "Runtime.consoleAPICalled": self._on_console,
+            "Log.entryAdded": self._on_entry,
+        }
+        self._handlers["Target.attachedToTarget"] = self._on_worker
+        self._count = 0
+        try:
+            self._socket = self._attach()
+            for domain in DOMAINS:
+                self.call(f"{domain}.enable")
+            # Workers have requests and complaints of their own.
+            self.call(
+                "Target.setAutoAttach", autoAttach=True, waitForDebuggerOnStart=True, flatten=True
+            )
+            self.resize(width, height)
+        except BaseException:
+            self.close()
+            raise
+
+    def _attach(self) -> Any:
+        port_file = Path(self._folder) / "DevToolsActivePort"
+        until(lambda: port_file.is_file() and len(port_file.read_text().splitlines()) == 2)
+        port, path = port_file.read_text().splitlines()
+        self._socket = self._connect(f"ws://127.0.0.1:{port}{path}")
+        pages = self.call("Target.getTargets")["targetInfos"]
+        target = next(page["targetId"] for page in pages if page["type"] == "page")
+        self._socket.close()
+        return self._connect(f"ws://127.0.0.1:{port}/devtools/page/{target}")
+
+    def _connect(self, url: str) -> Any:
+        return connect(url, max_size=None, compression=None, proxy=None)
+
+    def call(self, method: str, **params: Any) -> dict[str, Any]:
+        """One command of the protocol, and its result."""
+        self._count += 1
+        number = self._count
+        self._socket.send(json.dumps({"id": number, "method": method, "params": params}))
+        while True:
+            answer = json.loads(self._socket.recv(timeout=PATIENCE))
+            if answer.get("id") == number:
+                assert "error" not in answer, f"{method}: {answer['error']}"
+                return answer["result"]
+            self._take(answer)
+
+    def _on_worker(self, params: dict) -> None:
+        for method in ("Network.enable", "Runtime.enable", "Runtime.runIfWaitingForDebugger"):
+            self._count += 1
+            message = {"id": self._count, "method": method, "sessionId": params["sessionId"]}
+            self._socket.send(json.dumps(message))
+
+    def rest(self, seconds: float) -> None:
+        """Waits and listens to what the page does."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            try:
+                self._take(json.loads(self._socket.recv(timeout=left)))
+            except TimeoutError:
+                return
+
+    def _take(self, message: dict) -> None:
+        handler = self._handlers.get(message.get("method", ""))
+        if handler:
+            handler(message["params"])
+
+    def _complain(self, details: dict) -> None:
+        thrown = details.get("exception", {}).get("description", "")
+        self.complaints.append(f"{details.get('text', '')} {thrown}")
+
+    def _on_console(self, params: dict) -> None:
+        if params["type"] in ("error", "assert"):
+            self.complaints.append(" ".join(str(a.get("value", a)) for a in params["args"]))
+
+    def _on_entry(self, params: dict) -> None:
+        if params["entry"]["level"] == "error":
+            entry = params["entry"]
+            self.complaints.append(f"{entry['text']} {entry.get('url', '')}")
+
+    def resize(self, width: int, height: int) -> None:
+        """Size of the window [pixels]."""
+        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        self.call("Emulation.setDeviceMetricsOverride", **size)
+
+    def open(self, url: str) -> None:
+        """Goes to an address."""
+        self.requests.clear()
+        self.complaints.clear()
+        self.call("Page.navigate", url=url)
+
+    def offline(self) -> None:
+        """Cuts the network."""
+        self.call(
+            "Network.emulateNetworkConditions",
+            offline=True,
+            latency=0,
+            downloadThroughput=0,
+            uploadThroughput=0,
+        )
+
+    def run(self, script: str) -> Any:
+        """The value of a JavaScript expression in the page; promises are awaited."""
+        result = self.call(
+            "Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True
+        )
+        assert "exceptionDetails" not in result, result["exceptionDetails"]
+        return result["result"].get("value")
+
+    def text(self) -> str:
+        """All that is written on the page."""
+        return self.run("document.body.innerText") or ""
+
+    def wait_for(self, text: str) -> None:
+        """Until a text stands on the page."""
+        until(lambda: text in self.text(), pause=self.rest, what=f"'{text}' on the page")
+
+    def place(self, text: str) -> tuple[float, float]:
+        """Middle [pixels] of the innermost visible element with just this text, or placeholder."""
+        found = self.run(FIND % json.dumps(text))
+        assert found, f"no '{text}' on the page:\n{self.text()}"
+        return found[0], found[1]
+
+    def press(self, text: str) -> None:
+        """Clicks on the element with a text."""
+        self.click(*self.place(text))
+
+    def click(self, x: float, y: float) -> None:
+        """Moves there and clicks [pixels]."""
+        self.drag((x, y), (x, y), steps=0)
+
+    def mouse(self, kind: str, x: float, y: float, buttons: int = 0) -> None:
+        """One event of the mouse: "Moved", "Pressed" or "Released"."""
+        button = "left" if buttons or kind == "Released" else "none"
+        self.call(
+            "Input.dispatchMouseEvent",
+            type=f"mouse{kind}",
+            x=x,
+            y=y,
+            button=button,
+            buttons=buttons,
+            clickCount=0 if kind == "Moved" else 1,
+        )
+
+    def drag(
+        self,
+        start: tuple[float, float],
+        end: tuple[float, float],
+        steps: int = 8,
+        release: bool = True,
+    ) -> None:
+        """Presses the left button at one place [pixels] and moves it to another."""
+        self.mouse("Moved", *start)
+        self.rest(0.15)  # the page finds out in its next picture what lies below the mouse
+        self.mouse("Pressed", *start, buttons=1)
+        for step in range(1, steps + 1):
+            x, y = (a + (b - a) * step / steps for a, b in zip(start, end, strict=True))
+            self.mouse("Moved", x, y, buttons=1)
+            self.rest(0.06)
+        if release:
+            self.mouse("Released", *end)
+
+    def picture(self, file: Path | str | None = None) -> np.ndarray:
+        """What the window shows, (height, width, 3) of 0 to 255; also as a PNG file."""
+        from PIL import Image
+
+        data = base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
+        if file is not None:
+            Path(file).write_bytes(data)
+        return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
+
+    def close(self) -> None:
+        """Ends the browser."""
+        if hasattr(self, "_socket"):
+            self._socket.close()
+        self._process.terminate()
+        try:
+            self._process.wait(10)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+FIND = """(() => {
+  const wanted = %s, fits = [];
+  for (const e of document.querySelectorAll("body *")) {
+    const own = e.placeholder || e.innerText || "";
+    const box = e.getBoundingClientRect();
+    if (own.trim() === wanted && box.width > 0 && box.height > 0) fits.push(e);
+  }
+  if (!fits.length) return null;
+  const e = fits[fits.length - 1];
+  e.scrollIntoView({block: "nearest"});
+  const box = e.getBoundingClientRect();
+  return [box.x + box.width / 2, box.y + box.height / 2];
+})()"""
+
+
+def until(
+    done: Callable[[], Any],
+    patience: float = PATIENCE,
+    pause: Callable[[float], None] = time.sleep,
+    what: str = "the browser",
+) -> Any:
+    """Waits until something holds, and returns it."""
+    end = time.monotonic() + patience
+    while time.monotonic() < end:
+        value = done()
+        if value:
+            return value
+        pause(0.05)
+    raise AssertionError(f"waited {patience:g} s for {what}")

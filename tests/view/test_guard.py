@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page answers itself and programs on this machine, and refuses pages from elsewhere."""
+
+import base64
+import os
+import socket
+
+import pytest
+import viser
+from websockets.sync.client import connect
+
+from touchline.errors import InputError
+from touchline.view.guard import Guard
+from touchline.view.server import PageServer
+
+PROTOCOL = f"viser-v{viser.__version__}"
+
+
+@pytest.fixture(scope="module")
+def server():
+    with PageServer("test", port=0) as page:
+        yield page
+
+
+@pytest.fixture(scope="module")
+def open_server():
+    with PageServer("test", host="0.0.0.0", port=0) as page:
+        yield page
+
+
+def request(server, path="/", upgrade=False, **headers) -> tuple[int, str]:
+    """Status and head of the answer to a request made by hand; a header None is left out."""
+    port = server.page.get_port()
+    sent = {"Host": f"127.0.0.1:{port}"}
+    if upgrade:
+        key = base64.b64encode(os.urandom(16)).decode()
+        sent |= {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Key": key}
+        sent |= {"Sec-WebSocket-Version": "13", "Sec-WebSocket-Protocol": PROTOCOL}
+    sent |= {name.replace("_", "-"): value for name, value in headers.items()}
+    lines = [f"GET {path} HTTP/1.1"]
+    for name, value in sent.items():
+        values = value if isinstance(value, list) else [] if value is None else [value]
+        lines += [f"{name}: {v.format(port=port)}" for v in values]
+    with socket.create_connection(("127.0.0.1", port), 5) as s:
+        s.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
+        head = b""
+        while b"\r\n\r\n" not in head and (part := s.recv(65536)):
+            head += part
+    return int(head.split()[1]), head.split(b"\r\n\r\n")[0].decode()
+
+
+FOREIGN = [
+    {"Host": "evil.example"},
+    {"Host": "evil.example:{port}"},
+    {"Host": "127.0.0.1.evil.example:{port}"},
+    {"Host": "localhost.:{port}"},
+    {"Host": "evil.example@127.0.0.1:{port}"},
+    {"Host": "192.168.0.7:{port}"},
+    {"Host": "0.0.0.0:{port}"},
+    {"Host": "[::1"},
+    {"Host": ""},
+    {"Host": None},
+    {"Host": ["127.0.0.1:{port}", "evil.example"]},
+    {"Host": "evil.example:{port}", "Origin": "http://evil.example:{port}"},  # DNS rebinding
+    {"Origin": "http://evil.example"},
+    {"Origin": "https://evil.example:{port}"},
+    {"Origin": "null"},
+    {"Origin": ""},
+    {"Origin": "file://"},
+    {"Origin": "http://127.0.0.1:1"},  # another server of this machine
+    {"Origin": "http://localhost:{port}"},  # another name than that asked for
+    {"Origin": "http://127.0.0.1:{port}.evil.example"},
+    {"Origin": ["http://127.0.0.1:{port}", "http://evil.example"]},
+]
+
+
+@pytest.mark.parametrize("upgrade", [False, True], ids=["page", "websocket"])
+@pytest.mark.parametrize("headers", FOREIGN, ids=str)
+def test_foreign_requests_are_refused(server, headers, upgrade):
+    status, head = request(server, upgrade=upgrade, **headers)
+    assert status == 403
+    assert "Upgrade" not in head
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {},
+        {"Origin": "http://127.0.0.1:{port}"},
+        {"Host": "localhost:{port}"},
+        {"Host": "LOCALHOST:{port}", "Origin": "http://localhost:{port}"},
+        {"Host": "localhost:9000", "Origin": "http://localhost:9000"},  # a forwarded port
+        {"Host": "[::1]:{port}"},
+    ],
+    ids=str,
+)
+def test_local_requests_are_answered(server, headers):
+    assert request(server, **headers)[0] == 200
+    assert request(server, upgrade=True, **headers)[0] == 101
+
+
+def test_a_program_on_this_machine_may_connect(server):
+    url = f"ws://127.0.0.1:{server.page.get_port()}"
+    with connect(url, subprotocols=[PROTOCOL], compression=None, proxy=None) as client:
+        assert len(client.recv(timeout=5)) > 16
+
+
+def test_the_page_may_load_nothing_from_elsewhere_and_stands_in_no_frame(server):
+    _, head = request(server)
+    assert "default-src 'self'" in head and "frame-ancestors 'none'" in head
+    assert "http:" not in head and "https:" not in head
+
+
+def test_listens_on_this_machine_alone(server):
+    sockets = server.page._websock_server._live_connections
+    assert not sockets and server.page.get_host() == "127.0.0.1" and not server.token
+    assert server.url == f"http://127.0.0.1:{server.page.get_port()}/"
+
+
+def test_another_address_warns_and_needs_the_token(open_server, capsys):
+    with PageServer("test", host="0.0.0.0", port=0) as another:
+        warning = capsys.readouterr().err
+        assert "WARNING" in warning and "0.0.0.0" in warning
+        assert another.token != open_server.token
+    for upgrade in (False, True):
+        assert request(open_server, upgrade=upgrade)[0] == 403
+        assert request(open_server, "/?token=wrong", upgrade=upgrade)[0] == 403
+        assert request(open_server, Cookie="touchline-token=wrong", upgrade=upgrade)[0] == 403
+    status, head = request(open_server, f"/?token={open_server.token}")
+    assert status == 200
+    cookie = next(x for x in head.splitlines() if x.startswith("Set-Cookie: "))
+    assert "HttpOnly" in cookie and "SameSite=Strict" in cookie
+    shown = cookie.removeprefix("Set-Cookie: ").split(";")[0]
+    assert request(open_server, Cookie=f"a=b; {shown}", upgrade=True)[0] == 101
+    with_token = {"Host": "evil.example", "Cookie": shown}
+    assert request(open_server, upgrade=True, **with_token)[0] == 403
+
+
+def test_the_address_that_a_connection_came_to_is_a_name_of_the_server(open_server):
+    guard = open_server.guard
+
+    class Asked:
+        def get_all(self, key):
+            return {"Host": ["192.168.0.7:80"], "Cookie": [f"touchline-token={guard.token}"]}.get(
+                key, []
+            )
+
+    assert guard.refusal("/", Asked(), "192.168.0.7") is None
+    assert guard.refusal("/", Asked(), "192.168.0.8") is not None
+    assert Guard().refusal("/", Asked(), "127.0.0.1") is not None
+
+
+def test_a_visitor_cannot_open_a_tunnel_to_elsewhere(server):
+    assert server.page.request_share_url() is None
+
+
+def test_the_next_port_is_taken_where_one_is_busy(server):
+    busy = server.page.get_port()
+    with PageServer("test", port=busy) as other:
+        assert other.page.get_port() != busy
+
+
+@pytest.mark.parametrize(("host", "port"), [("203.0.113.1", 8080), ("127.0.0.1", 70000)])
+def test_an_address_that_is_not_ours_is_an_error(host, port):
+    with pytest.raises(InputError, match="--host"):
+        PageServer("test", host=host, port=port)
