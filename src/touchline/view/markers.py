@@ -94,11 +94,15 @@ class ContactMarker:
 
 
 def _add(
-    scene: viser.SceneApi, name: str, mesh: trimesh.Trimesh, colour: Colour, **options: float
+    scene: viser.SceneApi,
+    name: str,
+    mesh: trimesh.Trimesh,
+    colour: Colour,
+    opacity: float | None = None,
 ) -> viser.MeshHandle:
     smooth = trimesh.graph.smooth_shade(mesh, angle=np.deg2rad(35.0))
     return scene.add_mesh_simple(
-        name, np.asarray(smooth.vertices), np.asarray(smooth.faces), color=colour, **options
+        name, np.asarray(smooth.vertices), np.asarray(smooth.faces), color=colour, opacity=opacity
     )
 
 
