@@ -6,7 +6,7 @@ the mean of its values just before and just after that jump: then the trapezoid 
 samples is right to second order, and nothing is late by half a step.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -67,6 +67,7 @@ def run(
     contacts: Sequence[Contacts] = (),
     seconds: float = 1.0,
     rates: Rates | None = None,
+    sampled: Callable[[Readings, int], None] | None = None,
 ) -> tuple[Readings, Truth]:
     """Simulates from the plant's present state on.
 
@@ -76,6 +77,7 @@ def run(
         contacts: scripted forces and colliding bodies; their slots follow each other.
         seconds: from the first sample to the last.
         rates: of log and controller; default: 1 kHz, and the physics' own.
+        sampled: called after each sample of the log with the readings and its row.
 
     Returns:
         Ideal readings and the truth, `seconds * log rate + 1` samples.
@@ -92,6 +94,8 @@ def run(
         if step % control_stride == 0:
             command = controller.torque(plant)
         stepper.begin_step(row, command)
+        if sampled is not None and row >= 0:
+            sampled(stepper.readings, row)
         if step < rows * log_stride:
             plant.integrate()
     return stepper.readings, stepper.truth.truth

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A compliant body that the simulated robot runs into: a pad on a spring on a mass on a rail.
+
+The pad is light and collides; behind it the spring and the mass are free to choose, and a mass of
+infinity is a wall. MuJoCo's own contact force is the truth.
+"""
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from touchline.simulation.contacts import NOTHING, Touch, no_touch
+from touchline.simulation.mujoco_model import quaternion
+from touchline.simulation.plant import Plant
+from touchline.simulation.pushers import FRICTION_RATIO, IMPEDANCE
+from touchline.simulation.shapes import OTHER, ROBOT
+
+Array = NDArray[np.float64]
+NAME = "obstacle"
+PAD_MASS, PAD_RADIUS = 0.1, 0.03  # kg, m
+PAD_STIFFNESS = 1e5  # N/m between pad and robot
+PAD_DAMPING = 0.3  # ratio of that contact, which else would chatter
+SPRING_DAMPING = 0.1  # ratio of the spring with the mass, or with 5 kg before a wall
+WALL = 1e6  # kg
+
+
+@dataclass(frozen=True)
+class Body:
+    """What stands in the way.
+
+    Attributes:
+        point: (3,) where its surface meets the robot's [m].
+        direction: (3,) unit vector in which it is struck from its own side: towards the robot.
+        time: at which its surface is at the point, if nothing stops it [s].
+        speed: towards the robot [m/s].
+        spring: [N/m].
+        mass: behind the spring [kg]; inf: a wall.
+        friction: coefficient between pad and robot.
+    """
+
+    point: ArrayLike
+    direction: ArrayLike
+    time: float = 0.0
+    speed: float = 0.0
+    spring: float = 2.5e4
+    mass: float = 4.0
+    friction: float = 0.3
+
+
+class Obstacle:
+    """One obstacle in a plant's model; one slot: the strongest link that it touches.
+
+    Add it to the model first, `place` it after `Plant.reset`.
+    """
+
+    physical = True
+
+    def __init__(self) -> None:
+        self._mj: Any = import_module("mujoco")
+        self._wrench = np.zeros(6)
+        self._idle = [no_touch("")]
+
+    def __len__(self) -> int:
+        return 1
+
+    def add(self, spec: Any, bodies: dict[str, Any]) -> None:
+        """Adds it to a model before it is compiled; see `build_model`."""
+        spec.option.impratio = FRICTION_RATIO
+        spec.option.cone = self._mj.mjtCone.mjCONE_ELLIPTIC
+        slide = {"type": self._mj.mjtJoint.mjJNT_SLIDE, "axis": [1.0, 0.0, 0.0]}
+        mass = spec.worldbody.add_body(name=NAME, gravcomp=1.0, pos=[0.0, 0.0, 100.0])
+        mass.explicitinertial, mass.mass, mass.inertia = True, 1.0, np.full(3, 1e-3)
+        mass.add_joint(name=NAME, **slide)
+        pad = mass.add_body(name=f"{NAME}:pad", gravcomp=1.0)
+        pad.add_joint(name=f"{NAME}:pad", **slide)
+        pad.add_geom(
+            name=NAME,
+            type=self._mj.mjtGeom.mjGEOM_SPHERE,
+            size=[PAD_RADIUS, 0, 0],
+            mass=PAD_MASS,
+            contype=OTHER,
+            conaffinity=ROBOT,
+            condim=3,
+            priority=1,
+            solref=_contact_spring(),
+            solimp=[IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0],
+        )
+
+    def place(self, plant: Plant, body: Body) -> None:
+        """Puts it on its way; to be called after each `Plant.reset`."""
+        m, d = plant.model, plant.data
+        mass = min(body.mass, WALL)
+        b, pad = m.body(NAME).id, m.joint(f"{NAME}:pad")
+        m.body_mass[b] = mass
+        m.jnt_stiffness[pad.id] = body.spring
+        m.dof_damping[pad.dofadr[0]] = 2 * SPRING_DAMPING * np.sqrt(body.spring * min(mass, 5.0))
+        m.geom_friction[m.geom(NAME).id, 0] = body.friction
+        direction = np.asarray(body.direction, float)
+        m.body_pos[b] = np.asarray(body.point, float) - PAD_RADIUS * direction
+        m.body_quat[b] = quaternion(_frame_along(direction))
+        state = d.qpos.copy(), d.qvel.copy(), d.time
+        self._mj.mj_setConst(m, d)
+        d.qpos[:], d.qvel[:], d.time = state
+        rail = m.joint(NAME).dofadr[0]
+        d.qpos[rail] = body.speed * (d.time - body.time)
+        d.qvel[rail] = body.speed
+        self._links = {body: link for link, body in plant.bodies.items()}
+        self._geom = m.geom(NAME).id
+
+    def apply(self, plant: Plant) -> bool:
+        """Nothing drives it."""
+        return True
+
+    def touches(self, plant: Plant) -> list[Touch]:
+        """The contact force on the robot at the plant's present state and inputs."""
+        if plant.data.ncon == 0:
+            return self._idle
+        found: dict[str, list[tuple[Array, Array]]] = {}
+        contacts = plant.data.contact
+        for c, (first, second) in enumerate(contacts.geom.tolist()):
+            if self._geom not in (first, second):
+                continue
+            self._mj.mj_contactForce(plant.model, plant.data, c, self._wrench)
+            if self._wrench[0] <= 0.0:
+                continue
+            sign, other = (1.0, second) if first == self._geom else (-1.0, first)
+            force = sign * (self._wrench[:3] @ contacts.frame[c].reshape(3, 3))
+            link = self._links.get(int(plant.model.geom_bodyid[other]), "")
+            found.setdefault(link, []).append((contacts.pos[c].copy(), force))
+        if not found:
+            return self._idle
+        return [max((_joined(*item) for item in found.items()), key=lambda t: t.force @ t.force)]
+
+
+def _joined(link: str, forces: list[tuple[Array, Array]]) -> Touch:
+    """All contacts with one link as one force at their centre; the pad is small."""
+    weights = np.array([np.linalg.norm(force) for _, force in forces])
+    point = weights @ np.array([at for at, _ in forces]) / weights.sum()
+    return Touch(True, link, point, np.sum([force for _, force in forces], axis=0), NOTHING)
+
+
+def _contact_spring() -> list[float]:
+    """MuJoCo's `solref` of a spring between the pad and something much heavier."""
+    k = PAD_STIFFNESS / PAD_MASS
+    return [-k, -2 * PAD_DAMPING * np.sqrt(k)]
+
+
+def _frame_along(direction: Array) -> Array:
+    """A rotation (3, 3) whose x column is a unit vector."""
+    y = np.cross(np.eye(3)[int(np.argmin(np.abs(direction)))], direction)
+    y /= np.linalg.norm(y)
+    return np.column_stack([direction, y, np.cross(direction, y)])
