@@ -67,9 +67,7 @@ def retract(contact: Contact, state: State) -> Array:
     speed = np.clip(left / RETRACT_EASE, 0.0, RETRACT_SPEED)
     goal = direction * speed
     goal /= max(1.0, float(np.max(np.abs(goal) / state.speed_limit)))
-    return state.bias_torque + within_effort(
-        state, state.inertia @ (goal - state.qd) / SERVO_TIME
-    )
+    return state.bias_torque + within_effort(state, state.inertia @ (goal - state.qd) / SERVO_TIME)
 
 
 def escape_lever(contact: Contact, state: State) -> Array | None:

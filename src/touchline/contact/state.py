@@ -70,7 +70,8 @@ class State:
         From dp/dt = tau - n (eq. 11) with p = M qd and constant qd: tau = (dM/dt) qd + n.
         """
         ahead, behind = (
-            self.robot.terms(self.q + step * self.qd, self.qd)[0] for step in (RATE_STEP, -RATE_STEP)
+            self.robot.terms(self.q + step * self.qd, self.qd)[0]
+            for step in (RATE_STEP, -RATE_STEP)
         )
         momentum_rate = (ahead - behind) / (2 * RATE_STEP)
         return (momentum_rate + self.robot.terms(self.q, self.qd)[1])[: len(self.q)]

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reactions as functions of a contact and a state, for any of them."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import touchline as tl
+from touchline.contact.contact import Contact
+from touchline.contact.reaction import REACTIONS, Reactor, limited, retract, stop
+from touchline.contact.state import Since, State
+from touchline.estimation.dynamics import inverse_dynamics, mass_matrix, point_jacobian
+
+LINKS = ("link0", "link1", "link3", "link5", "link7", "tool", "handle")
+
+
+@pytest.fixture(scope="module")
+def sara():
+    return tl.load_robot("sara")
+
+
+def state_of(robot, seed, speed=2.0, since=False):
+    rng = np.random.default_rng(seed)
+    joints = [robot.mechanism.joints[name] for name in robot.joint_names]
+    q = np.array([rng.uniform(joint.lower, joint.upper) for joint in joints])
+    qd = speed * rng.uniform(-1, 1, len(q))
+    began = Since(0.0, q - 0.01 * qd, q if rng.random() < 0.5 else None) if since else None
+    torque, tau_ext = rng.normal(size=(2, len(q))) * 300.0
+    return State(robot, 0.01, q, qd, torque, tau_ext, began)
+
+
+def contact_of(state, link, seed, located=True):
+    rng = np.random.default_rng([seed, 1])
+    force = rng.normal(size=3) * rng.choice([1.0, 30.0, 1000.0])
+    if not located:
+        return Contact("base", 0, "collision", wrench=np.r_[force, rng.normal(size=3)])
+    T = state.robot.T_world_links(state.q)[link]
+    position = T[:3, :3] @ rng.uniform(-0.1, 0.1, 3) + T[:3, 3]
+    return Contact(
+        "base", 0, "collision", "located", link=link, body=link, position=position, force=force
+    )
+
+
+seeds = st.integers(0, 10_000)
+
+
+def test_inertia_and_bias_torque_are_those_of_newton_and_euler(sara):
+    state = state_of(sara, 1)
+    expected = inverse_dynamics(sara, state.q, state.qd, np.zeros(7)).torque
+    assert state.bias_torque == pytest.approx(expected, abs=1e-5)
+    assert state.inertia == pytest.approx(mass_matrix(sara, state.q)[0], abs=1e-9)
+
+
+def test_lever_is_the_row_of_the_jacobian(sara):
+    state = state_of(sara, 2)
+    T, local = sara.T_world_links(state.q)["link5"], np.array([0.03, -0.02, 0.1])
+    J = point_jacobian(sara, state.q, "link5", local)[:3]
+    direction = np.array([0.6, 0.0, 0.8])
+    lever = state.lever("link5", T[:3, :3] @ local + T[:3, 3], direction)
+    assert lever == pytest.approx(direction @ J, abs=1e-9)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seeds, st.sampled_from(sorted(REACTIONS)), st.sampled_from(LINKS), st.booleans())
+def test_torques_stay_within_their_limits_for_any_contact(seed, name, link, located):
+    robot = tl.load_robot("sara")
+    state = state_of(robot, seed, since=True)
+    contact = contact_of(state, link, seed, located)
+    command = Reactor(lambda _: name).update([contact], state)
+    assert np.all(np.isfinite(command.torque))
+    assert np.all(np.abs(command.torque) <= state.effort + 1e-9)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seeds)
+def test_stop_takes_energy_out_and_keeps_the_direction(seed):
+    robot = tl.load_robot("sara")
+    state = state_of(robot, seed)
+    push = stop(contact_of(state, "link3", seed), state) - state.bias_torque
+    power = float(push @ state.qd)
+    fits = np.all(np.abs(state.bias_torque) <= state.effort)
+    assert power <= 0.0
+    if fits:
+        deceleration = np.linalg.solve(state.inertia, push)
+        cosine = deceleration @ state.qd / np.linalg.norm(deceleration) / np.linalg.norm(state.qd)
+        assert cosine == pytest.approx(-1.0, abs=1e-9)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seeds, st.sampled_from(LINKS[2:]))
+def test_retract_accelerates_the_point_along_the_force(seed, link):
+    robot = tl.load_robot("sara")
+    state = state_of(robot, seed, speed=0.0)
+    contact = contact_of(state, link, seed)
+    direction = contact.force / np.linalg.norm(contact.force)
+    lever = state.lever(link, contact.position, direction)
+    acceleration = np.linalg.solve(state.inertia, retract(contact, state) - state.bias_torque)
+    if np.linalg.norm(lever) > 1e-2 and np.all(np.abs(state.bias_torque) < state.effort):
+        assert lever @ acceleration > 0.0
+
+
+def test_a_joint_near_its_limit_is_braked_and_that_is_told(sara):
+    state = state_of(sara, 3)
+    q, qd = np.zeros(7), np.zeros(7)
+    q[1], qd[1] = state.range[1][1] - 0.01, 1.0
+    state = State(sara, 0.0, q, qd, np.zeros(7))
+    torque, told = limited(np.full(7, 500.0), state)
+    acceleration = np.linalg.solve(state.inertia, torque - state.bias_torque)
+    assert "position joint2" in told and "torque joint1" in told
+    assert torque[1] < state.bias_torque[1] and np.isfinite(acceleration).all()
