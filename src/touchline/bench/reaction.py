@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from touchline.bench.tables import aligned
+from touchline.bench.tables import Row, aligned
 from touchline.contact.contact import Contact
 from touchline.contact.reaction import REACTIONS, Reactor
 from touchline.model.robot import load_robot
@@ -106,7 +106,7 @@ def measure(scene: EncounterScene, outcome: Outcome, case: Case, reaction: str) 
     time = readings.time
     force = np.linalg.norm(outcome.truth.force[:, 0], axis=1)
     touched = np.flatnonzero(force > 0.0)
-    begin = time[touched[0]] if len(touched) else HIT_TIME
+    begin = float(time[touched[0]]) if len(touched) else HIT_TIME
     loud = time[force > QUIET]
     acting = [step for step in outcome.steps if step.command.reaction != "ignore"]
     place = np.array([_point(robot, q, outcome) for q in readings.q[time >= begin]])
@@ -159,7 +159,7 @@ def run_trials(todo: Sequence[Case]) -> list[Trial]:
 def table(trials: Sequence[Trial]) -> str:
     """Medians by reaction, for bodies that give way and for walls."""
     head = ("", "n", "peak N", "x ignore", "worst x", "impulse Ns", "< 20 N ms", "never", "way mm")
-    rows = [(*head, "reacts ms", "effort")]
+    rows: list[Row] = [(*head, "reacts ms", "effort")]
     for wall, name in ((False, "free body"), (True, "wall")):
         for reaction in REACTIONS:
             chosen = [t for t in trials if t.wall == wall and t.reaction == reaction]
@@ -176,7 +176,7 @@ def _key(trial: Trial) -> tuple:
     return trial.link, trial.speed, trial.wall, trial.seed
 
 
-def _row(name: str, trials: Sequence[Trial], ignored: dict[tuple, Trial]) -> tuple[str, ...]:
+def _row(name: str, trials: Sequence[Trial], ignored: dict[tuple, Trial]) -> Row:
     ratios = [t.peak / ignored[_key(t)].peak for t in trials]
     quiet = np.array([t.quiet for t in trials])
     reacted = [t.reacted for t in trials if np.isfinite(t.reacted)]

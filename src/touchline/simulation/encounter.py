@@ -163,8 +163,8 @@ class EncounterScene:
         lever = state.lever(link, point, normal)
         if np.linalg.norm(lever) < 0.02:
             return still, 0.0
-        direction = np.linalg.solve(state.inertia, lever)
-        direction /= lever @ direction
+        direction: Array = np.linalg.solve(state.inertia, lever)
+        direction = direction / (lever @ direction)
         most = float(np.min(SPEED_SHARE * self.setup.speed / np.maximum(np.abs(direction), 1e-9)))
         speed = min(speed, most)
         return speed * direction, speed
