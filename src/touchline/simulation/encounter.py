@@ -163,7 +163,7 @@ class EncounterScene:
         lever = state.lever(link, point, normal)
         if np.linalg.norm(lever) < 0.02:
             return still, 0.0
-        direction: Array = np.linalg.solve(state.inertia, lever)
+        direction = np.asarray(np.linalg.solve(state.inertia, lever), float)
         direction = direction / (lever @ direction)
         most = float(np.min(SPEED_SHARE * self.setup.speed / np.maximum(np.abs(direction), 1e-9)))
         speed = min(speed, most)
