@@ -195,21 +195,27 @@ def _row(name: str, trials: Sequence[Trial], ignored: dict[tuple, Trial]) -> Row
     )
 
 
-def main(output: Path | None = None, rounds: int = 40) -> None:
-    """Prints the table of `sara`; `rounds` / 20 encounters for each link and speed."""
-    todo = list(cases(max(1, round(rounds / 20))))
+def main(encounters: int = 2, out: Path | None = None) -> None:
+    """Prints the table of `sara`.
+
+    Args:
+        encounters: for each link and speed.
+        out: folder for `reaction.csv`, one row for each encounter and reaction.
+    """
+    todo = list(cases(encounters))
     trials = run_trials(todo)
     print(f"reaction benchmark: sara, {len(todo)} encounters, each with every reaction; medians")
     print("spring 25 kN/m; free body 4 kg; x ignore: peak against that without reaction\n")
     print(table(trials))
-    if output is not None:
-        write(output, trials)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        write(out / "reaction.csv", trials)
 
 
-def write(output: Path, trials: Sequence[Trial]) -> None:
-    """Writes the trials as .csv."""
+def write(path: Path, trials: Sequence[Trial]) -> None:
+    """Writes the trials as CSV."""
     rows = [asdict(trial) for trial in trials]
-    with output.open("w", newline="") as file:
+    with path.open("w", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)

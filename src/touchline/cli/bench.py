@@ -6,12 +6,13 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
-NAMES = ("observer", "localization")
+NAMES = ("observer", "localization", "reaction")
 
 
 def bench(
     names: Annotated[
-        Positional[tuple[Literal["observer", "localization"], ...]], arg(metavar="[NAME ...]")
+        Positional[tuple[Literal["observer", "localization", "reaction"], ...]],
+        arg(metavar="[NAME ...]"),
     ] = (),
     /,
     output: Annotated[Path | None, arg(metavar="FILE")] = None,
@@ -23,6 +24,7 @@ def bench(
     speeds: tuple[float, ...] = (0.0,),
     runs: int = 1000,
     seed: int = 0,
+    encounters: int = 2,
     out: Annotated[Path | None, arg(metavar="DIR")] = None,
 ) -> int:
     """Measures speed and accuracy beside the peers that are installed.
@@ -30,7 +32,7 @@ def bench(
     Example: touchline bench localization --robots panda sara --runs 10000 --out figures
 
     Args:
-        names: What to measure (observer, localization); default: everything.
+        names: What to measure (observer, localization, reaction); default: everything.
         output: observer: writes the figures here as well (.json or .csv).
         rounds: observer: how often each candidate is timed.
         robots: localization: the arms; panda and ur10 need the package example-robot-data.
@@ -40,7 +42,8 @@ def bench(
         speeds: localization: of every joint [rad/s]; 0 is an arm at rest.
         runs: localization: random poses and places per line of the tables.
         seed: localization: of all that is random.
-        out: localization: folder for the tables, every run, and figures.
+        encounters: reaction: collisions for each link and speed.
+        out: localization, reaction: folder for the tables, every run, and figures.
     """
     wanted = names or NAMES
     if "observer" in wanted:
@@ -53,4 +56,8 @@ def bench(
 
         plan = Plan(robots, contacts, noise, begin, speeds, runs, seed)
         measure_localization(plan, out)
+    if "reaction" in wanted:
+        from touchline.bench.reaction import main as measure_reaction
+
+        measure_reaction(encounters, out)
     return 0
