@@ -84,16 +84,18 @@ nb::object run(tl::Observer& o, nb::handle time, nb::handle q, nb::handle qd, nb
 }
 
 // One sample through observer and detector: the observer's row, the level of each segment, the
-// normalized rows.
+// normalized rows, for how long each segment's baseline has been averaged.
 nb::tuple detect(tl::Observer& o, tl::Detector& d, double time, nb::handle q, nb::handle qd,
                  nb::handle tau, nb::handle wrench) {
   const double* row = o.step(sample(o, time, q, qd, tau, wrench));
   d.step(row);
-  arrays::Out out({o.output().size()}), levels({d.levels().size()}), tests({d.rows().size()});
+  arrays::Out out({o.output().size()}), levels({d.levels().size()}), tests({d.rows().size()}),
+      quiet({d.quiet().size()});
   std::copy_n(row, o.output().size(), out.data());
   std::copy(d.levels().begin(), d.levels().end(), levels.data());
   std::copy(d.normalized().begin(), d.normalized().end(), tests.data());
-  return nb::make_tuple(out.release(), levels.release(), tests.release());
+  std::copy(d.quiet().begin(), d.quiet().end(), quiet.data());
+  return nb::make_tuple(out.release(), levels.release(), tests.release(), quiet.release());
 }
 
 // The same for N samples.
@@ -101,17 +103,18 @@ nb::tuple detect_run(tl::Observer& o, tl::Detector& d, nb::handle time, nb::hand
                      nb::handle qd, nb::handle tau, nb::handle wrench) {
   const Recording in = recording(o, time, q, qd, tau, wrench);
   arrays::Out out({in.rows, o.output().size()}), levels({in.rows, d.levels().size()}),
-      tests({in.rows, d.rows().size()});
+      tests({in.rows, d.rows().size()}), quiet({in.rows, d.quiet().size()});
   {
     nb::gil_scoped_release release;
-    double *level = levels.data(), *x = tests.data();
+    double *level = levels.data(), *x = tests.data(), *since = quiet.data();
     o.run(in.rows, in.time, in.first.q, in.first.qd, in.first.tau, in.first.wrench, out.data(), [&](const double* row) {
       d.step(row);
       level = std::copy(d.levels().begin(), d.levels().end(), level);
       x = std::copy(d.normalized().begin(), d.normalized().end(), x);
+      since = std::copy(d.quiet().begin(), d.quiet().end(), since);
     });
   }
-  return nb::make_tuple(out.release(), levels.release(), tests.release());
+  return nb::make_tuple(out.release(), levels.release(), tests.release(), quiet.release());
 }
 
 // Momentum and n-bar: joint rows, then six rows per sensor in its own frame.

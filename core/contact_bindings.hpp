@@ -123,10 +123,12 @@ inline const double* data_or_null(const std::optional<In>& a) {
 }
 
 inline Out locate(tl::Localizer& l, int segment, const In& row, const std::optional<In>& normalized,
-                  const In& q, const std::optional<In>& qd) {
+                  const In& q, const std::optional<In>& qd,
+                  const std::optional<In>& quiet) {
   l.expect(segment, row.size(), normalized ? normalized->size() : l.tests(), q.size(),
            qd ? qd->size() : q.size());
-  l.set_state(q.data(), data_or_null(qd));
+  if (quiet && quiet->size() != l.segments()) throw std::invalid_argument("one number per segment");
+  l.set_state(q.data(), data_or_null(qd), data_or_null(quiet));
   std::vector<double> out(kWidth);
   write(l, l.locate(segment, row.data(), data_or_null(normalized)), out.data());
   return array(out, 1, kWidth);
@@ -162,11 +164,11 @@ inline Out event(tl::Localizer& l, int segment) {
 // N samples: for each sample and each segment that is touched, its sample, its segment, its answer;
 // and for each event that ends, sample, segment, event.
 inline nb::tuple follow(tl::Localizer& l, const In& time, const In& rows, const In& normalized,
-                        const In& levels, const In& q, const In& qd) {
+                        const In& levels, const In& quiet, const In& q, const In& qd) {
   const std::size_t n = l.joints(), m = l.segments(), r = l.tests(), width = l.width();
   const std::size_t count = time.size();
   if (rows.size() != count * width || normalized.size() != count * r ||
-      levels.size() != count * m || q.size() != count * n || qd.size() != count * n)
+      levels.size() != count * m || quiet.size() != count * m || q.size() != count * n || qd.size() != count * n)
     throw std::invalid_argument("the arrays do not belong to the same samples");
   std::vector<double> answers, ended;
   {
@@ -181,7 +183,7 @@ inline nb::tuple follow(tl::Localizer& l, const In& time, const In& rows, const 
           push_event(l, segment, ended);
         }
         if (!touched) continue;
-        if (!ready) l.set_state(q.data() + i * n, qd.data() + i * n);
+        if (!ready) l.set_state(q.data() + i * n, qd.data() + i * n, quiet.data() + i * m);
         ready = true;
         const std::size_t at = answers.size();
         answers.resize(at + 2 + kWidth);
@@ -257,15 +259,17 @@ inline void bind(nb::module_& m) {
            nb::keep_alive<1, 2>())
       .def("wrench_covariance", [](tl::Localizer& l, const In& q, const In& row, int segment) {
         l.expect(segment, row.size(), l.tests(), q.size(), q.size());
-        l.set_state(q.data(), nullptr);
+        l.set_state(q.data(), nullptr, nullptr);
         std::vector<double> out(36);
         if (!l.wrench_covariance(segment, row.data(), out.data()))
           throw std::invalid_argument("the segment has no wrench");
         return array(out, 6, 6);
       })
-      .def("locate", &locate, "segment"_a, "row"_a, "normalized"_a.none(), "q"_a, "qd"_a.none())
+      .def("locate", &locate, "segment"_a, "row"_a, "normalized"_a.none(), "q"_a, "qd"_a.none(),
+           "quiet"_a.none())
       .def("event", &event, "segment"_a)
-      .def("follow", &follow, "time"_a, "rows"_a, "normalized"_a, "levels"_a, "q"_a, "qd"_a);
+      .def("follow", &follow, "time"_a, "rows"_a, "normalized"_a, "levels"_a, "quiet"_a,
+           "q"_a, "qd"_a);
 }
 
 }  // namespace contact

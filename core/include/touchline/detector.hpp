@@ -43,7 +43,8 @@ class Detector {
         states_(rows_.size()),
         segments_(sum_limit_.size()),
         normalized_(rows_.size(), 0.0),
-        levels_(sum_limit_.size(), 0) {}
+        levels_(sum_limit_.size(), 0),
+        quiet_(sum_limit_.size(), 0.0) {}
 
   // To be called after each step of the observer, with the row it wrote.
   void step(const double* output) {
@@ -62,6 +63,8 @@ class Detector {
   // Per row: (residual - baseline) / contact threshold; 0 where there is no settled residual.
   const std::vector<double>& normalized() const { return normalized_; }
   const std::vector<int>& levels() const { return levels_; }  // per segment
+  // Per segment: over how long its baseline has been averaged [s].
+  const std::vector<double>& quiet() const { return quiet_; }
   double baseline(int row) const { return states_[row].baseline; }
   const Observer& observer() const { return observer_; }
 
@@ -134,7 +137,7 @@ class Detector {
     RowState& s = states_[i];
     const DetectionRow& row = rows_[i];
     if (!s.known || levels_[row.segment] > 0 || segments_[row.segment].pending) return;
-    s.age += dt;  // a running mean first, a low-pass once it has seen enough
+    quiet_[row.segment] = s.age += dt;  // a running mean first, a low-pass once it has seen enough
     const double tau = std::min(s.age, times_.baseline);
     if (tau <= 0.0) return;
     const double next = s.baseline + (s.value - s.baseline) * std::min(1.0, dt / tau);
@@ -150,6 +153,7 @@ class Detector {
   std::vector<Segment> segments_;
   std::vector<double> normalized_;
   std::vector<int> levels_;
+  std::vector<double> quiet_;
   double time_ = 0.0;
   bool timed_ = false;
 };

@@ -48,8 +48,11 @@ class Localizer {
       throw std::invalid_argument("an array has a size that does not belong to this robot");
   }
 
-  // The configuration of the sample; `qd` may be null.
-  void set_state(const double* q, const double* qd) { measurement_.set_state(q, qd); }
+  // The configuration of the sample, and for how long the baseline of each segment has been
+  // averaged; `qd` and `quiet` may be null.
+  void set_state(const double* q, const double* qd, const double* quiet) {
+    measurement_.set_state(q, qd, quiet);
+  }
 
   // Covariance (6, 6) of a segment's wrench; false where it has none.
   bool wrench_covariance(int g, const double* row, double* out) {

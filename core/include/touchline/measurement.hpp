@@ -38,7 +38,11 @@ class Measurement {
   }
 
   // The configuration of the sample; `qd` may be null.
-  void set_state(const double* q, const double* qd) { posture_.set(q, qd); }
+  // And for how long the baseline of each segment has been averaged [s], or null.
+  void set_state(const double* q, const double* qd, const double* quiet) {
+    posture_.set(q, qd);
+    quiet_ = quiet;
+  }
 
   // Takes the observer's row, and the detector's normalized rows (or null) from which the offsets
   // follow. Returns false where nothing is known of the segment.
@@ -49,11 +53,12 @@ class Measurement {
                   row[layout_.segment_settled() + g] > 0.0 &&
                   std::isfinite(row[layout_.segment_wrench() + 6 * g]);
     for (int i = 0; i < 6; ++i) raw_wrench_[i] = row[layout_.segment_wrench() + 6 * g + i];
+    std::copy(raw_wrench_, raw_wrench_ + 6, wrench_);
     find_offsets(normalized);
     count_ = 0;
     for (const Row& r : rows_[g]) take(r);
     size_ = (has_wrench_ ? 6 : 0) + count_;
-    return size_ > 0 && weigh();
+    return size_ > 0 && weigh() && (normalized == nullptr || take_out_offsets());
   }
 
   // The largest of a segment's normalized rows.
@@ -118,6 +123,8 @@ class Measurement {
   }
 
  private:
+  static constexpr double kOffset = 3.0;  // sigmas of a normal variable: beyond, it is no noise
+
   // A joint's torque, or one axis of a sensor that has fewer than six.
   struct Row {
     int joint, sensor, axis;
@@ -163,7 +170,7 @@ class Measurement {
   // A row's offset is what the detector has taken out of it.
   void find_offsets(const double* normalized) {
     std::fill(joint_offsets_.begin(), joint_offsets_.end(), 0.0);
-    std::copy(raw_wrench_, raw_wrench_ + 6, wrench_);
+    std::fill(wrench_offset_, wrench_offset_ + 6, 0.0);
     if (normalized == nullptr) return;
     double clean[6];
     bool complete = false;
@@ -182,16 +189,50 @@ class Measurement {
     const int sensor = observer_.layout().segments[segment_].sensor;
     store(wrench_to_parent(posture_.pose(observer_.sensors()[sensor].node),
                            {{clean[0], clean[1], clean[2]}, {clean[3], clean[4], clean[5]}}),
-          wrench_);
+          clean);
+    for (int i = 0; i < 6; ++i) wrench_offset_[i] = raw_wrench_[i] - clean[i];
+  }
+
+  // Takes the offsets out if there are any: what noise alone explains is none, and would only add
+  // its own noise. The baseline, a mean over `quiet` [s], is surer than one sample.
+  bool take_out_offsets() {
+    const int first = has_wrench_ ? 6 : 0;
+    double* d = design_.data();
+    std::copy(wrench_offset_, wrench_offset_ + first, d);
+    for (int i = 0; i < count_; ++i) d[first + i] = offset_of(*used_[i]);
+    solve_lower(factor_.data(), size_, d);
+    double distance = 0.0;
+    for (int i = 0; i < size_; ++i) distance += d[i] * d[i];
+    const double rest = variance_of_baseline();
+    if (distance < rest * chi2_limit(size_, kOffset)) return true;
+    for (int i = 0; i < first; ++i) wrench_[i] -= wrench_offset_[i];
+    for (int i = 0; i < count_; ++i) {
+      own_[i] -= offset_of(*used_[i]);
+      outboard_[i] -= offset_of(*used_[i]);
+    }
+    if (!weigh()) return false;
+    for (int i = 0; i < size_ * size_; ++i) factor_[i] *= std::sqrt(1.0 + rest);
+    return true;
+  }
+
+  double offset_of(const Row& r) const { return r.joint >= 0 ? joint_offsets_[r.joint] : 0.0; }
+
+  // Of a mean of filtered noise over a time, in parts of the variance of one sample.
+  double variance_of_baseline() const {
+    const int sensor = observer_.layout().segments[segment_].sensor;
+    const double bandwidth = sensor >= 0 ? observer_.sensors()[sensor].bandwidth
+                             : layout_.joints > 0 ? observer_.joints()[0].bandwidth
+                                                  : 0.0;
+    const double x = bandwidth * (quiet_ != nullptr ? quiet_[segment_] : 0.0);
+    return x > 1e-3 ? 2.0 / x * (1.0 - (1.0 - std::exp(-x)) / x) : 1.0;
   }
 
   void take(const Row& r) {
     double own, outboard = std::nan("");
     if (r.joint >= 0) {
       if (!(row_[layout_.joint_settled() + r.joint] > 0.0)) return;
-      const double offset = joint_offsets_[r.joint];
-      own = row_[layout_.segment_torque() + r.joint] - offset;
-      outboard = row_[layout_.parity() + r.joint] - offset;
+      own = row_[layout_.segment_torque() + r.joint];
+      outboard = row_[layout_.parity() + r.joint];
     } else {
       own = row_[layout_.sensor_wrench() + 6 * r.sensor + r.axis];
     }
@@ -249,9 +290,9 @@ class Measurement {
   std::vector<double> joint_offsets_;
 
   int segment_ = 0, count_ = 0, size_ = 0;
-  const double* row_ = nullptr;
+  const double *row_ = nullptr, *quiet_ = nullptr;
   bool has_wrench_ = false;
-  double wrench_[6] = {}, raw_wrench_[6] = {};
+  double wrench_[6] = {}, raw_wrench_[6] = {}, wrench_offset_[6] = {};
   std::vector<const Row*> used_;
   std::vector<double> own_;       // if the contact is inboard of the joint
   std::vector<double> outboard_;  // if it is outboard, less what the wrench says

@@ -25,6 +25,12 @@ struct Quadratic {
   }
 };
 
+// Beyond it lies as much of chi2 as of a normal variable beyond `sigmas` (Wilson-Hilferty).
+inline double chi2_limit(int degrees, double sigmas) {
+  const double n = degrees, c = 2.0 / (9.0 * n);
+  return n * std::pow(1.0 - c + sigmas * std::sqrt(c), 3);
+}
+
 // Adds an unknown moment of `sigma` [Nm] about each axis to what is measured of a wrench; returns
 // the logarithm of how much wider the measurements' distribution gets, the half of it.
 inline double loosen(Quadratic& q, double sigma) {

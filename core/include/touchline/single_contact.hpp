@@ -206,12 +206,6 @@ class SingleContact {
     answer_.spread = std::sqrt(k.along[0] + k.along[2]);
   }
 
-  // Beyond it lies as much of chi2 as of a normal variable beyond `sigmas` (Wilson-Hilferty).
-  static double chi2_limit(int degrees, double sigmas) {
-    const double n = degrees, c = 2.0 / (9.0 * n);
-    return n * std::pow(1.0 - c + sigmas * std::sqrt(c), 3);
-  }
-
   // The paper's rule: along the line of the segment's wrench, the first entry into any link.
   void first_entry(int g, const Measurement& measurement) {
     if (!measurement.has_wrench()) return;

@@ -29,10 +29,12 @@ class Detection:
     Attributes:
         levels: (m,) the `Level` of each segment.
         normalized: (r,) each test's (residual - baseline) / contact threshold.
+        quiet: (m,) over how long the baseline of each segment has been averaged [s].
     """
 
     levels: Array
     normalized: Array
+    quiet: Array
 
 
 class Detector:
@@ -62,16 +64,12 @@ class Detector:
     def update(self, time, q, qd, tau=None, wrench=None) -> tuple[Estimate, Detection]:
         """One sample, arguments as for `Observer.update`."""
         signals = self.observer.arrays((), q, qd, tau, wrench)
-        row, levels, normalized = core.detect(
-            self.observer.kernel, self._core, float(time), *signals
-        )
-        return self.observer.estimate(row), Detection(levels, normalized)
+        row, *judged = core.detect(self.observer.kernel, self._core, float(time), *signals)
+        return self.observer.estimate(row), Detection(*judged)
 
     def run(self, time, q, qd, tau=None, wrench=None) -> tuple[Estimate, Detection]:
         """N samples, arguments as for `Observer.run`."""
         stamps = np.ascontiguousarray(time, dtype=float)
         signals = self.observer.arrays(stamps.shape, q, qd, tau, wrench)
-        rows, levels, normalized = core.detect_run(
-            self.observer.kernel, self._core, stamps, *signals
-        )
-        return self.observer.estimate(rows), Detection(levels, normalized)
+        rows, *judged = core.detect_run(self.observer.kernel, self._core, stamps, *signals)
+        return self.observer.estimate(rows), Detection(*judged)

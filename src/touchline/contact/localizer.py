@@ -140,6 +140,7 @@ class Localizer:
             None if detection is None else detection.normalized,
             np.ascontiguousarray(q, float),
             None if qd is None else np.ascontiguousarray(qd, float),
+            None if detection is None else detection.quiet,
         )
         return self.answer(row[0])
 
@@ -158,6 +159,7 @@ class Localizer:
             estimate.rows,
             detection.normalized,
             detection.levels,
+            detection.quiet,
             np.ascontiguousarray(q, float),
             np.ascontiguousarray(qd, float),
         )

@@ -147,11 +147,12 @@ class Pipeline:
         self._pending = []
         levels = np.array([detection.levels for detection in detections])
         normalized = np.array([detection.normalized for detection in detections])
+        quiet = np.array([detection.quiet for detection in detections])
         self.recorder.add(
             np.array(times),
             np.array(qs),
             self.observer.estimate(np.array(rows)),
-            Detection(levels, normalized),
+            Detection(levels, normalized, quiet),
             np.concatenate(ended),
         )
 
