@@ -1,5 +1,5 @@
-import enum
 from collections.abc import Sequence
+import enum
 from typing import Annotated
 
 import numpy
@@ -307,6 +307,8 @@ class Localizer:
         | None,
         q: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)],
         qd: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)] | None,
+        quiet: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)]
+        | None,
     ) -> NDArray[numpy.float64]: ...
     def event(self, segment: int) -> NDArray[numpy.float64]: ...
     def follow(
@@ -317,6 +319,7 @@ class Localizer:
             NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)
         ],
         levels: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)],
+        quiet: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)],
         q: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)],
         qd: Annotated[NDArray[numpy.float64], dict(order="C", device="cpu", writable=False)],
     ) -> tuple: ...
