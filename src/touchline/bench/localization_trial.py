@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 FORCE = 20.0  # N
 NEAR, GROSS = 0.0225, 0.1  # m: what counts as found, and as grossly wrong
-FIRST, APART = 0.06, 0.1  # s: the first onset, after settling, and from one onset to the next
+FIRST, APART = 0.55, 0.1  # s: the first onset, after settling and a quiet half second, then each
 FRICTION = 0.5
 
 
