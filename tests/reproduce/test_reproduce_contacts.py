@@ -4,10 +4,10 @@
 import numpy as np
 import pytest
 
+from touchline.figure import new_figure
 from touchline.model.robot import load_robot
 from touchline.reproduce import applications, fig5, fig6
 from touchline.reproduce.arm_view import ArmView
-from touchline.reproduce.figure import new_figure
 from touchline.reproduce.replay import Replay
 from touchline.reproduce.wrench_routes import Routes
 from touchline.simulation.random_push import PAUSE, joined

@@ -6,12 +6,12 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
-NAMES = ("observer", "localization", "reaction")
+NAMES = ("observer", "localization", "reaction", "wrench")
 
 
 def bench(
     names: Annotated[
-        Positional[tuple[Literal["observer", "localization", "reaction"], ...]],
+        Positional[tuple[Literal["observer", "localization", "reaction", "wrench"], ...]],
         arg(metavar="[NAME ...]"),
     ] = (),
     /,
@@ -32,7 +32,7 @@ def bench(
     Example: touchline bench localization --robots panda sara --runs 10000 --out figures
 
     Args:
-        names: What to measure (observer, localization, reaction); default: everything.
+        names: What to measure (observer, localization, reaction, wrench); default: everything.
         output: observer: writes the figures here as well (.json or .csv).
         rounds: observer: how often each candidate is timed.
         robots: localization: the arms; panda and ur10 need the package example-robot-data.
@@ -41,9 +41,9 @@ def bench(
         begin: localization: several contacts begin 0.1 s apart, or at the same instant.
         speeds: localization: of every joint [rad/s]; 0 is an arm at rest.
         runs: localization: random poses and places per line of the tables.
-        seed: localization: of all that is random.
+        seed: localization, wrench: of all that is random.
         encounters: reaction: collisions for each link and speed.
-        out: localization, reaction: folder for the tables, every run, and figures.
+        out: localization, reaction, wrench: folder for the tables, every run, and figures.
     """
     wanted = names or NAMES
     if "observer" in wanted:
@@ -60,4 +60,8 @@ def bench(
         from touchline.bench.reaction import main as measure_reaction
 
         measure_reaction(encounters, out)
+    if "wrench" in wanted:
+        from touchline.bench.wrench import main as measure_wrench
+
+        measure_wrench(out, seed)
     return 0

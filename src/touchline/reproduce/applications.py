@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.estimation.joint_momentum import JointMomentumObserver, tool_wrench
+from touchline.figure import thin
 from touchline.model.robot import Robot, load_robot
 from touchline.reproduce.aim import place_along
 from touchline.reproduce.experiment import Check, Experiment, Row, Table, Tick
-from touchline.reproduce.figure import thin
 from touchline.reproduce.replay import FORCE, Replay
 from touchline.simulation.contacts import Profile, ScriptedContact, ScriptedForces
 from touchline.simulation.control import JointImpedance, Setpoint, Trajectory, hold

@@ -6,10 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.reproduce.applications import Application, tool_moment
-from touchline.reproduce.arm_view import ArmView
-from touchline.reproduce.experiment import Drawing
-from touchline.reproduce.figure import (
+from touchline.figure import (
     COLORS,
     PAGE,
     legend_above,
@@ -18,6 +15,9 @@ from touchline.reproduce.figure import (
     styled,
     thin,
 )
+from touchline.reproduce.applications import Application, tool_moment
+from touchline.reproduce.arm_view import ArmView
+from touchline.reproduce.experiment import Drawing
 from touchline.reproduce.replay import FORCE
 
 Array = NDArray[np.float64]

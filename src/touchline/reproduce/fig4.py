@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from touchline.estimation.classical import ClassicalObserver
 from touchline.estimation.observer import Observer
+from touchline.figure import thin
 from touchline.model.robot import Robot, load_robot
 from touchline.reproduce.conditioning import EndEffector, best_conditioned, nearby_singularity
 from touchline.reproduce.experiment import Check, Experiment, Row, Table, Tick
-from touchline.reproduce.figure import thin
 from touchline.reproduce.prescribed import Motion, Wave, coupling, prescribed_motion
 from touchline.simulation.setup import read_setup
 

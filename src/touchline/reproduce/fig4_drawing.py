@@ -6,9 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.reproduce.experiment import Drawing, Row
-from touchline.reproduce.fig4 import BEST, JOINT, SINGULAR, Outcome
-from touchline.reproduce.figure import (
+from touchline.figure import (
     COLORS,
     COLUMN,
     FAINT,
@@ -21,6 +19,8 @@ from touchline.reproduce.figure import (
     styled,
     thin,
 )
+from touchline.reproduce.experiment import Drawing, Row
+from touchline.reproduce.fig4 import BEST, JOINT, SINGULAR, Outcome
 
 Array = NDArray[np.float64]
 

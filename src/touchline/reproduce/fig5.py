@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.figure import thin
 from touchline.model.robot import load_robot
 from touchline.reproduce.aim import place_along
 from touchline.reproduce.experiment import Check, Experiment, Row, Table, Tick
-from touchline.reproduce.figure import thin
 from touchline.reproduce.replay import FORCE, Replay
 from touchline.simulation.control import JointImpedance, hold
 from touchline.simulation.noise import SensorNoise

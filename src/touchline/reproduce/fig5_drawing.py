@@ -6,11 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.reproduce.arm_view import ArmView
-from touchline.reproduce.experiment import Drawing
-from touchline.reproduce.fig5 import HAND, RECOIL, SEGMENTS, STRUCTURE, Pushes, Recoil, point_errors
-from touchline.reproduce.fig5 import ghost as ghost_of
-from touchline.reproduce.figure import (
+from touchline.figure import (
     COLORS,
     FAINT,
     INK,
@@ -21,6 +17,10 @@ from touchline.reproduce.figure import (
     styled,
     thin,
 )
+from touchline.reproduce.arm_view import ArmView
+from touchline.reproduce.experiment import Drawing
+from touchline.reproduce.fig5 import HAND, RECOIL, SEGMENTS, STRUCTURE, Pushes, Recoil, point_errors
+from touchline.reproduce.fig5 import ghost as ghost_of
 from touchline.reproduce.replay import FORCE, Replay
 
 Array = NDArray[np.float64]

@@ -5,10 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from touchline.reproduce.arm_view import ArmView
-from touchline.reproduce.experiment import Drawing, Row
-from touchline.reproduce.fig6 import LINKS, NEAR, RIGHT, Case
-from touchline.reproduce.figure import (
+from touchline.figure import (
     COLORS,
     FAINT,
     PAGE,
@@ -17,6 +14,9 @@ from touchline.reproduce.figure import (
     panel_label,
     styled,
 )
+from touchline.reproduce.arm_view import ArmView
+from touchline.reproduce.experiment import Drawing, Row
+from touchline.reproduce.fig6 import LINKS, NEAR, RIGHT, Case
 from touchline.reproduce.wrench_routes import METHODS, NAMES
 
 TONES = {"eq5": "#b9bec4", "classical": COLORS["classical"], "ours": COLORS["segment"]}

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.errors import InputError
+from touchline.figure import save
 from touchline.reproduce.experiment import Experiment, Row
-from touchline.reproduce.figure import save
 from touchline.reproduce.page import page_text
 
 Array = NDArray[np.float64]

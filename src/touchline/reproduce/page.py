@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from html import escape
 
 from touchline import __version__
+from touchline.figure import rendered
 from touchline.reproduce.experiment import Check, Experiment, Row, Table
-from touchline.reproduce.figure import rendered
 
 PAGE = """<!doctype html>
 <html lang="en">

@@ -33,6 +33,7 @@ class Reading:
         motor_torque: (n,) torque of the motor, before rotor and friction [Nm or N]; springs and
             dampers set in the model count as the motor's.
         wrench: (k, 6) on the outboard body, sensor frame [N, Nm].
+        acceleration: (n,) of the joints, which no sensor reads [rad/s2 or m/s2].
         motion_torque: (n,) that the motion would take without contact; None where no joint's
             driver takes it out [Nm or N].
     """
@@ -40,6 +41,7 @@ class Reading:
     link_torque: Array
     motor_torque: Array
     wrench: Array
+    acceleration: Array
     motion_torque: Array | None = None
 
 
@@ -189,6 +191,7 @@ class Plant:
             self._P.T @ transmitted,
             self._motor_torque + d.qfrc_passive[self._dofs],
             d.sensordata[: 6 * k].reshape(k, 6).copy(),
+            d.qacc[self._dofs],
             self._motion_torque() if self._shows_motion else None,
         )
 

@@ -27,6 +27,7 @@ class Readings:
             sensor takes it out.
         R_log_sensor: (N, k, 3, 3) turns sensor axes into those of the log; None if all are the
             sensors' own.
+        acceleration: (N, n) of the joints, which no sensor reads; None where it is not known.
     """
 
     time: Array
@@ -39,6 +40,7 @@ class Readings:
     motion_torque: Array | None = None
     weight: Array | None = None
     R_log_sensor: Array | None = None
+    acceleration: Array | None = None
 
     @classmethod
     def empty(cls, plant: Plant, count: int) -> Self:
@@ -60,6 +62,7 @@ class Readings:
             np.empty((count, n)) if "model" in compensated else None,
             np.empty((count, k, 6)) if weighed else None,
             np.empty((count, k, 3, 3)) if turned else None,
+            np.empty((count, n)),
         )
 
     def put(self, row: int, plant: Plant, before: Reading, after: Reading) -> None:
@@ -69,6 +72,8 @@ class Readings:
         self.link_torque[row] = (before.link_torque + after.link_torque) / 2
         self.motor_torque[row] = (before.motor_torque + after.motor_torque) / 2
         self.wrench[row] = (before.wrench + after.wrench) / 2
+        if self.acceleration is not None:
+            self.acceleration[row] = (before.acceleration + after.acceleration) / 2
         room, first, second = self.motion_torque, before.motion_torque, after.motion_torque
         if room is not None and first is not None and second is not None:
             room[row] = (first + second) / 2
