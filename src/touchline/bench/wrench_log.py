@@ -13,10 +13,11 @@ from touchline.estimation.samples import Samples
 from touchline.model.mechanism import Mechanism
 from touchline.model.robot import Robot
 from touchline.simulation.contacts import ScriptedContact, ScriptedForces
-from touchline.simulation.control import JointImpedance, Trajectory
+from touchline.simulation.control import Trajectory
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.plant import Plant
 from touchline.simulation.readings import Readings
+from touchline.simulation.scene import impedance
 from touchline.simulation.sensing import sense
 from touchline.simulation.setup import read_setup
 from touchline.simulation.simulator import Rates, run
@@ -108,7 +109,7 @@ def record(
     seconds: float,
     mechanism: Mechanism | None = None,
 ) -> Recording:
-    """Simulates the robot under joint impedance control.
+    """Simulates the robot under control that tracks a trajectory.
 
     Args:
         robot: as the estimators believe it to be.
@@ -117,11 +118,10 @@ def record(
         seconds: duration.
         mechanism: what the robot really is; default: what is believed.
     """
-    setup = read_setup(robot)
     plant = Plant(robot, PHYSICS, mechanism)
     goal = trajectory(-1.0 / PHYSICS)
     plant.reset(goal.q, goal.qd, -1.0 / PHYSICS)
-    controller = JointImpedance(trajectory, setup.stiffness, setup.damping)
+    controller = impedance(read_setup(robot), trajectory)
     forces = [ScriptedForces(contacts)]
     readings, truth = run(plant, controller, forces, seconds, Rates(PHYSICS))
     touched = {robot.body_of(contact.link).segment: contact.link for contact in contacts}

@@ -203,7 +203,6 @@ def outermost_links(log: Log) -> dict[str, str]:
     return links
 
 
-IDYNTREE = {"module": "idyntree", "package": "idyntree"}
 METHODS = (
     Method("segment", "ours: the momentum of each segment", segment, own=True),
     Method("paper", "ours, as the paper prints it, eq. (18)", paper, own=True),
@@ -220,19 +219,22 @@ METHODS = (
         "idyn-in",
         "iDynTree, accelerations by differences, low-pass on its inputs; told the touched links",
         idyntree_inputs,
-        **IDYNTREE,
+        module="idyntree",
+        package="idyntree",
     ),
     Method(
         "idyn-out",
         "iDynTree, accelerations by differences, low-pass on its result; told the touched links",
         idyntree_result,
-        **IDYNTREE,
+        module="idyntree",
+        package="idyntree",
     ),
     Method(
         "idyn-exact",
         "iDynTree with the simulator's accelerations, which no robot has; told the touched links",
         idyntree_exact,
         real=False,
-        **IDYNTREE,
+        module="idyntree",
+        package="idyntree",
     ),
 )
