@@ -51,4 +51,42 @@ inline double log_determinant(const double* l, int n) {
   return 2.0 * sum;
 }
 
+// Jacobi's rotations: the eigenvalues of a symmetric (n, n) matrix end up on its diagonal, the
+// eigenvectors in the columns of v.
+inline void diagonalize(double* a, double* v, int n) {
+  for (int i = 0; i < n * n; ++i) v[i] = i % (n + 1) == 0 ? 1.0 : 0.0;
+  constexpr int kSweeps = 12;
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    double off = 0.0, diagonal = 0.0;
+    for (int i = 0; i < n; ++i) {
+      diagonal += a[i * n + i] * a[i * n + i];
+      for (int j = 0; j < i; ++j) off += a[i * n + j] * a[i * n + j];
+    }
+    if (!(off > 1e-20 * diagonal)) return;
+    for (int p = 0; p < n; ++p) {
+      for (int q = p + 1; q < n; ++q) {
+        if (a[p * n + q] == 0.0) continue;
+        const double theta = 0.5 * (a[q * n + q] - a[p * n + p]) / a[p * n + q];
+        const double t = std::copysign(1.0, theta) / (std::fabs(theta) + std::sqrt(theta * theta + 1.0));
+        const double c = 1.0 / std::sqrt(t * t + 1.0), s = t * c;
+        for (int k = 0; k < n; ++k) {
+          const double x = a[k * n + p], y = a[k * n + q];
+          a[k * n + p] = c * x - s * y;
+          a[k * n + q] = s * x + c * y;
+        }
+        for (int k = 0; k < n; ++k) {
+          const double x = a[p * n + k], y = a[q * n + k];
+          a[p * n + k] = c * x - s * y;
+          a[q * n + k] = s * x + c * y;
+        }
+        for (int k = 0; k < n; ++k) {
+          const double x = v[k * n + p], y = v[k * n + q];
+          v[k * n + p] = c * x - s * y;
+          v[k * n + q] = s * x + c * y;
+        }
+      }
+    }
+  }
+}
+
 }  // namespace touchline

@@ -1,61 +1,66 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tells contact from noise, per segment: thresholds per row and for all rows together, with
-// hysteresis, a minimum duration, and a slow baseline that follows constant offsets while nothing
-// touches. No allocation, lock, exception or output in `step`.
+// Tells contact from noise, per segment: one or several tests at a time, each with a threshold,
+// with hysteresis, a minimum duration, and a slow baseline that follows constant offsets while
+// nothing touches. No allocation, lock, exception or output in `step`.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 #include <vector>
 
+#include "touchline/activity.hpp"
+#include "touchline/detection_row.hpp"
 #include "touchline/observer.hpp"
+#include "touchline/posture.hpp"
+#include "touchline/segment_tests.hpp"
 
 namespace touchline {
 
-enum class Level { none = 0, contact = 1, collision = 2 };
-
-// One residual of a segment: a component of its wrench in the frame of its own sensor, or the
-// torque that contacts on the segment put on one of its joints.
-struct DetectionRow {
-  int segment;
-  int component;  // 0 to 5 of the segment wrench; -1: a joint
-  int joint;
-  double contact, collision;  // thresholds [N or Nm]
-  double baseline_limit;      // the largest residual that is taken for an offset [N or Nm]
-};
-
-struct DetectionTimes {
-  double min_duration;  // a test must hold this long to fire [s]
-  double hold;          // and be quiet this long to clear [s]
-  double baseline;      // time constant of the baseline [s]
-  double release;       // cleared below this fraction of the thresholds
-};
-
 class Detector {
  public:
-  // `sum_limit` (one per segment): the limit of the sum of squares of all normalized rows.
-  Detector(const Observer& observer, std::vector<DetectionRow> rows,
-           std::vector<double> sum_limit, const DetectionTimes& times)
+  Detector(const Observer& observer, std::vector<DetectionRow> rows, DetectionSettings settings)
       : observer_(observer),
+        posture_(observer.tree(), observer.row_layout().joints),
         rows_(std::move(rows)),
-        sum_limit_(std::move(sum_limit)),
-        times_(times),
+        settings_(std::move(settings)),
+        activity_(observer.row_layout().joints),
         states_(rows_.size()),
-        segments_(sum_limit_.size()),
+        samples_(rows_.size()),
+        segments_(settings_.sum_limits.size()),
+        first_(segments_.size() + 1, 0),
         normalized_(rows_.size(), 0.0),
-        levels_(sum_limit_.size(), 0),
-        quiet_(sum_limit_.size(), 0.0) {}
+        levels_(segments_.size(), 0),
+        quiet_(segments_.size(), 0.0),
+        statistics_(segments_.size() * settings_.tests.size(), 0.0) {
+    for (std::size_t g = 0; g < segments_.size(); ++g) {
+      std::vector<DetectionRow> own;
+      for (const DetectionRow& row : rows_) {
+        if (row.segment == static_cast<int>(g)) own.push_back(row);
+      }
+      first_[g + 1] = first_[g] + own.size();
+      tests_.emplace_back(observer, own, settings_);
+      joint_tests_ = joint_tests_ || tests_.back().used();
+    }
+  }
 
-  // To be called after each step of the observer, with the row it wrote.
-  void step(const double* output) {
+  // To be called after each step of the observer, with the row it wrote and the sample it took.
+  void step(const double* output, const double* q, const double* qd) {
     row_ = output;
     const double now = observer_.time();
     const double dt = timed_ ? std::max(0.0, now - time_) : 0.0;
     timed_ = true;
     time_ = now;
-    for (Segment& s : segments_) s.peak = s.sum = s.collision = 0.0;
-    for (std::size_t i = 0; i < rows_.size(); ++i) test_row(i);
-    for (std::size_t g = 0; g < segments_.size(); ++g) decide(g, dt);
+    if (joint_tests_ && dt > 0.0) follow_motion(q, qd, dt);
+    for (std::size_t g = 0; g < segments_.size(); ++g) {
+      Segment& s = segments_[g];
+      s.peak = s.sum = s.collision = 0.0;
+      read_segment(g);
+      for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) test_row(i);
+      judge(g, dt);
+      decide(g, dt);
+    }
     for (std::size_t i = 0; i < rows_.size(); ++i) follow_offset(i, dt);
   }
 
@@ -65,49 +70,92 @@ class Detector {
   const std::vector<int>& levels() const { return levels_; }  // per segment
   // Per segment: over how long its baseline has been averaged [s].
   const std::vector<double>& quiet() const { return quiet_; }
+  // Per segment, for each test: what is compared with its limit.
+  const std::vector<double>& statistics() const { return statistics_; }
+  const RowSample& sample(std::size_t row) const { return samples_[row]; }
+  const Activity& activity() const { return activity_.activity(); }
   double baseline(int row) const { return states_[row].baseline; }
+  double reference(int row) const { return states_[row].reference; }
   const Observer& observer() const { return observer_; }
 
  private:
   struct RowState {
-    double value = 0.0, baseline = 0.0, age = 0.0;
-    bool known = false, started = false;
+    double baseline = 0.0, reference = 0.0, age = 0.0;
+    bool started = false;
   };
   struct Segment {
     double peak = 0.0, sum = 0.0, collision = 0.0;  // of the normalized rows
     double above = 0.0, above_collision = 0.0, below = 0.0;  // for how long [s]
+    double score = 0.0;  // of all tests, in thresholds
     bool pending = false, pending_collision = false;
   };
+  static constexpr double kMost = 1.5;  // thresholds that a sum can grow to while all is felt
 
-  double residual(const DetectionRow& row) const {
+  void follow_motion(const double* q, const double* qd, double dt) {
+    double sum = 0.0;
+    for (int j = 0; j < observer_.row_layout().joints; ++j) sum += std::fabs(q[j]) + std::fabs(qd[j]);
+    if (!(sum < kAbsurd)) return;
+    activity_.add(qd, dt);
+    since_ += dt;
+    if (placed_ && since_ < kRefresh) return;
+    posture_.set(q, nullptr);
+    for (SegmentTests& tests : tests_) tests.weigh(posture_, activity_.activity());
+    since_ = 0.0;
+    placed_ = true;
+  }
+
+  // The residuals and innovations of a segment's rows.
+  void read_segment(std::size_t g) {
     const RowLayout& layout = observer_.row_layout();
-    if (row.component < 0) {
-      return row_[layout.joint_settled() + row.joint] > 0.0
-                 ? row_[layout.segment_torque() + row.joint]
-                 : std::nan("");
+    double wrench[6], load[6];
+    bool known = false;
+    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+      const DetectionRow& row = rows_[i];
+      RowSample& s = samples_[i];
+      if (row.component < 0) {
+        s.known = row_[layout.joint_settled() + row.joint] > 0.0;
+        s.residual = row_[layout.segment_torque() + row.joint];
+        s.innovation = observer_.own_innovation(row.joint);
+      } else {
+        if (i == first_[g]) known = read_wrench(g, wrench, load);
+        s.known = known;
+        s.residual = wrench[row.component];
+        s.innovation = load[row.component];
+      }
+      s.known = s.known && std::isfinite(s.residual);
+      if (!std::isfinite(s.innovation)) s.innovation = s.residual;  // samples were lost
     }
-    if (!(row_[layout.segment_settled() + row.segment] > 0.0)) return std::nan("");
-    const Spatial w = wrench_to_child(
-        observer_.sensor_pose(observer_.layout().segments[row.segment].sensor),
-        load(row_ + layout.segment_wrench() + 6 * row.segment));
-    double parts[6];
-    store(w, parts);
-    return parts[row.component];
+  }
+
+  bool read_wrench(std::size_t g, double* wrench, double* innovation) const {
+    const RowLayout& layout = observer_.row_layout();
+    const int sensor = observer_.layout().segments[g].sensor;
+    if (sensor < 0 || !(row_[layout.segment_settled() + g] > 0.0)) {
+      std::fill_n(wrench, 6, std::nan(""));
+      std::fill_n(innovation, 6, std::nan(""));
+      return false;
+    }
+    const Pose X = observer_.sensor_pose(sensor);
+    store(wrench_to_child(X, load(row_ + layout.segment_wrench() + 6 * g)), wrench);
+    if (joint_tests_)
+      store(wrench_to_child(X, load(row_ + layout.segment_innovation() + 6 * g)), innovation);
+    return true;
   }
 
   void test_row(std::size_t i) {
     const DetectionRow& row = rows_[i];
     RowState& s = states_[i];
-    const double value = residual(row);
-    s.known = std::isfinite(value);
+    RowSample& sample = samples_[i];
     normalized_[i] = 0.0;
-    if (!s.known) return;
-    s.value = value;
+    if (!sample.known) return;
     if (!s.started) {  // the first settled residual is taken for an offset, up to the limit
-      s.baseline = std::clamp(value, -row.baseline_limit, row.baseline_limit);
+      s.baseline = std::clamp(sample.residual, -row.baseline_limit, row.baseline_limit);
+      s.reference = sample.residual;
       s.started = true;
     }
-    const double x = (value - s.baseline) / row.contact;
+    sample.offset = s.baseline;
+    sample.reference = s.reference;
+    const double x = (sample.residual - s.baseline) / row.contact;
     normalized_[i] = x;
     Segment& segment = segments_[row.segment];
     segment.peak = std::max(segment.peak, std::fabs(x));
@@ -115,16 +163,40 @@ class Detector {
     segment.collision = std::max(segment.collision, std::fabs(x) * row.contact / row.collision);
   }
 
+  // May offsets be followed: is nothing felt, or only by what has been an offset since?
+  bool adapts(std::size_t g) const {
+    return levels_[g] == 0 ? !segments_[g].pending : segments_[g].peak < settings_.times.release;
+  }
+
+  // The statistics of all tests, and the largest in thresholds.
+  void judge(std::size_t g, double dt) {
+    Segment& s = segments_[g];
+    if (joint_tests_ && placed_) {
+      double most = std::numeric_limits<double>::infinity();
+      for (const TestSetting& setting : settings_.tests) {
+        if (setting.test == Test::cusum) most = kMost * setting.limits[g];
+      }
+      tests_[g].step(samples_.data() + first_[g], dt, adapts(g), activity_.activity(), most);
+    }
+    s.score = 0.0;
+    for (std::size_t t = 0; t < settings_.tests.size(); ++t) {
+      const TestSetting& setting = settings_.tests[t];
+      double& statistic = statistics_[g * settings_.tests.size() + t];
+      statistic = setting.test == Test::rows ? std::max(s.peak, std::sqrt(s.sum / settings_.sum_limits[g]))
+                  : placed_                  ? tests_[g].statistic(setting.test)
+                                             : 0.0;
+      s.score = std::max(s.score, statistic / setting.limits[g]);
+    }
+  }
+
   void decide(std::size_t g, double dt) {
     Segment& s = segments_[g];
-    const double sum = s.sum / sum_limit_[g];
-    const double level = std::max(s.peak, std::sqrt(sum));
-    advance(level > 1.0, dt, s.pending, s.above);
+    advance(s.score > 1.0, dt, s.pending, s.above);
     advance(s.collision > 1.0, dt, s.pending_collision, s.above_collision);
-    s.below = level < times_.release ? s.below + dt : 0.0;
-    if (s.pending && s.above >= times_.min_duration) levels_[g] = std::max(levels_[g], 1);
-    if (s.pending_collision && s.above_collision >= times_.min_duration) levels_[g] = 2;
-    if (levels_[g] > 0 && s.below >= times_.hold) levels_[g] = 0;
+    s.below = s.score < settings_.times.release ? s.below + dt : 0.0;
+    if (s.pending && s.above >= settings_.times.min_duration) levels_[g] = std::max(levels_[g], 1);
+    if (s.pending_collision && s.above_collision >= settings_.times.min_duration) levels_[g] = 2;
+    if (levels_[g] > 0 && s.below >= settings_.times.hold) levels_[g] = 0;
   }
 
   // For how long a test has held without a break.
@@ -136,26 +208,33 @@ class Detector {
   void follow_offset(std::size_t i, double dt) {
     RowState& s = states_[i];
     const DetectionRow& row = rows_[i];
-    if (!s.known || levels_[row.segment] > 0 || segments_[row.segment].pending) return;
+    const double value = samples_[i].residual;
+    if (!samples_[i].known) return;
+    if (adapts(row.segment)) s.reference += (value - s.reference) * std::min(1.0, dt / kReference);
+    if (levels_[row.segment] > 0 || segments_[row.segment].pending) return;
     quiet_[row.segment] = s.age += dt;  // a running mean first, a low-pass once it has seen enough
-    const double tau = std::min(s.age, times_.baseline);
+    const double tau = std::min(s.age, settings_.times.baseline);
     if (tau <= 0.0) return;
-    const double next = s.baseline + (s.value - s.baseline) * std::min(1.0, dt / tau);
+    const double next = s.baseline + (value - s.baseline) * std::min(1.0, dt / tau);
     s.baseline = std::clamp(next, -row.baseline_limit, row.baseline_limit);
   }
 
   const Observer& observer_;
+  Posture posture_;
   const double* row_ = nullptr;
   std::vector<DetectionRow> rows_;
-  std::vector<double> sum_limit_;
-  DetectionTimes times_;
+  DetectionSettings settings_;
+  ActivityMeter activity_;
   std::vector<RowState> states_;
+  std::vector<RowSample> samples_;
   std::vector<Segment> segments_;
+  std::vector<std::size_t> first_;  // per segment: its first row; they stand together
+  std::vector<SegmentTests> tests_;
   std::vector<double> normalized_;
   std::vector<int> levels_;
-  std::vector<double> quiet_;
-  double time_ = 0.0;
-  bool timed_ = false;
+  std::vector<double> quiet_, statistics_;
+  double time_ = 0.0, since_ = 0.0;
+  bool timed_ = false, placed_ = false, joint_tests_ = false;
 };
 
 }  // namespace touchline

@@ -50,6 +50,7 @@ class Filters {
 
   const Group& group(std::size_t g) const { return groups_[g]; }
   const double* value(std::size_t g) const { return value_.data() + groups_[g].first; }
+  const double* input(std::size_t g) const { return input_.data() + groups_[g].first; }
   double* input(std::size_t g) { return input_.data() + groups_[g].first; }
 
   bool settled(std::size_t g, const Instant& now) const {

@@ -115,6 +115,9 @@ class Observer {
   Pose sensor_pose(int s) const {
     return load_pose(before_ + terms_.at().sensor(s) + TermsLayout::kPose);
   }
+  // External torque that contacts on its own segment put on joint j, mean over the last interval,
+  // not filtered; 0 where it is not known.
+  double own_innovation(std::size_t j) const { return channels_.filters.input(channels_.own(j))[0]; }
   // The model's terms alone, for a state of its own.
   Terms<double>& terms() { return terms_; }
 

@@ -9,19 +9,11 @@
 #include <vector>
 
 #include "touchline/dense.hpp"
+#include "touchline/noise_figures.hpp"
 #include "touchline/observer.hpp"
 #include "touchline/posture.hpp"
 
 namespace touchline {
-
-// One sigma per sample of the signals, and what no filter takes away.
-struct NoiseFigures {
-  std::vector<double> qd, tau, wrench;  // n, n, 6 k
-  double period = 1e-3;                 // between samples [s]
-  // Errors of gains and model, as a part of the load.
-  double wrench_error = 0.0, torque_error = 0.0;
-  double force = 2e-3, moment = 5e-4;   // floors [N, Nm]
-};
 
 class RowNoise {
  public:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from touchline.contact.thresholds import Thresholds, make_thresholds
 from touchline.estimation.observer import Estimate, Observer
+from touchline.model.robot import Robot
 from touchline.native import core
 
 Array = NDArray[np.float64]
@@ -37,6 +38,36 @@ class Detection:
     quiet: Array
 
 
+@dataclass(frozen=True)
+class Details:
+    """What the tests see of N samples, for those who set thresholds.
+
+    Attributes:
+        levels: (N, m) the `Level` of each segment.
+        statistics: (N, m, t) each test's statistic, in the order of `Thresholds.limits`.
+        slow: (N / every, r) residuals less their baseline [N or Nm]; NaN where not known.
+        quick: (N / every, r) the same less the mean of the last 0.2 s.
+        activity: (N / every, 2) squared speed [rad2/s2], acceleration [rad/s2].
+    """
+
+    levels: Array
+    statistics: Array
+    slow: Array
+    quick: Array
+    activity: Array
+
+
+def native_noise(
+    robot: Robot, period: float, wrench_error: float = 0.0, torque_error: float = 0.0
+) -> core.NoiseFigures:
+    """The noise figures of a robot's description in the words of the native core."""
+    noise = robot.description.noise
+    sensors = [x for name in robot.sensor_names for x in noise.sensors[name]]
+    return core.noise_figures(
+        list(noise.qd), list(noise.tau), sensors, period, wrench_error, torque_error
+    )
+
+
 class Detector:
     """Runs an observer and tests its residuals (see `core/include/touchline/detector.hpp`).
 
@@ -51,13 +82,22 @@ class Detector:
     ) -> None:
         self.observer = observer
         self.thresholds = thresholds or make_thresholds(observer.robot, period)
-        settings = observer.robot.description.detection
+        detection = observer.robot.description.detection
+        times = core.DetectionTimes(
+            detection.min_duration, detection.hold, detection.baseline.time, detection.release
+        )
         self._core = core.Detector(
             observer.kernel,
             [core.DetectionRow(**vars(row)) for row in self.thresholds.rows],
-            self.thresholds.sum_limit.tolist(),
-            core.DetectionTimes(
-                settings.min_duration, settings.hold, settings.baseline.time, settings.release
+            core.DetectionSettings(
+                [
+                    core.TestSetting(getattr(core.Test, method), limits.tolist())
+                    for method, limits in self.thresholds.limits.items()
+                ],
+                self.thresholds.sum_limit.tolist(),
+                times,
+                native_noise(observer.robot, period),
+                list(detection.windows),
             ),
         )
 
@@ -73,3 +113,13 @@ class Detector:
         signals = self.observer.arrays(stamps.shape, q, qd, tau, wrench)
         rows, *judged = core.detect_run(self.observer.kernel, self._core, stamps, *signals)
         return self.observer.estimate(rows), Detection(*judged)
+
+    def details(self, time, q, qd, tau=None, wrench=None, every: int = 1) -> Details:
+        """N samples, for those who set thresholds: what the tests see."""
+        stamps = np.ascontiguousarray(time, dtype=float)
+        signals = self.observer.arrays(stamps.shape, q, qd, tau, wrench)
+        q, qd, tau, wrench = signals
+        levels, statistics, slow, quick, activity = core.detect_details(
+            self.observer.kernel, self._core, stamps, q, qd, tau, wrench, every
+        )
+        return Details(levels, statistics, slow, quick, activity)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from touchline.contact.contact import Candidate
-from touchline.contact.detector import Detection
+from touchline.contact.detector import Detection, native_noise
 from touchline.contact.skin import Skin
 from touchline.contact.thresholds import Thresholds
 from touchline.estimation.observer import Estimate, Observer
@@ -111,7 +111,7 @@ class Localizer:
         self.core = core.Localizer(
             observer.kernel,
             [core.DetectionRow(**vars(row)) for row in rows],
-            self._noise(period, wrench_error, torque_error),
+            native_noise(self.robot, period, wrench_error, torque_error),
             [core.LinkSurface(patch.node, patch.mesh) for patch in self.skin.patches],
             settings,
         )
@@ -240,13 +240,6 @@ class Localizer:
                 position,
             )
             for surface, node, weight, *_, position in ((*part[:3], part[3:]) for part in parts)
-        )
-
-    def _noise(self, period: float, wrench_error: float, torque_error: float) -> core.NoiseFigures:
-        noise = self.robot.description.noise
-        sensors = [x for name in self.robot.sensor_names for x in noise.sensors[name]]
-        return core.noise_figures(
-            list(noise.qd), list(noise.tau), sensors, period, wrench_error, torque_error
         )
 
 

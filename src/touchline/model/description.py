@@ -105,12 +105,58 @@ class BaselineDescription:
 
 
 @dataclass(frozen=True)
+class RowCalibration:
+    """What contact-free motion left in one row [N or Nm], written by `calibrate`.
+
+    `typical` is its root mean square. `slow` and `quick` are the sigmas of the model's errors,
+    against the slow baseline and against the last 0.2 s: a constant, per rad2/s2 of squared speed,
+    per rad/s2 of acceleration.
+    """
+
+    typical: float
+    slow: Vector = (0.0, 0.0, 0.0)
+    quick: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class TailDescription:
+    """How often a test exceeded what: a generalized Pareto tail, written by `calibrate`.
+
+    `level` was exceeded `per_hour` times an hour, by excesses of `scale` and `shape`.
+    """
+
+    level: float
+    per_hour: float
+    scale: float
+    shape: float = 0.0
+
+
+@dataclass(frozen=True)
+class CalibrationDescription:
+    """What `calibrate` found in `hours` of contact-free motion, sampled every `period` [s].
+
+    `rows` are named after joints and `SENSOR.fx` to `SENSOR.mz`; `tails` by segment and method.
+    """
+
+    hours: float
+    period: float
+    rows: dict[str, RowCalibration]
+    tails: dict[str, dict[str, TailDescription]]
+
+
+@dataclass(frozen=True)
 class DetectionDescription:
     """When residuals count as contacts.
 
-    A test fires after `min_duration` [s]; an event ends when all rows have been below `release`
-    times their thresholds for `hold` [s].
+    The tests of `method` fire, with thresholds for `false_alarms` per hour of the whole robot as
+    far as it is calibrated, after `min_duration` [s]; an event ends when all have been below
+    `release` times their thresholds for `hold` [s]. `windows` [s] are those of `glrt`.
     """
+
+    method: tuple[str, ...] = ("rows",)
+    false_alarms: float = 1.0
+    windows: Vector = (0.002, 0.005, 0.01, 0.02, 0.05)
+    calibration: CalibrationDescription | None = None
 
     contact: LevelDescription = field(default_factory=LevelDescription)
     collision: LevelDescription = field(default_factory=LevelDescription)

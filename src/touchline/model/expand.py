@@ -4,7 +4,13 @@
 from typing import Any
 
 from touchline.model import values
-from touchline.model.description import AXES, DetectionDescription, Noise, Vector
+from touchline.model.description import (
+    AXES,
+    CalibrationDescription,
+    DetectionDescription,
+    Noise,
+    Vector,
+)
 from touchline.model.names import RESERVED_SENSORS
 from touchline.model.schema import SensorEntry
 from touchline.suggest import unknown
@@ -76,7 +82,25 @@ class Expander:
                     if key not in self.sensor_names:
                         what = unknown(key, "sensor", self.sensor_names)
                         self.problems.append((f"{where}.{kind}.{key}", what))
+        if given.calibration is not None:
+            self._calibration(given.calibration)
         return given
+
+    def _calibration(self, given: CalibrationDescription) -> None:
+        where = "detection.calibration"
+        segments = (*self.sensor_names, "root")
+        rows = [f"{name}.{axis}" for name in self.sensor_names for axis in AXES]
+        for name in given.rows:
+            if "." in name and name not in rows:
+                self.problems.append((f"{where}.rows.{name}", unknown(name, "row", rows)))
+        for segment, tails in given.tails.items():
+            if segment not in segments:
+                what = unknown(segment, "segment", segments)
+                self.problems.append((f"{where}.tails.{segment}", what))
+            for method in tails:
+                if method not in values.METHODS:
+                    what = unknown(method, "method", values.METHODS)
+                    self.problems.append((f"{where}.tails.{segment}.{method}", what))
 
     def per_axis(self, where: str, given: Any, sensor: SensorEntry, default: Vector) -> Vector:
         """Return six values; `given` has six, one per measured axis, or is None (the default)."""

@@ -23,11 +23,14 @@ from cattrs.gen import make_dict_structure_fn, override
 from touchline.model import values
 from touchline.model.description import (
     BaselineDescription,
+    CalibrationDescription,
     DetectionDescription,
     Friction,
     LevelDescription,
     LinkCorrection,
     Load,
+    RowCalibration,
+    TailDescription,
     Vector,
 )
 from touchline.model.values import Hook, Torque, kind_of, show
@@ -160,7 +163,22 @@ HOOKS: dict[type, dict[str, Hook]] = {
         "moment": _by_sensor,
     },
     BaselineDescription: {"time": values.positive, "limit": values.non_negative},
+    RowCalibration: {
+        "typical": values.positive,
+        "slow": values.list_of(values.non_negative, 3),
+        "quick": values.list_of(values.non_negative, 3),
+    },
+    TailDescription: {
+        "level": values.positive,
+        "per_hour": values.positive,
+        "scale": values.positive,
+        "shape": values.number,
+    },
+    CalibrationDescription: {"hours": values.positive, "period": values.positive},
     DetectionDescription: {
+        "method": values.methods,
+        "false_alarms": values.positive,
+        "windows": values.windows,
         "min_duration": values.non_negative,
         "hold": values.non_negative,
         "release": values.fraction,

@@ -21,6 +21,8 @@ from touchline.model.yaml_file import kind_of
 from touchline.suggest import not_allowed
 
 TORQUES = ("sensor", "motor", "none")
+METHODS = ("rows", "scaled", "chi2", "glrt", "cusum")  # of detection
+MOST_WINDOW = 0.5  # s; longer ones are no detection any more
 
 Hook = Callable[..., Any]
 
@@ -77,6 +79,22 @@ def sign(value: Any, _: Any = None) -> float:
     if isinstance(value, bool) or value not in (1, -1):
         raise ValueError(f"{show(value)} is not allowed; allowed: 1, -1")
     return float(value)
+
+
+def methods(value: Any, _: Any = None) -> tuple[str, ...]:
+    """Return one or several methods of detection, each once."""
+    named = list_of(one_of(*METHODS))(value) if isinstance(value, list) else (value,)
+    if not named or len(set(named)) < len(named):
+        raise ValueError(f"{show(value)}: name at least one method, each once")
+    return tuple(one_of(*METHODS)(name) for name in named)
+
+
+def windows(value: Any, _: Any = None) -> tuple[float, ...]:
+    """Return the lengths of windows [s]."""
+    lengths = list_of(positive)(value)
+    if not 1 <= len(lengths) <= 10 or max(lengths) > MOST_WINDOW:
+        raise ValueError(f"{show(value)}: allowed: 1 to 10 lengths of at most {MOST_WINDOW:g} s")
+    return lengths
 
 
 def text(value: Any, _: Any = None) -> str:
