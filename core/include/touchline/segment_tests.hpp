@@ -62,9 +62,9 @@ class SegmentTests {
   void step(const RowSample* samples, double dt, bool adapt, const Activity& activity,
             double most) {
     if (take(samples)) {
-      compact(activity);
       windows_.restart(active_.size());
       innovations_.restart(active_.size(), load_.data());
+      compact(activity);
       return;
     }
     if (dt <= 0.0 || active_.empty()) return;
