@@ -8,9 +8,11 @@ from hypothesis import strategies as st
 
 import touchline as tl
 from touchline.contact.contact import Contact
-from touchline.contact.reaction import REACTIONS, Reactor, limited, retract, stop
+from touchline.contact.reaction import REACTIONS, Retract, stop
+from touchline.contact.reactor import Reactor, limited
 from touchline.contact.state import Since, State
 from touchline.estimation.dynamics import inverse_dynamics, mass_matrix, point_jacobian
+from touchline.model.description import PolicyDescription, PolicyRule
 
 LINKS = ("link0", "link1", "link3", "link5", "link7", "tool", "handle")
 
@@ -34,11 +36,13 @@ def contact_of(state, link, seed, located=True):
     rng = np.random.default_rng([seed, 1])
     force = rng.normal(size=3) * rng.choice([1.0, 30.0, 1000.0])
     if not located:
-        return Contact("base", 0, "collision", wrench=np.r_[force, rng.normal(size=3)])
+        return Contact(
+            "base", 0, "collision", wrench=np.r_[force, rng.normal(size=3)], decided=True
+        )
     T = state.robot.T_world_links(state.q)[link]
     position = T[:3, :3] @ rng.uniform(-0.1, 0.1, 3) + T[:3, 3]
     return Contact(
-        "base", 0, "collision", "located", link=link, body=link, position=position, force=force
+        "base", 0, "collision", "located", link=link, position=position, force=force, decided=True
     )
 
 
@@ -67,7 +71,9 @@ def test_torques_stay_within_their_limits_for_any_contact(seed, name, link, loca
     robot = tl.load_robot("sara")
     state = state_of(robot, seed, since=True)
     contact = contact_of(state, link, seed, located)
-    command = Reactor(lambda _: name).update([contact], state)
+    policy = PolicyDescription(rules=[PolicyRule(name)])
+    command = Reactor(robot, policy).update([contact], state)
+    assert command.reaction == name
     assert np.all(np.isfinite(command.torque))
     assert np.all(np.abs(command.torque) <= state.effort + 1e-9)
 
@@ -95,7 +101,7 @@ def test_retract_accelerates_the_point_along_the_force(seed, link):
     contact = contact_of(state, link, seed)
     direction = contact.force / np.linalg.norm(contact.force)
     lever = state.lever(link, contact.position, direction)
-    acceleration = np.linalg.solve(state.inertia, retract(contact, state) - state.bias_torque)
+    acceleration = np.linalg.solve(state.inertia, Retract()(contact, state) - state.bias_torque)
     if np.linalg.norm(lever) > 1e-2 and np.all(np.abs(state.bias_torque) < state.effort):
         assert lever @ acceleration > 0.0
 

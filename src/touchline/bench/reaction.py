@@ -16,9 +16,10 @@ from pathlib import Path
 import numpy as np
 
 from touchline.bench.tables import Row, aligned
-from touchline.contact.contact import Contact
-from touchline.contact.reaction import REACTIONS, Reactor
-from touchline.model.robot import load_robot
+from touchline.contact.reaction import REACTIONS
+from touchline.contact.reactor import Reactor
+from touchline.model.description import PolicyDescription, PolicyRule
+from touchline.model.robot import Robot, load_robot
 from touchline.simulation.encounter import HIT_TIME, EncounterScene, Outcome
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scene import Run
@@ -88,16 +89,14 @@ def play(case: Case) -> list[Trial]:
     encounter = scene.draw((case.link,), case.speed, rng, mass=mass)
     trials = []
     for name in REACTIONS:
-        outcome = scene.play(encounter, Reactor(_on_collision(name)), SECONDS, case.seed)
+        outcome = scene.play(encounter, reactor(scene.robot, name), SECONDS, case.seed)
         trials.append(measure(scene, outcome, case, name))
     return trials
 
 
-def _on_collision(name: str):
-    def choose(contact: Contact) -> str:
-        return name if contact.level == "collision" else "ignore"
-
-    return choose
+def reactor(robot: Robot, reaction: str) -> Reactor:
+    """That answers every collision with one reaction."""
+    return Reactor(robot, PolicyDescription(rules=[PolicyRule(reaction, level="collision")]))
 
 
 def measure(scene: EncounterScene, outcome: Outcome, case: Case, reaction: str) -> Trial:

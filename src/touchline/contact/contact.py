@@ -28,7 +28,7 @@ class Contact:
     Attributes:
         segment: name of the segment.
         event: number of the event that it belongs to.
-        level: "contact" or "collision".
+        level: "contact" or "collision"; "contact" until the contrary is known.
         status: "located", "ambiguous", "not_separable" or "wrench_only".
         wrench: (6,) [N, Nm] on the segment, world axes, about the world origin; None on `root`.
         link: the link that carries the point, and `body` the rigid body it belongs to.
@@ -37,6 +37,10 @@ class Contact:
         force: (3,) [N] on the robot, world axes.
         covariance: (3, 3) [m2] of the position.
         candidates: other explanations, best first.
+        decided: whether the level is more than a default.
+        zone: "structure", "end_effector" or "handle"; None while that is open.
+        clamped: whether forces on two sides oppose each other.
+        rate: at which the force grows [N/s].
     """
 
     segment: str
@@ -51,6 +55,23 @@ class Contact:
     force: Array | None = None
     covariance: Array | None = None
     candidates: tuple[Candidate, ...] = field(default=())
+    decided: bool = False
+    zone: str | None = None
+    clamped: bool = False
+    rate: float | None = None
+
+    @property
+    def size(self) -> float:
+        """Of the force, or of the segment's where the contact's own is not known [N]."""
+        force = self.force if self.wrench is None or self.force is not None else self.wrench[:3]
+        return 0.0 if force is None else float(np.linalg.norm(force))
+
+    @property
+    def likely_link(self) -> str | None:
+        """The link, or the best candidate's where the place is not certain."""
+        if self.link is None and self.candidates:
+            return self.candidates[0].link
+        return self.link
 
     @property
     def position_std(self) -> float | None:

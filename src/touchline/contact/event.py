@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.contact.classification import Classes, Kind
 from touchline.contact.contact import Candidate
-from touchline.contact.detector import Detection, Detector, Level
+from touchline.contact.detector import Detection, Detector
 from touchline.contact.localizer import EventAnswer, Localizer
+from touchline.contact.zones import Zones
 from touchline.estimation.observer import Estimate
 
 Array = NDArray[np.float64]
@@ -24,7 +26,7 @@ class Event:
     Attributes:
         id: number, from 0 in the order of detection.
         segment: name of the segment.
-        level: "contact" or "collision", the highest reached.
+        level: "contact" or "collision": how it began, or a blow while it lasted.
         detected: time at which the test fired [s], not the onset.
         cleared: time at which it ended [s]; None while it lasts.
         joint: the most distal loaded joint; None where no torque tells.
@@ -39,6 +41,10 @@ class Event:
         time_of_position: the last strong sample [s].
         position_std: root of the trace of its covariance [m].
         candidates: all explanations, best first, at `time_of_position`.
+        decided: when the level was decided [s]; None while it is a default.
+        zone: "structure", "end_effector" or "handle"; None while that is open.
+        clamped: whether forces on two sides opposed each other.
+        rate: largest rate of the segment's force [N/s].
     """
 
     id: int
@@ -59,6 +65,10 @@ class Event:
     time_of_position: float | None = None
     position_std: float | None = None
     candidates: tuple[Candidate, ...] = ()
+    decided: float | None = None
+    zone: str | None = None
+    clamped: bool = False
+    rate: float | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The event as in `events.json`."""
@@ -80,6 +90,10 @@ class Event:
             "torque_peak": self.torque_peak,
             "status": self.status,
             "joint": self.joint,
+            "decided": self.decided,
+            "zone": self.zone,
+            "clamped": self.clamped,
+            "rate": self.rate,
             "candidates": [
                 {
                     "link": candidate.link,
@@ -96,9 +110,18 @@ def _numbers(values: Array | None) -> list[float] | None:
     return None if values is None else [float(x) for x in values]
 
 
-def _place(event: Event, answer: EventAnswer) -> None:
-    for name, value in vars(answer).items():
-        setattr(event, name, value)
+def _classify(event: Event, time: Array, classes: Classes, samples: Any, g: int) -> None:
+    """Brings the class of an event up to date with samples of its segment."""
+    kinds, rates = classes.kinds[samples, g], classes.rates[samples, g]
+    known = np.flatnonzero(kinds >= Kind.CONTACT)
+    blows = np.flatnonzero(kinds == Kind.COLLISION)
+    if len(known) and event.decided is None:
+        event.decided = float(time[samples][known[0]])
+    if len(blows) and event.level != "collision":
+        event.level, event.decided = "collision", float(time[samples][blows[0]])
+    event.clamped = event.clamped or bool(classes.clamped[samples, g].any())
+    if np.isfinite(rates).any():
+        event.rate = max(event.rate or 0.0, float(np.nanmax(rates)))
 
 
 class _Gathered:
@@ -154,6 +177,7 @@ class EventRecorder:
         self.events: list[Event] = []
         self._robot = detector.observer.robot
         self._rows = detector.thresholds.rows
+        self._zones = Zones(self._robot)
         self._open: dict[int, tuple[Event, _Gathered]] = {}
         self._announced: dict[tuple[int, int], Event] = {}  # by segment and sample of a part
 
@@ -167,6 +191,7 @@ class EventRecorder:
         q: Array,
         estimate: Estimate,
         detection: Detection,
+        classes: Classes,
         ended: Array | None = None,
     ) -> NDArray[np.int64]:
         """Takes N samples: `time` (N,) [s], `q` (N, n), and what was made of them.
@@ -176,6 +201,7 @@ class EventRecorder:
             q: (N, n) [rad or m].
             estimate: of these samples.
             detection: of these samples.
+            classes: of these samples.
             ended: the native events that ended, see `Localizer.follow`.
 
         Returns:
@@ -187,7 +213,7 @@ class EventRecorder:
             levels = detection.levels[:, g]
             if g in self._open or levels.any():
                 places = [row[2:] for row in ended if row[1] == g] if ended is not None else []
-                self._add_segment(g, levels, time, q, estimate, detection, ids, places)
+                self._add_segment(g, levels, time, q, estimate, detection, classes, ids, places)
         return ids
 
     def locate_open(self) -> None:
@@ -195,7 +221,12 @@ class EventRecorder:
         if self._localizer is None:
             return
         for g, (event, _) in self._open.items():
-            _place(event, self._localizer.event(g))
+            self._place(event, self._localizer.event(g))
+
+    def _place(self, event: Event, answer: EventAnswer) -> None:
+        for name, value in vars(answer).items():
+            setattr(event, name, value)
+        event.zone = self._zones.of(event.segment, event.link)
 
     def _announce(self, time: Array, levels: Array) -> None:
         """Numbers the events that begin in these samples in the order in which they do."""
@@ -207,6 +238,7 @@ class EventRecorder:
         for row, g in rises.tolist():
             name = self._robot.segment_names[g]
             event = Event(len(self.events), name, "contact", float(time[row]))
+            event.zone = self._zones.of(name)
             self.events.append(event)
             self._announced[g, row] = event
 
@@ -218,6 +250,7 @@ class EventRecorder:
         q: Array,
         estimate: Estimate,
         detection: Detection,
+        classes: Classes,
         ids: NDArray[np.int64],
         places: list[Array],
     ) -> None:
@@ -234,16 +267,17 @@ class EventRecorder:
                 gathered = _Gathered(len(self._rows) + 3, len(self._robot.joint_names))
                 self._open[g] = (event, gathered)
             ids[start:stop, g] = self._open[g][0].id
-            self._extend(g, slice(start, stop), levels, q, estimate, detection)
+            self._extend(g, slice(start, stop), q, estimate, detection)
+            _classify(self._open[g][0], time, classes, slice(start, stop), g)
 
     def _close(self, g: int, time: float, places: list[Array]) -> None:
         event, _ = self._open.pop(g)
         event.cleared = time
         if self._localizer is not None and places:
-            _place(event, self._localizer.event_answer(places.pop(0)))
+            self._place(event, self._localizer.event_answer(places.pop(0)))
 
     def _extend(
-        self, g: int, part: slice, levels: Array, q: Array, estimate: Estimate, detection: Detection
+        self, g: int, part: slice, q: Array, estimate: Estimate, detection: Detection
     ) -> None:
         event, gathered = self._open[g]
         own = np.array([row.segment == g for row in self._rows])
@@ -252,8 +286,6 @@ class EventRecorder:
         forces = np.nan_to_num(wrenches[:, :3])
         gathered.add_rows(np.abs(normalized[:, own]).max(axis=1), np.hstack([normalized, forces]))
         gathered.add_peaks(wrenches, q[part], estimate.tau_ext[part])
-        if levels[part].max() >= Level.COLLISION:
-            event.level = "collision"
         if event.segment != "root":
             event.force, event.force_peak = gathered.mean[-3:], gathered.force
         self._name_joint(event, g, gathered)

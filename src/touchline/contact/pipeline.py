@@ -6,12 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from touchline.contact.classification import Classes, Classifier, Kind
 from touchline.contact.contact import Contact
 from touchline.contact.detector import Detection, Detector
 from touchline.contact.event import Event, EventRecorder
 from touchline.contact.localizer import TORQUE_ERROR, Localizer
 from touchline.contact.skin import Skin
 from touchline.contact.table import ContactTable
+from touchline.contact.zones import Zones
 from touchline.estimation.observer import Estimate, Observer
 from touchline.model.robot import Robot
 
@@ -74,6 +76,8 @@ class Pipeline:
             torque_error=torque_error,
             skin=skin,
         )
+        self.zones = Zones(robot)
+        self.classifier = Classifier(self.observer, self.detector.thresholds, self.zones)
         self.recorder = EventRecorder(self.detector, self.localizer)
         self.contacts = ContactTable.empty(self.localizer)
         self._pending: list[tuple] = []
@@ -101,6 +105,8 @@ class Pipeline:
         touched = detection.levels.tobytes()
         if touched != self._idle or self._touched != self._idle:
             contacts = self._follow(time, q, qd, estimate, detection, touched)
+        else:
+            self.classifier.wait(time, estimate)
         self._touched = touched
         return Result(estimate, contacts, detection, estimate.health)
 
@@ -121,7 +127,8 @@ class Pipeline:
         estimate, detection = self.detector.run(time, q, qd, tau, wrench)
         stamps, q, qd = (np.asarray(signal, dtype=float) for signal in (time, q, qd))
         answers, ended = self.localizer.follow(stamps, q, qd, estimate, detection)
-        ids = self.recorder.add(stamps, q, estimate, detection, ended)
+        classes = self.classifier.follow(stamps, estimate, detection.levels)
+        ids = self.recorder.add(stamps, q, estimate, detection, classes, ended)
         sample, segment = answers[:, 0].astype(int), answers[:, 1].astype(int)
         self.contacts = ContactTable(
             sample, segment, ids[sample, segment], answers[:, 2:], self.localizer
@@ -134,16 +141,18 @@ class Pipeline:
         q, qd = np.asarray(q, float), np.asarray(qd, float)
         stamp = np.array([time], float)
         answers, ended = self.localizer.follow(stamp, q, qd, estimate, detection)
-        self._pending.append((time, q.copy(), estimate.rows, detection, ended))
+        batch = self.observer.estimate(estimate.rows[None])
+        classes = self.classifier.follow(stamp, batch, detection.levels[None])
+        self._pending.append((time, q.copy(), estimate.rows, detection, classes, ended))
         if touched != self._touched or len(self._pending) >= PENDING:
             self._record()
-        return [self._contact(row, estimate) for row in answers]
+        return [self._contact(row, estimate, classes) for row in answers]
 
     def _record(self) -> None:
         """Hands the samples of a live stream on to the events."""
         if not self._pending:
             return
-        times, qs, rows, detections, ended = zip(*self._pending, strict=True)
+        times, qs, rows, detections, classes, ended = zip(*self._pending, strict=True)
         self._pending = []
         levels = np.array([detection.levels for detection in detections])
         normalized = np.array([detection.normalized for detection in detections])
@@ -153,17 +162,19 @@ class Pipeline:
             np.array(qs),
             self.observer.estimate(np.array(rows)),
             Detection(levels, normalized, quiet),
+            Classes.joined(classes),
             np.concatenate(ended),
         )
 
-    def _contact(self, row: Array, estimate: Estimate) -> Contact:
+    def _contact(self, row: Array, estimate: Estimate, classes: Classes) -> Contact:
         g = int(row[1])
+        kind = int(classes.kinds[0, g])
         event = self.recorder.open_events()[g]
         answer = self.localizer.answer(row[2:])
         return Contact(
             event.segment,
             event.id,
-            event.level,
+            "collision" if kind == Kind.COLLISION else "contact",
             answer.status or "wrench_only",
             None if event.segment == "root" else estimate.segment_wrench[g],
             answer.link,
@@ -173,4 +184,8 @@ class Pipeline:
             answer.force,
             answer.covariance,
             answer.candidates,
+            kind >= Kind.CONTACT,
+            self.zones.of(event.segment, answer.link),
+            bool(classes.clamped[0, g]),
+            float(classes.rates[0, g]),
         )

@@ -166,6 +166,67 @@ class DetectionDescription:
     baseline: BaselineDescription = field(default_factory=BaselineDescription)
 
 
+ZONES = ("structure", "end_effector", "handle")
+
+
+@dataclass(frozen=True)
+class PolicyRule:
+    """A reaction and when it is due: all that is given must hold; None holds always.
+
+    `level` is "contact" or "collision", `zone` one of ZONES, `force` the least force [N].
+    """
+
+    reaction: str
+    level: str | None = None
+    clamped: bool | None = None
+    zone: str | None = None
+    segment: str | None = None
+    link: str | None = None
+    force: float | None = None
+
+
+@dataclass(frozen=True)
+class ForceLimit:
+    """The largest forces [N] somewhere, for a short while and for longer, and what then is due."""
+
+    transient: float | None = None
+    quasi_static: float | None = None
+    reaction: str = "retract"
+
+
+@dataclass(frozen=True)
+class Onset:
+    """Rates of force [N/s] above which a touch begins like a collision, by zone."""
+
+    structure: float = 400.0
+    end_effector: float = 600.0
+    handle: float = 1500.0
+
+
+@dataclass(frozen=True)
+class RetractDescription:
+    """How far [m] and how fast [m/s] the touched point moves away."""
+
+    way: float = 0.05
+    speed: float = 0.25
+
+
+@dataclass(frozen=True)
+class PolicyDescription:
+    """What to do about which touch.
+
+    `zones` gives links or segments a zone; of `rules` the first that holds decides; `limits`, by
+    link or segment, come before all rules. A force counts as transient for `transient_time` [s].
+    """
+
+    zones: dict[str, str] = field(default_factory=dict)
+    onset: Onset = Onset()
+    rules: list[PolicyRule] = field(default_factory=lambda: [PolicyRule("stop", level="collision")])
+    limits: dict[str, ForceLimit] = field(default_factory=dict)
+    transient_time: float = 0.5
+    retract: RetractDescription = RetractDescription()
+
+
 @dataclass(frozen=True)
 class RobotDescription:
     """A whole `robot.yaml`, checked; per-joint values are expanded to the order of `joints`."""
@@ -183,5 +244,6 @@ class RobotDescription:
     loads: tuple[Load, ...] = ()
     links: dict[str, LinkCorrection] = field(default_factory=dict)
     detection: DetectionDescription = field(default_factory=DetectionDescription)
+    policy: PolicyDescription = field(default_factory=PolicyDescription)
     log: dict[str, Any] = field(default_factory=dict)
     path: Path | None = None

@@ -11,6 +11,7 @@ from touchline.model.expand import Expander
 from touchline.model.mechanism import Mechanism
 from touchline.model.names import Names, check_names, joint_entries, names_in, sensor_entries
 from touchline.model.packages import resolve, resolve_robot
+from touchline.model.policy_names import check_policy
 from touchline.model.schema import JointEntry, RobotFile, SensorEntry, structure
 from touchline.model.topology import independent_joints
 from touchline.model.urdf import load_urdf, parse_xml
@@ -123,7 +124,11 @@ class _Draft:
         self.bandwidth = self.expander.bandwidth(file.observer.bandwidth)
         self.detection = self.expander.detection(file.detection)
         self.sensors = [self._sensor(place, sensor) for place, sensor in sensor_entries(file)]
-        self.problems = [*check_names(file, names, mechanism), *self.expander.problems]
+        self.problems = [
+            *check_names(file, names, mechanism),
+            *check_policy(file, names, mechanism),
+            *self.expander.problems,
+        ]
 
     def _joint_entries(self, names: Names, mechanism: Mechanism | None) -> list[JointEntry]:
         if names.joints is not None or mechanism is None:
@@ -166,6 +171,7 @@ class _Draft:
             loads=tuple(file.loads),
             links=file.links,
             detection=self.detection,
+            policy=file.policy,
             log=file.log,
             path=self.path,
         )

@@ -22,13 +22,19 @@ from cattrs.gen import make_dict_structure_fn, override
 
 from touchline.model import values
 from touchline.model.description import (
+    ZONES,
     BaselineDescription,
     CalibrationDescription,
     DetectionDescription,
+    ForceLimit,
     Friction,
     LevelDescription,
     LinkCorrection,
     Load,
+    Onset,
+    PolicyDescription,
+    PolicyRule,
+    RetractDescription,
     RowCalibration,
     TailDescription,
     Vector,
@@ -107,6 +113,7 @@ class RobotFile:
     noise: dict[str, Any] = field(default_factory=dict)
     observer: ObserverEntry = ObserverEntry()
     detection: DetectionDescription = field(default_factory=DetectionDescription)
+    policy: PolicyDescription = field(default_factory=PolicyDescription)
     log: dict[str, Any] = field(default_factory=dict)
 
 
@@ -120,6 +127,11 @@ def _by_sensor(value: Any, _: Any = None) -> Any:
     if not isinstance(value, dict):
         return values.positive(value)
     return {values.text(key): values.positive(item) for key, item in value.items()}
+
+
+def _zones(value: Any, _: Any = None) -> Any:
+    _require_mapping(value, f"; it gives links or segments a zone: {', '.join(ZONES)}")
+    return {values.text(key): values.one_of(*ZONES)(item) for key, item in value.items()}
 
 
 _VECTOR3 = values.list_of(values.number, 3)
@@ -183,6 +195,23 @@ HOOKS: dict[type, dict[str, Hook]] = {
         "hold": values.non_negative,
         "release": values.fraction,
     },
+    Onset: dict.fromkeys(ZONES, values.positive),
+    PolicyRule: {
+        "reaction": values.reaction,
+        "level": values.one_of("contact", "collision"),
+        "clamped": values.truth,
+        "zone": values.one_of(*ZONES),
+        "segment": values.text,
+        "link": values.text,
+        "force": values.positive,
+    },
+    ForceLimit: {
+        "transient": values.positive,
+        "quasi_static": values.positive,
+        "reaction": values.reaction,
+    },
+    RetractDescription: {"way": values.positive, "speed": values.positive},
+    PolicyDescription: {"zones": _zones, "transient_time": values.positive},
     RobotFile: {"name": values.text, "model": values.text, "gravity": _VECTOR3},
 }
 

@@ -23,6 +23,8 @@ from touchline.suggest import not_allowed
 TORQUES = ("sensor", "motor", "none")
 METHODS = ("rows", "scaled", "chi2", "glrt", "cusum")  # of detection
 MOST_WINDOW = 0.5  # s; longer ones are no detection any more
+REACTIONS = ("ignore", "stop", "float", "retract")
+OWN = "own:"  # begins the name of a reaction that the user's program brings
 
 Hook = Callable[..., Any]
 
@@ -104,6 +106,20 @@ def text(value: Any, _: Any = None) -> str:
     if not value.strip():
         raise ValueError("the text is empty")
     return value
+
+
+def truth(value: Any, _: Any = None) -> bool:
+    """Return true or false."""
+    if not isinstance(value, bool):
+        raise ValueError(f"{show(value)} is {kind_of(value)}; allowed: true, false")
+    return value
+
+
+def reaction(value: Any, _: Any = None) -> str:
+    """Return the name of a reaction, or `own:NAME`."""
+    if isinstance(value, str) and value.startswith(OWN) and len(value) > len(OWN):
+        return value
+    return one_of(*REACTIONS, f"{OWN}NAME")(value) if value != f"{OWN}NAME" else value
 
 
 def one_of(*allowed: str) -> Hook:

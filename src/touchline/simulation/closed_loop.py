@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.contact.pipeline import Pipeline, Result
-from touchline.contact.reaction import Command, Reactor
+from touchline.contact.reactor import Command, Reactor
 from touchline.contact.state import State
 from touchline.model.robot import Robot
 from touchline.simulation.control import Controller

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.contact.pipeline import Pipeline
-from touchline.contact.reaction import Reactor
+from touchline.contact.reactor import Reactor
 from touchline.contact.skin import Skin
 from touchline.contact.state import State
 from touchline.errors import InputError
