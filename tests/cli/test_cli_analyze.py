@@ -49,9 +49,25 @@ def strict_json(path):
     return json.loads(path.read_text(), parse_constant=refuse)
 
 
-def test_the_four_files_and_nothing_else(results):
-    names = sorted(path.name for path in results.iterdir())
-    assert names == ["contacts.parquet", "estimates.parquet", "events.json", "report.html"]
+def test_the_files_and_nothing_else(results):
+    names = {path.name for path in results.iterdir()}
+    tables = {"contacts.parquet", "estimates.parquet", "postures.parquet"}
+    assert names == tables | {"analysis.json", "events.json", "report.html"}
+
+
+def test_results_know_what_they_were_made_from(results, recording):
+    origin = strict_json(results / "analysis.json")
+    assert origin["log"] == str(results.parent / "log.parquet") and origin["robot"] == "sara-full"
+    assert origin["samples"] == len(recording.time) and origin["method"] == "segment"
+
+
+def test_postures_are_those_of_the_recording(results, recording):
+    table = pq.read_table(results / "postures.parquet")
+    time = table["time"].to_numpy()
+    assert len(time) == 600 and np.diff(time).max() < 0.0126  # 400 Hz thinned to 100 Hz
+    row = np.searchsorted(recording.time, time)
+    np.testing.assert_array_equal(time, recording.time[row])
+    np.testing.assert_array_equal(table["q.joint3"], recording.q[row, 2])
 
 
 def test_estimates_are_those_of_the_observer(results, robot, recording):

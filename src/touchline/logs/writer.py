@@ -23,8 +23,8 @@ from touchline.model.description import AXES
 PART_ROWS = 1 << 18
 PART_SECONDS = 5.0
 _GROUP_ROWS = 1 << 17
-_RESULTS = ("estimates", "contacts")
-_DOCUMENTS = ("events.json", "report.html")
+_RESULTS = ("estimates", "contacts", "postures")
+_DOCUMENTS = ("events.json", "analysis.json", "report.html")
 
 
 def remove_results(directory: Path | str) -> None:

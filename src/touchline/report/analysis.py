@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,14 @@ from touchline.report.curves import Curves
 from touchline.report.event_pictures import EventPoses
 from touchline.report.event_windows import EventWindows
 from touchline.report.facts import bandwidth_warnings, bandwidths
-from touchline.report.outputs import REPORT, Outputs, prepare_directory, write_text
+from touchline.report.outputs import (
+    ANALYSIS,
+    REPORT,
+    Outputs,
+    prepare_directory,
+    write_origin,
+    write_text,
+)
 from touchline.report.statistics import Statistics
 
 CHUNK = 1 << 15  # samples; bounds the memory
@@ -77,6 +85,7 @@ def analyze(
     out: Path | str,
     bandwidth: float | None = None,
     method: str = "segment",
+    report: bool = True,
 ) -> Analysis:
     """Analyze a recording; writes estimates, contacts, events and the report into a directory.
 
@@ -86,6 +95,7 @@ def analyze(
         out: directory for the results.
         bandwidth: K [rad/s] of all rows; default: the description's.
         method: of the observer, "segment" or "paper".
+        report: whether the report is made; its pictures take a while.
 
     Raises:
         InputError: an input cannot be used; what had been written before stays readable.
@@ -106,8 +116,16 @@ def analyze(
         warnings = bandwidth_warnings(bandwidths(model, bandwidth), run.period)
         warnings += [*recording.warnings, *model.warnings]
     analysis = run.finish(log, method, bandwidth, warnings)
-    write_text(out / REPORT, page_text(analysis))
+    write_origin(out / ANALYSIS, log, robot, _origin(analysis))
+    if report:
+        write_text(out / REPORT, page_text(analysis))
     return analysis
+
+
+def _origin(analysis: Analysis) -> dict[str, Any]:
+    clock = analysis.statistics.clock
+    facts = {"method": analysis.method, "bandwidth": analysis.bandwidth, "period": analysis.period}
+    return facts | {"start": clock.first, "end": clock.last, "samples": clock.rows}
 
 
 def typical_period(time: np.ndarray) -> float:
@@ -154,6 +172,7 @@ class _Run:
         if self.pipeline.contacts is not None:
             self._outputs.contacts(time, estimate, self.pipeline.contacts)
         self._outputs.events(self.pipeline.events)
+        self._outputs.postures(time, part.q)
         self._poses.add(time, part.q, self.pipeline.events)
 
     def finish(

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from touchline import __version__
 from touchline.contact.event import Event
 from touchline.contact.table import ContactTable
 from touchline.errors import InputError
@@ -17,15 +18,12 @@ from touchline.estimation.observer import Estimate
 from touchline.logs import EstimateWriter, TableWriter
 from touchline.model.description import AXES
 from touchline.model.robot import Robot
+from touchline.report.postures import PostureWriter
 
-ESTIMATES, CONTACTS, EVENTS, REPORT = (
-    "estimates.parquet",
-    "contacts.parquet",
-    "events.json",
-    "report.html",
-)
-NAMES = (ESTIMATES, CONTACTS, EVENTS, REPORT)
-PARTS = ("estimates.parts", "contacts.parts")
+ESTIMATES, CONTACTS, POSTURES = "estimates.parquet", "contacts.parquet", "postures.parquet"
+EVENTS, ANALYSIS, REPORT = "events.json", "analysis.json", "report.html"
+NAMES = (ESTIMATES, CONTACTS, POSTURES, EVENTS, ANALYSIS, REPORT)
+PARTS = tuple(f"{name.removesuffix('.parquet')}.parts" for name in NAMES[:3])
 CONTACT_SCHEMA: dict[str, Any] = (
     {"time": "f8", "health": "u4", "event": "i8", "segment": "str", "link": "str", "body": "str"}
     | {"body_probability": "f8", "status": "str"}
@@ -90,6 +88,20 @@ def write_events(path: Path, events: Sequence[Event]) -> None:
     write_text(path, f"[\n{body}\n]\n" if lines else "[]\n")
 
 
+def write_origin(path: Path, log: Path, robot: Path | str, facts: dict[str, Any]) -> None:
+    """Write `analysis.json`: what the results were made from, for whoever finds them later.
+
+    Args:
+        path: of the file.
+        log: the recording.
+        robot: as it was given, a file or the name of a robot that ships with Touchline.
+        facts: what else there is to keep.
+    """
+    where = str(Path(robot).resolve()) if Path(robot).is_file() else str(robot)
+    content = {"touchline": __version__, "log": str(log.resolve()), "robot": where, **facts}
+    write_text(path, json.dumps(strict(content), indent=1, allow_nan=False) + "\n")
+
+
 class Outputs:
     """The tables of a running analysis and its list of events."""
 
@@ -98,6 +110,7 @@ class Outputs:
         names = (robot.joint_names, robot.sensor_names, robot.segment_names)
         self._estimates = EstimateWriter(directory, *names)
         self._contacts = TableWriter(directory / CONTACTS, CONTACT_SCHEMA)
+        self._postures = PostureWriter(directory / POSTURES, robot)
         self._written: list[Any] | None = None
         self.events([])
 
@@ -106,6 +119,10 @@ class Outputs:
         self._estimates.write(
             time, estimate.health, estimate.tau_ext, estimate.sensor_wrench, estimate.segment_wrench
         )
+
+    def postures(self, time: np.ndarray, q: np.ndarray) -> None:
+        """Append how the arm stood in N samples, thinned."""
+        self._postures.add(time, q)
 
     def contacts(self, time: np.ndarray, estimate: Estimate, table: ContactTable) -> None:
         """Append the contacts of N samples.
@@ -128,4 +145,5 @@ class Outputs:
         """Turn the parts into the tables, and write the events for good."""
         self._estimates.close()
         self._contacts.close()
+        self._postures.close()
         write_events(self.directory / EVENTS, events)

@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page of a replay: the arm as it stood, what was felt, and a time line with the events."""
+
+import time as clock
+from threading import RLock
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from touchline.contact.contact import Contact
+from touchline.contact.event import Event
+from touchline.view.markers import ContactMarker
+from touchline.view.player import Player
+from touchline.view.replay import Replay
+from touchline.view.scene import RobotScene, dress
+from touchline.view.server import PageServer
+from touchline.view.signals import SignalPlot, signal_groups
+from touchline.view.timeline import Timeline
+
+Array = NDArray[np.float64]
+
+EPOCH = 1e6  # s; stamps beyond it are dates, and the page counts from the first
+FRAME = 1 / 30  # s; between pictures
+PLOTTED = 0.1  # s; between plots while it plays
+IDLE = 0.2  # s; between looks for visitors while there are none
+SPEEDS = {"1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "1": 1.0, "2": 2.0, "5": 5.0, "20": 20.0}
+WINDOWS = {"1 s": 1.0, "5 s": 5.0, "20 s": 20.0, "60 s": 60.0, "whole recording": None}
+WORTH_DRAWING, MOST_CANDIDATES = 0.03, 3
+HELP = (
+    "Move **time**, press **Play**, or choose an event. Drag over the arm to look around it. "
+    "Orange: what was felt; pale orange: places that cannot be told apart."
+)
+
+
+class ReplayPage:
+    """A replay in the browser; `run` keeps it going.
+
+    Args:
+        replay: what is shown.
+        server: that shows it.
+
+    Attributes:
+        player: the time shown; `lock` is held while it changes.
+    """
+
+    def __init__(self, replay: Replay, server: PageServer) -> None:
+        self.replay, self.lock = replay, RLock()
+        self.player = Player(replay.start, replay.end, replay.events)
+        self._origin = replay.start if abs(replay.start) > EPOCH else 0.0
+        self._page = server.page
+        dress(self._page)
+        self._arm = RobotScene(self._page.scene, replay.robot)
+        self._marks: dict[tuple[str, int], ContactMarker] = {}
+        self._groups = signal_groups(replay.robot, replay.signals)
+        self._build(self._page.gui)
+        self._drawn: tuple = ()
+        self._plotted = -np.inf
+        self.draw()
+
+    def _build(self, gui: viser.GuiApi) -> None:
+        gui.add_markdown(HELP)
+        self._timeline = Timeline(gui, self.replay, self._origin)
+        first, last = self.player.start - self._origin, self.player.end - self._origin
+        self._slider = gui.add_slider("time [s]", first, max(last, first + 1e-3), 1e-3, first)
+        self._play = gui.add_button("Play", icon=viser.Icon.PLAYER_PLAY)
+        self._step = gui.add_button_group("event", ("previous", "next"))
+        self._titles = {self._title(event): event for event in self.replay.events}
+        names = tuple(self._titles) or ("none",)
+        self._choice = gui.add_dropdown("jump to", ("-", *names), "-")
+        self._speed = gui.add_dropdown("speed", tuple(SPEEDS), "1")
+        self._felt = gui.add_markdown("")
+        self._window = gui.add_dropdown("curves of", tuple(WINDOWS), "5 s")
+        names = tuple(self._groups)
+        joints = names.index("external joint torques")
+        self._choices = [gui.add_dropdown("curves", names, names[i]) for i in (0, joints)]
+        self._plots = [SignalPlot(gui, self.replay, self._origin) for _ in self._choices]
+        self._orders = [choice.order + 0.5 for choice in self._choices]
+        self._choices[1].order = self._orders[0] + 0.2
+        self._orders[1] = self._orders[0] + 0.4
+        self._slider.on_update(self._on_slider)
+        self._play.on_click(lambda _: self._toggle())
+        self._step.on_click(lambda e: self._jump(-1 if e.target.value == "previous" else 1))
+        self._choice.on_update(self._on_choice)
+        self._speed.on_update(self._on_speed)
+
+    def _title(self, event: Event) -> str:
+        where = event.link or event.segment
+        return f"{event.id}: {event.detected - self._origin:.2f} s, {event.level} on {where}"
+
+    def _on_slider(self, event: viser.GuiEvent) -> None:
+        if event.client_id is None:  # it was set by the page itself
+            return
+        with self.lock:
+            self.player.playing = False
+            self.player.seek(float(self._slider.value) + self._origin)
+
+    def _on_choice(self, event: viser.GuiEvent) -> None:
+        found = self._titles.get(str(self._choice.value))
+        if event.client_id is not None and found is not None:
+            self.show(found)
+
+    def _on_speed(self, _: viser.GuiEvent) -> None:
+        with self.lock:
+            self.player.speed = SPEEDS[str(self._speed.value)]
+
+    def _toggle(self) -> None:
+        with self.lock:
+            if self.player.playing:
+                self.player.playing = False
+            else:
+                self.player.play()
+
+    def _jump(self, step: int) -> None:
+        with self.lock:
+            event = self.player.neighbour(step)
+            if event is not None:
+                self.show(event)
+
+    def show(self, event: Event) -> None:
+        """Stops at an event, and shows the wrench on its segment."""
+        with self.lock:
+            self.player.show(event)
+            force = f"{event.segment}: wrench on the segment, force"
+            if force in self._groups:
+                self._choices[0].value = force
+
+    def run(self) -> None:
+        """Draws for as long as the program lasts; costs little while nobody looks."""
+        before = clock.monotonic()
+        while True:
+            now = clock.monotonic()
+            passed, before = now - before, now
+            if not self._page.get_clients():
+                clock.sleep(IDLE)
+                continue
+            self.step(min(passed, 0.5))
+            clock.sleep(max(FRAME - (clock.monotonic() - now), 0.002))
+
+    def step(self, seconds: float) -> None:
+        """So many seconds have passed: goes on and draws what has changed."""
+        with self.lock:
+            self.player.advance(seconds)
+        self.draw()
+
+    def draw(self) -> None:
+        """Brings the page up to date with the player and the choices."""
+        with self.lock:
+            time, playing = self.player.time, self.player.playing
+        state = (time, playing, self._window.value, *(c.value for c in self._choices))
+        if state == self._drawn:
+            return
+        self._drawn = state
+        with self._page.atomic():
+            contacts = self.replay.contacts(time)
+            self._arm.place(self.replay.posture(time))
+            self._draw_contacts(contacts)
+            self._slider.value = round(time - self._origin, 3)
+            label = "Pause" if playing else "Play"
+            if self._play.label != label:
+                self._play.label = label
+                self._play.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
+            words = self._words(contacts, time)
+            if self._felt.content != words:
+                self._felt.content = words
+        if not playing or clock.monotonic() - self._plotted > PLOTTED:
+            self._plotted = clock.monotonic()
+            self._timeline.update(time)
+            length = WINDOWS[str(self._window.value)]
+            for plot, choice, order in zip(self._plots, self._choices, self._orders, strict=True):
+                plot.update(self._groups[str(choice.value)], time, length, order)
+
+    def _draw_contacts(self, contacts: list[Contact]) -> None:
+        used, tinted = set(), set()
+        for contact in contacts:
+            if contact.position is not None and contact.link is not None:
+                tinted.add(contact.link)
+                self._mark(used, contact.segment, 0, "estimate").show(
+                    contact.position, contact.force, contact.covariance, line=True
+                )
+            else:
+                tinted |= self._show_doubt(contact, used)
+        for key, mark in self._marks.items():
+            if key not in used:
+                mark.hide()
+        self._arm.tint(frozenset(tinted))
+
+    def _show_doubt(self, contact: Contact, used: set[tuple[str, int]]) -> set[str]:
+        """Candidates where there are some, else all that could have been touched; its links."""
+        likely = [c for c in contact.candidates if c.probability >= WORTH_DRAWING]
+        likely = likely[:MOST_CANDIDATES]
+        for i, candidate in enumerate(likely, start=1):
+            force = contact.force if i == 1 else None
+            self._mark(used, contact.segment, i, "candidate").show(candidate.position, force)
+        if likely:
+            return {candidate.link for candidate in likely}
+        bodies = [b for b in self.replay.robot.bodies if b.segment == contact.segment]
+        return {link for body in bodies for link in body.links}
+
+    def _mark(self, used: set, segment: str, number: int, kind: str) -> ContactMarker:
+        key = (segment, number)
+        used.add(key)
+        if key not in self._marks:
+            name = f"/contacts/{segment}/{number}"
+            self._marks[key] = ContactMarker(self._page.scene, name, kind)
+        return self._marks[key]
+
+    def _words(self, contacts: list[Contact], time: float) -> str:
+        lines = [f"**{time - self._origin:.3f} s**"]
+        for contact in contacts:
+            lines.append(f"* event {contact.event}: {_sentence(contact)}")
+        if not contacts:
+            lines.append("* nothing touches")
+        return "\n".join(lines)
+
+
+def _sentence(contact: Contact) -> str:
+    parts = [f"**{contact.link or contact.segment}**, {contact.level}"]
+    if contact.force is not None:
+        parts.append(f"{float(np.linalg.norm(contact.force)):.1f} N")
+    if contact.position_std is not None:
+        parts.append(f"+- {1e3 * contact.position_std:.1f} mm")
+    if contact.status != "located":
+        parts.append(contact.status.replace("_", " "))
+    for candidate in contact.candidates[:MOST_CANDIDATES]:
+        parts.append(f"{100 * candidate.probability:.0f} % {candidate.link}")
+    return ", ".join(parts)
