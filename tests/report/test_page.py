@@ -125,7 +125,7 @@ def test_a_browser_draws_every_plot_without_an_error(analysis, page):
 
 def test_a_page_without_room_says_what_was_left_out(analysis, monkeypatch):
     assert page_text(analysis).count('class="event-figure"') == len(analysis.events)
-    monkeypatch.setattr("touchline.report.event_figures.BUDGET", 1000)
+    monkeypatch.setattr("touchline.report.page.MOST_BYTES", 1000)
     small = page_text(analysis)
     assert "1 of 1 events have a figure" in small and "0 of them have plots" in small
     assert 'data-window="' not in small

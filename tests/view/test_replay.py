@@ -99,8 +99,10 @@ def test_what_is_no_result_is_refused(touched, tmp_path):
         read_origin(tmp_path)
     for path in touched.out.iterdir():
         (tmp_path / path.name).write_bytes(path.read_bytes())
+    table = pq.read_table(tmp_path / "postures.parquet")
+    pq.write_table(table.drop_columns(["q.joint4"]), tmp_path / "postures.parquet")
     with pytest.raises(InputError, match="give the robot of the recording"):
-        Replay(tmp_path, "examples/robots/ur10.yaml")
+        Replay(tmp_path)
     for broken in ("{}", "no", json.dumps({"log": 1})):
         (tmp_path / "analysis.json").write_text(broken)
         with pytest.raises(InputError, match=r"analysis.json: cannot be understood"):

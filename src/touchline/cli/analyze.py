@@ -21,8 +21,10 @@ def analyze(
 
     Writes into DIR estimates.parquet (a row per sample), contacts.parquet (a row per contact and
     sample), events.json (a list of contacts from beginning to end) and report.html (open it in a
-    browser; it needs no network). Prints a summary. Older results in DIR are replaced, other files
-    in it are left alone. If it is stopped, what was finished stays: events.json, and the folders
+    browser; it needs no network); and for `touchline view DIR` analysis.json (what the results were
+    made from) and postures.parquet (joint positions, at most 100 a second). Prints a summary.
+    Older results in DIR are replaced, other files in it are left alone. If it is stopped, what was
+    finished stays: events.json, and the folders
     estimates.parts and contacts.parts with Parquet files.
 
     Args:

@@ -11,6 +11,7 @@ from touchline.cli.check import check
 from touchline.cli.demo import demo
 from touchline.cli.reproduce import reproduce
 from touchline.cli.simulate import simulate
+from touchline.cli.view import view
 from touchline.errors import InputError
 from touchline.suggest import did_you_mean
 
@@ -29,6 +30,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "demo": demo,
     "simulate": simulate,
     "analyze": analyze,
+    "view": view,
     "check": check,
     "reproduce": reproduce,
     "bench": bench,

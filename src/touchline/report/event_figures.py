@@ -16,26 +16,31 @@ from touchline.report.picture import SIGMAS
 from touchline.report.plots import plot
 from touchline.report.render.skin import robot_skin
 
-BUDGET = 2_900_000  # bytes of the page for all figures
 MOST_PICTURED = 400  # events; two pictures take a quarter of a second
 # Up to so many events, the pictures are so wide [pixels].
+FRAME = 400  # bytes around the pictures and plots of an event
 PICTURES = ((16, 520), (80, 400), (MOST_PICTURED, 300))
 PIECES = (512, 256, 128, 64, 32)  # of time in a plot, at most
 PLOT = (500, 130)  # pixels
 
 
-def figures(analysis: Analysis) -> tuple[str, set[int]]:
+def figures(analysis: Analysis, room: int) -> tuple[str, set[int]]:
     """The section with a figure per event, and the events that have one.
 
     Where there is no room for all, those that stood out least go without plots, then without
     pictures, and the section says so.
+
+    Args:
+        analysis: what the page is about.
+        room: bytes that the section may take.
     """
     events = _ranked(analysis)
     if not events:
         return "", set()
     shown = events[:MOST_PICTURED]
     pictures = _pictures(analysis, shown)
-    plots, most = _plots(analysis, shown, BUDGET - sum(map(len, pictures.values())))
+    used = sum(map(len, pictures.values())) + FRAME * len(shown)
+    plots, most = _plots(analysis, shown, room - used)
     drawn = [event for event in shown if event.id in pictures or event.id in plots]
     drawn.sort(key=lambda event: event.id)
     parts = [_figure(analysis, event, pictures, plots) for event in drawn]
@@ -70,7 +75,8 @@ def _pictures(analysis: Analysis, events: Sequence[Event]) -> dict[int, str]:
     made = {}
     for event, q in tqdm(posed, desc="pictures", unit="event", disable=None, leave=False):
         scene = event_scene(robot, event, q, truth_of(event, analysis.comparisons))
-        made[event.id] = event_pictures(scene, event, (width, 3 * width // 4))
+        drawn = event_pictures(scene, event, (width, 3 * width // 4))
+        made[event.id] = f'<div class="views" style="--picture:{width}px">{drawn}</div>'
     return made
 
 
@@ -107,19 +113,17 @@ def _event_plots(analysis: Analysis, event: Event, window: Window) -> str:
         curves = [window.of(curve.column) for curve in panel.curves]
         data = {"segment": panel.segment or event.segment}
         parts.append(plot(panel, curves, span, shaded, PLOT, data))
-    where = json.dumps([window.start - first, window.width, len(window.low)])
+    where = json.dumps([round(window.start - first, 6), round(window.width, 9), len(window.low)])
     return f'<div class="around" data-window="{where}">{"".join(parts)}</div>'
 
 
 def _figure(
     analysis: Analysis, event: Event, pictures: dict[int, str], plots: dict[int, str]
 ) -> str:
-    picture = pictures.get(event.id, "")
-    views = f'<div class="views">{picture}</div>' if picture else ""
     return (
         f'<figure class="event-figure" id="event-{event.id}"><figcaption><b>{event.id}</b> '
-        f"{escape(caption(event, analysis.origin))}</figcaption>{views}"
-        f"{plots.get(event.id, '')}</figure>"
+        f"{escape(caption(event, analysis.origin))}</figcaption>"
+        f"{pictures.get(event.id, '')}{plots.get(event.id, '')}</figure>"
     )
 
 

@@ -22,6 +22,7 @@ from touchline.report.plots import plot
 from touchline.report.robot_section import robot_section
 
 MOST_EVENTS, MOST_SHADED = 1000, 5000
+MOST_BYTES = 4_850_000  # of the page
 STEPS = 32767
 DRAWN = 400  # pieces of time of a plot without the script
 PLOT = (1030, 120)  # pixels
@@ -60,26 +61,25 @@ segments in world axes about the world origin. Not a certified safety function.<
 def page_text(analysis: Analysis) -> str:
     """The whole page."""
     assets = Path(__file__).parent / "assets"
-    shown, pictured = figures(analysis)
-    body = [
-        _header(analysis),
-        _warnings(analysis),
-        _events(analysis, pictured),
-        _comparisons(analysis),
-        shown,
-        _plots(analysis),
-        _residuals(analysis),
-        _health(analysis),
-        robot_section(analysis),
-    ]
+    data = json.dumps(strict(_data(analysis)), allow_nan=False).replace("<", "\\u003c")
+    style, script = ((assets / f"report.{kind}").read_text("utf-8") for kind in ("css", "js"))
+    before = [_header(analysis), _warnings(analysis)]
+    after = [_plots(analysis), _residuals(analysis), _health(analysis), robot_section(analysis)]
+    fixed = [data, style, script, *before, *after, *_tables(analysis, set())]
+    shown, pictured = figures(analysis, MOST_BYTES - sum(len(p.encode()) for p in fixed))
+    body = [*before, *_tables(analysis, pictured), shown, *after]
     return PAGE.format(
         title=escape(f"{analysis.log.name} - Touchline"),
-        style=(assets / "report.css").read_text(encoding="utf-8"),
+        style=style,
         body="\n".join(body),
         version=__version__,
-        data=json.dumps(strict(_data(analysis)), allow_nan=False).replace("<", "\\u003c"),
-        script=(assets / "report.js").read_text(encoding="utf-8"),
+        data=data,
+        script=script,
     )
+
+
+def _tables(analysis: Analysis, pictured: set[int]) -> list[str]:
+    return [_events(analysis, pictured), _comparisons(analysis)]
 
 
 def _header(analysis: Analysis) -> str:

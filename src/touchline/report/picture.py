@@ -12,7 +12,15 @@ from touchline.model.robot import Robot
 from touchline.report.render import solids
 from touchline.report.render.camera import Camera, Size
 from touchline.report.render.canvas import Canvas
-from touchline.report.render.light import FloorContact, Lights, ShadowMap, doubled, shaded
+from touchline.report.render.light import (
+    MAP,
+    SMALL_MAP,
+    FloorContact,
+    Lights,
+    ShadowMap,
+    doubled,
+    shaded,
+)
 from touchline.report.render.png import png_bytes
 from touchline.report.render.raster import box
 from touchline.report.render.skin import Piece, Triangles, posed_skin
@@ -27,6 +35,7 @@ FORCE_SCALE, SHORTEST, LONGEST = 0.010, 0.09, 0.42  # m/N, m, m, for an arm of 1
 # Okabe and Ito's vermilion and blue: told apart with any colour vision.
 COLOURS = {"truth": "#0072b2", "estimate": "#d55e00", "candidate": "#e69f00"}
 SHELL, TRIM, TINT = "#f1f2f4", "#5d646d", "#ffd39e"
+SMALL = 420  # pixels; a picture up to this wide is small
 SKY, FLOOR = "#f8f9fb", "#e4e8ed"
 
 
@@ -161,7 +170,8 @@ class Scene:
         lights = Lights.of(camera)
         floor = float(self._box[0][2])
         canvas = Canvas(camera, size)
-        shadow = ShadowMap(self._surface.corners, lights.key)
+        fine = MAP if max(size) > SMALL else SMALL_MAP
+        shadow = ShadowMap(self._surface.corners, lights.key, fine)
         ground = self._ground(camera, size, shadow, lights.key, floor)
         body = canvas.see(self._surface, self._closed())
         albedo = self._albedo()[body.part]

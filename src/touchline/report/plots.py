@@ -47,14 +47,17 @@ def curve_path(low: Array, high: Array, least: float, largest: float) -> str:
     return "".join(parts)
 
 
-def value_range(lows: Sequence[Array], highs: Sequence[Array], limit: float | None) -> tuple:
+def value_range(
+    lows: Sequence[Array], highs: Sequence[Array], limit: float | None
+) -> tuple[float, ...]:
     """Least and largest value that a plot shows: all of its curves, zero, and its limit."""
     least = min([0.0, *(float(np.fmin.reduce(v, initial=np.inf)) for v in lows)])
     largest = max([0.0, *(float(np.fmax.reduce(v, initial=-np.inf)) for v in highs)])
     if limit is not None:
         largest = max(largest, 1.2 * limit)
     room = 0.06 * ((largest - least) or 1.0)
-    return (0.0 if limit is not None else least - room), largest + room
+    low = 0.0 if limit is not None else least - room
+    return float(f"{low:.6g}"), float(f"{largest + room:.6g}")
 
 
 def plot(
@@ -88,17 +91,18 @@ def plot(
     )
     if data is not None:
         data = {**data, "low": least, "high": largest, "steps": STEPS, "limit": limit}
-        attributes += f" data-plot='{escape(json.dumps(data), quote=True)}'"
+        packed = escape(json.dumps(data, separators=(",", ":")), quote=False)
+        attributes += " data-plot='{}'".format(packed.replace("'", "&#39;"))
     keys = "".join(
-        f'<span class="key s{i}">{escape(curve.name)} <span class="value"></span></span>'
+        f'<span class="key s{i}">{escape(curve.name)}</span>'
         for i, curve in enumerate(panel.curves)
     )
-    # Half a piece to the right: a path stands at the middle of its pieces.
+    # From half a piece before zero: a path stands at the middle of its pieces.
     return (
         f'<div class="plot"{attributes}><header><b>{escape(panel.title)}</b>'
         f'<span class="soft">{escape(panel.unit)}</span>{keys}</header>'
         f'<svg role="img" viewBox="0 0 {width} {height}" aria-label="{escape(panel.title)} over '
-        f'time; arrow keys move, plus and minus zoom, 0 shows all">'
+        f'time">'
         f"{_axes(least, largest, limit, span, size)}{_shades(shaded, span, inner)}"
         f'<svg x="{LEFT}" y="{TOP}" width="{inner[0]}" height="{inner[1]}" '
         f'viewBox="-0.5 0 {pieces} {STEPS}" preserveAspectRatio="none">{paths}</svg></svg></div>'

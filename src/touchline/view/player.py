@@ -5,8 +5,6 @@ from collections.abc import Sequence
 
 from touchline.contact.event import Event
 
-BEFORE = 0.05  # s; a jump stops so shortly after an event was detected that it is seen
-
 
 class Player:
     """The time of a replay.
@@ -46,13 +44,9 @@ class Player:
             self.playing = False
 
     def show(self, event: Event) -> None:
-        """Stops at an event: where its place was found for good, as far as it was."""
+        """Stops in the middle of an event, of that part of it which told its place."""
         self.playing = False
-        best = event.time_of_position
-        if best is None:
-            last = self.end if event.cleared is None else event.cleared
-            best = min(event.detected + BEFORE, (event.detected + last) / 2)
-        self.seek(best)
+        self.seek(self._shown_at(event))
 
     def neighbour(self, step: int) -> Event | None:
         """The next event (`step` 1) or the one before (-1), seen from the time shown."""
@@ -62,6 +56,7 @@ class Player:
         return over[-1] if over else None
 
     def _shown_at(self, event: Event) -> float:
-        other = Player(self.start, self.end)
-        other.show(event)
-        return other.time
+        last = event.time_of_position
+        if last is None:
+            last = self.end if event.cleared is None else event.cleared
+        return (event.detected + last) / 2

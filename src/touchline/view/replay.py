@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An analyzed recording, asked for how things stood at a time; what is not asked for is not read."""
+"""An analyzed recording, asked for how things stood at a time; the rest of it is not read."""
 
 import json
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from touchline.contact.contact import Candidate, Contact
 from touchline.contact.event import Event
 from touchline.errors import InputError
-from touchline.model.robot import Robot, load_robot
+from touchline.model.robot import load_robot
 from touchline.view.tables import TimedTable
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from touchline.view.player import Player
 from touchline.view.replay import Replay
 from touchline.view.scene import RobotScene, dress
 from touchline.view.server import PageServer
-from touchline.view.signals import SignalPlot, signal_groups
+from touchline.view.signals import JOINTS, SignalPlot, force_on, signal_groups
 from touchline.view.timeline import Timeline
 
 Array = NDArray[np.float64]
@@ -26,6 +26,7 @@ PLOTTED = 0.1  # s; between plots while it plays
 IDLE = 0.2  # s; between looks for visitors while there are none
 SPEEDS = {"1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "1": 1.0, "2": 2.0, "5": 5.0, "20": 20.0}
 WINDOWS = {"1 s": 1.0, "5 s": 5.0, "20 s": 20.0, "60 s": 60.0, "whole recording": None}
+CURVES_WIDTH = 440  # pixels
 WORTH_DRAWING, MOST_CANDIDATES = 0.03, 3
 HELP = (
     "Move **time**, press **Play**, or choose an event. Drag over the arm to look around it. "
@@ -52,7 +53,6 @@ class ReplayPage:
         dress(self._page)
         self._arm = RobotScene(self._page.scene, replay.robot)
         self._marks: dict[tuple[str, int], ContactMarker] = {}
-        self._groups = signal_groups(replay.robot, replay.signals)
         self._build(self._page.gui)
         self._drawn: tuple = ()
         self._plotted = -np.inf
@@ -67,17 +67,19 @@ class ReplayPage:
         self._step = gui.add_button_group("event", ("previous", "next"))
         self._titles = {self._title(event): event for event in self.replay.events}
         names = tuple(self._titles) or ("none",)
-        self._choice = gui.add_dropdown("jump to", ("-", *names), "-")
-        self._speed = gui.add_dropdown("speed", tuple(SPEEDS), "1")
+        self._choice = gui.add_dropdown("jump to", ("-", *names), initial_value="-")
+        self._speed = gui.add_dropdown("speed", tuple(SPEEDS), initial_value="1")
         self._felt = gui.add_markdown("")
-        self._window = gui.add_dropdown("curves of", tuple(WINDOWS), "5 s")
-        names = tuple(self._groups)
-        joints = names.index("external joint torques")
-        self._choices = [gui.add_dropdown("curves", names, names[i]) for i in (0, joints)]
-        self._plots = [SignalPlot(gui, self.replay, self._origin) for _ in self._choices]
-        self._orders = [choice.order + 0.5 for choice in self._choices]
-        self._choices[1].order = self._orders[0] + 0.2
-        self._orders[1] = self._orders[0] + 0.4
+        panel = gui.add_panel()
+        with panel.add_tab("Curves", viser.Icon.CHART_LINE):
+            self._window = gui.add_dropdown("time", tuple(WINDOWS), initial_value="5 s")
+            groups = signal_groups(self.replay.robot, self.replay.signals)
+            first_two = (next(iter(groups)), JOINTS)
+            self._plots = [
+                SignalPlot(gui, self.replay, self._origin, groups, name) for name in first_two
+            ]
+        panel.dock_left()
+        panel.set_width(CURVES_WIDTH)
         self._slider.on_update(self._on_slider)
         self._play.on_click(lambda _: self._toggle())
         self._step.on_click(lambda e: self._jump(-1 if e.target.value == "previous" else 1))
@@ -121,9 +123,7 @@ class ReplayPage:
         """Stops at an event, and shows the wrench on its segment."""
         with self.lock:
             self.player.show(event)
-            force = f"{event.segment}: wrench on the segment, force"
-            if force in self._groups:
-                self._choices[0].value = force
+            self._plots[0].choose(force_on(event.segment))
 
     def run(self) -> None:
         """Draws for as long as the program lasts; costs little while nobody looks."""
@@ -147,7 +147,7 @@ class ReplayPage:
         """Brings the page up to date with the player and the choices."""
         with self.lock:
             time, playing = self.player.time, self.player.playing
-        state = (time, playing, self._window.value, *(c.value for c in self._choices))
+        state = (time, playing, self._window.value, *(plot.chosen for plot in self._plots))
         if state == self._drawn:
             return
         self._drawn = state
@@ -167,8 +167,8 @@ class ReplayPage:
             self._plotted = clock.monotonic()
             self._timeline.update(time)
             length = WINDOWS[str(self._window.value)]
-            for plot, choice, order in zip(self._plots, self._choices, self._orders, strict=True):
-                plot.update(self._groups[str(choice.value)], time, length, order)
+            for plot in self._plots:
+                plot.update(time, length)
 
     def _draw_contacts(self, contacts: list[Contact]) -> None:
         used, tinted = set(), set()
@@ -219,9 +219,10 @@ def _sentence(contact: Contact) -> str:
     if contact.force is not None:
         parts.append(f"{float(np.linalg.norm(contact.force)):.1f} N")
     if contact.position_std is not None:
-        parts.append(f"+- {1e3 * contact.position_std:.1f} mm")
+        parts.append(f"\N{PLUS-MINUS SIGN} {1e3 * contact.position_std:.1f} mm")
     if contact.status != "located":
         parts.append(contact.status.replace("_", " "))
-    for candidate in contact.candidates[:MOST_CANDIDATES]:
-        parts.append(f"{100 * candidate.probability:.0f} % {candidate.link}")
+    likely = [c for c in contact.candidates if c.probability >= WORTH_DRAWING]
+    if len(likely) > 1:
+        parts += [f"{100 * c.probability:.0f} % {c.link}" for c in likely[:MOST_CANDIDATES]]
     return ", ".join(parts)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 from numpy.typing import NDArray
+from viser import uplot
 
 from touchline.model.robot import Robot
 from touchline.view.replay import Replay
@@ -14,7 +15,10 @@ Array = NDArray[np.float64]
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#6a51a3", "#444444", "#56b4e9", "#a6761d")
 NOW = "#22262b"
+ON_SEGMENT = "{}: wrench on the segment"
+JOINTS = "external joint torques"
 PIECES = 240  # of time in a plot
+PADDING = (10, 24, 0, 0)  # pixels: top, right, bottom, left
 LEFT_OF_NOW = 0.7  # part of the window
 
 
@@ -31,15 +35,20 @@ def signal_groups(robot: Robot, signals: tuple[str, ...]) -> dict[str, SignalGro
     """What there is to choose from, by the words for it."""
     groups: dict[str, SignalGroup] = {}
     for segment in robot.segment_names:
-        _add_wrench(groups, f"{segment}: wrench on the segment", f"{segment}.seg", signals)
+        _add_wrench(groups, ON_SEGMENT.format(segment), f"{segment}.seg", signals)
     joints = [name for name in robot.joint_names if f"tau_ext.{name}" in signals]
     columns = tuple(f"tau_ext.{name}" for name in joints)
-    groups["external joint torques"] = SignalGroup("Nm", tuple(joints), columns)
+    groups[JOINTS] = SignalGroup("Nm", tuple(joints), columns)
     for name in joints:
         groups[f"external torque of {name}"] = SignalGroup("Nm", (name,), (f"tau_ext.{name}",))
     for sensor in robot.sensor_names:
         _add_wrench(groups, f"{sensor}: wrench on all outboard", f"{sensor}.ext", signals)
     return groups
+
+
+def force_on(segment: str) -> str:
+    """The words for the force on a segment."""
+    return f"{ON_SEGMENT.format(segment)}, force"
 
 
 def _add_wrench(
@@ -54,6 +63,16 @@ def _add_wrench(
             )
 
 
+@dataclass(frozen=True)
+class Box:
+    """What a plot shows: from `left` to `right`, from `low` to `high`."""
+
+    left: float
+    right: float
+    low: float
+    high: float
+
+
 def window_around(replay: Replay, time: float, length: float | None) -> tuple[float, float]:
     """The piece of time that is shown: `length` [s] around `time`, or all for None."""
     whole = replay.end - replay.start
@@ -63,74 +82,133 @@ def window_around(replay: Replay, time: float, length: float | None) -> tuple[fl
     return begin, begin + length
 
 
-def with_now(times: Array, values: list[Array], now: float) -> tuple[Array, ...]:
-    """Data of a plot: times, values, and an upright line at `now` over their range."""
-    finite = np.concatenate([v[np.isfinite(v)] for v in values] or [[]])
-    low, high = (min(finite.min(), 0.0), max(finite.max(), 0.0)) if len(finite) else (0.0, 0.0)
-    room = 0.05 * ((high - low) or 1.0)
+def with_now(times: Array, values: Array, now: float, box: Box) -> tuple[Array, ...]:
+    """Data of a plot: times, rows of values, and an area that is an upright line at `now`.
+
+    uPlot has no gaps for NaN: it draws on to the next number. Areas have none to begin with.
+
+    Args:
+        times: (N,) that increase.
+        values: (R, N).
+        now: where the line is, in the unit of `times`.
+        box: what the plot shows.
+    """
+    half = 0.0015 * (box.right - box.left)
     at = int(np.searchsorted(times, now))
-    x = np.insert(times, at, [now, now])
-    ys = [np.insert(v, at, [np.nan, np.nan]) for v in values]
-    line = np.full(len(x), np.nan)
-    line[at : at + 2] = low - room, high + room
-    return (x, *ys, line)
+    x = np.insert(times, at, [now - half, now - half, now + half, now + half])
+    order = np.argsort(x, kind="stable")
+    rows = np.insert(values, at, np.full((4, 1), np.nan), axis=1)
+    line = np.full(len(x), box.low)
+    line[at + 1 : at + 3] = box.high
+    return (x[order], *rows[:, order], line[order])
+
+
+def now_series(box: Box) -> uplot.Series:
+    """The upright line of `with_now`."""
+    points = uplot.Series_Points(show=False)
+    return uplot.Series(label="now", width=0, fill=NOW, fillTo=box.low, points=points)
+
+
+def nice_range(values: Array, before: tuple[float, float] | None) -> tuple[float, float]:
+    """A vertical range that holds zero and all finite values (N,), and rarely changes.
+
+    Args:
+        values: that are shown.
+        before: the range that was shown.
+    """
+    finite = values[np.isfinite(values)]
+    low, high = min(finite.min(initial=0.0), 0.0), max(finite.max(initial=0.0), 0.0)
+    if before and before[0] <= low and high <= before[1] and high - low > 0.3 * np.ptp(before):
+        return before
+    size = max(high - low, 1e-3)
+    power = 10.0 ** np.floor(np.log10(size))
+    step = 0.2 * power * next(m for m in (1, 2, 5, 10) if m * power >= size)
+    return float(np.floor(low / step - 0.05) * step), float(np.ceil(high / step + 0.05) * step)
 
 
 class SignalPlot:
-    """One plot on the page.
+    """One plot on the page, with the choice of what it shows.
 
     Args:
-        gui: of the page.
+        gui: of the page, in the place where the plot is to be.
         replay: that is shown.
         origin: from where times count on the page [s].
+        groups: to choose from.
+        chosen: the one that is shown first.
     """
 
-    HEIGHT = 190
+    HEIGHT = 230
 
-    def __init__(self, gui: viser.GuiApi, replay: Replay, origin: float) -> None:
-        self._gui, self._replay, self._origin = gui, replay, origin
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        replay: Replay,
+        origin: float,
+        groups: dict[str, SignalGroup],
+        chosen: str,
+    ) -> None:
+        self._gui, self._replay, self._origin, self._groups = gui, replay, origin, groups
+        self._choice = gui.add_dropdown("curves", tuple(groups), initial_value=chosen)
+        self._place = gui.add_folder("")
         self._handle: viser.GuiUplotHandle | None = None
         self._group: SignalGroup | None = None
+        self._range: tuple[float, float] | None = None
         self._shown: tuple = ()
 
-    def update(self, group: SignalGroup, now: float, length: float | None, order: float) -> None:
-        """Shows a group of signals around a time.
+    @property
+    def chosen(self) -> str:
+        """What is shown."""
+        return str(self._choice.value)
+
+    def choose(self, name: str) -> None:
+        """Shows another group, if there is one of this name."""
+        if name in self._groups:
+            self._choice.value = name
+
+    def update(self, now: float, length: float | None) -> None:
+        """Shows what is chosen around a time.
 
         Args:
-            group: what is shown.
             now: the time [s] that is marked.
             length: of the time shown [s]; None: all.
-            order: place on the page.
         """
+        group = self._groups[self.chosen]
         begin, end = window_around(self._replay, now, length)
         if (group, begin, end, now) == self._shown:
             return
         self._shown = (group, begin, end, now)
         step = (end - begin) / PIECES
         begin = np.floor(begin / step) * step  # pieces that stand still while the window moves
-        end = begin + step * (PIECES + 1)
-        found = [self._replay.curve(c, begin, end, PIECES + 1) for c in group.columns]
-        values = [values for _, values in found]
-        data = with_now(found[0][0] - self._origin, values, now - self._origin)
-        if self._handle is None or group is not self._group:
-            self._make(group, data, order)
-        else:
+        found = [
+            self._replay.curve(c, begin, begin + step * (PIECES + 1), PIECES + 1)
+            for c in group.columns
+        ]
+        times, values = found[0][0] - self._origin, np.array([values for _, values in found])
+        same = self._handle is not None and group is self._group
+        low, high = nice_range(values, self._range if same else None)
+        box = Box(times[0], times[-1], low, high)
+        data = with_now(times, values, now - self._origin, box)
+        if self._handle is not None and same and (low, high) == self._range:
             self._handle.data = data
+        else:
+            self._make(group, box, data)
 
-    def _make(self, group: SignalGroup, data: tuple[Array, ...], order: float) -> None:
+    def _make(self, group: SignalGroup, box: Box, data: tuple[Array, ...]) -> None:
         if self._handle is not None:
             self._handle.remove()
-        self._group = group
-        series: list[viser.uplot.Series] = [viser.uplot.Series(label="s")]
+        self._group, self._range = group, (box.low, box.high)
+        points = uplot.Series_Points(show=False)
+        series = [uplot.Series(label="s")]
         for i, name in enumerate(group.names):
             colour = COLOURS[i % len(COLOURS)]
-            series.append(viser.uplot.Series(label=name, stroke=colour, width=1.5))
-        series.append(viser.uplot.Series(label="now", stroke=NOW, width=1.5))
-        self._handle = self._gui.add_uplot(
-            data,
-            tuple(series),
-            scales={"x": viser.uplot.Scale(time=False)},
-            axes=(viser.uplot.Axis(), viser.uplot.Axis(label=group.unit, labelSize=18, size=52)),
-            height=self.HEIGHT,
-            order=order,
-        )
+            series.append(uplot.Series(label=name, stroke=colour, width=1.5, points=points))
+        scales = {
+            "x": uplot.Scale(time=False),
+            "y": uplot.Scale(range=self._range),
+        }
+        axes = (uplot.Axis(), uplot.Axis(label=group.unit, labelSize=18, size=52))
+        shown = (*series, now_series(box))
+        with self._place:
+            self._handle = self._gui.add_uplot(
+                data, shown, scales=scales, axes=axes, height=self.HEIGHT, padding=PADDING
+            )

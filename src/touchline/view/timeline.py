@@ -4,14 +4,17 @@
 import numpy as np
 import viser
 from numpy.typing import NDArray
+from viser import uplot
 
 from touchline.contact.event import Event
 from touchline.view.replay import Replay
+from touchline.view.signals import Box, now_series, with_now
 
 Array = NDArray[np.float64]
 
-CONTACT, COLLISION, NOW = "#e0a33a", "#d0503f", "#22262b"
-ROW, ROOM = 16, 62  # pixels: of a segment, and of the axis below with the names above
+CONTACT, COLLISION = "#e0a33a", "#d0503f"
+THICK = 0.33  # half of a bar, of the distance between rows
+ROW, ROOM = 18, 62  # pixels: of a segment, and of the axis below with the names above
 
 
 class Timeline:
@@ -27,61 +30,65 @@ class Timeline:
         self._replay, self._origin = replay, origin
         rows = [s for s in replay.robot.segment_names if _of(replay.events, s)]
         self._rows = rows or list(replay.robot.segment_names[:1])
-        self._bars = [
-            self._edges(row, segment, level)
+        end = max(replay.end, replay.start + 1e-3) - origin
+        self._box = Box(replay.start - origin, end, -0.5, len(self._rows) - 0.5)
+        bars = [
+            (row, self._edges(segment, level))
             for row, segment in enumerate(self._rows)
             for level in ("contact", "collision")
         ]
-        span = (replay.start - origin, max(replay.end, replay.start + 1e-3) - origin)
-        series = [viser.uplot.Series(label="s")]
-        for i in range(len(self._bars)):
+        self._times, self._heights = areas(bars)
+        none = uplot.Series_Points(show=False)
+        series = [uplot.Series(label="s")]
+        for i, (row, _) in enumerate(bars):
             colour = COLLISION if i % 2 else CONTACT
-            series.append(viser.uplot.Series(stroke=colour, width=9, spanGaps=False))
-        series.append(viser.uplot.Series(stroke=NOW, width=1.5))
-        top = len(self._rows) - 0.5
+            area = uplot.Series(width=0, fill=colour, fillTo=row - THICK, points=none)
+            series.append(area)
         self._plot = gui.add_uplot(
             self._data(replay.start),
-            tuple(series),
-            title=" / ".join(reversed(self._rows)) + " (from below)" if rows[1:] else "events",
+            (*series, now_series(self._box)),
+            title=", ".join(self._rows) + (" (from below)" if rows[1:] else ""),
             scales={
-                "x": viser.uplot.Scale(time=False, auto=False, min=span[0], max=span[1]),
-                "y": viser.uplot.Scale(auto=False, min=-0.5, max=top),
+                "x": uplot.Scale(time=False, range=(self._box.left, self._box.right)),
+                "y": uplot.Scale(range=(self._box.low, self._box.high)),
             },
-            axes=(viser.uplot.Axis(), viser.uplot.Axis(show=False)),
-            legend=viser.uplot.Legend(show=False),
+            axes=(uplot.Axis(), uplot.Axis(show=False)),
+            legend=uplot.Legend(show=False),
             height=ROOM + ROW * len(self._rows),
+            padding=(0, 24, 0, 24),
         )
 
-    def _edges(self, row: int, segment: str, level: str) -> list[tuple[float, float, float]]:
-        """Begin and end of each event [s] and the height of its bar."""
+    def _edges(self, segment: str, level: str) -> list[tuple[float, float]]:
+        """Begin and end of each event [s]."""
         least = (self._replay.end - self._replay.start) / 400  # seen, however short
-        bars = []
+        edges = []
         for event in _of(self._replay.events, segment):
             if event.level == level:
                 end = self._replay.end if event.cleared is None else event.cleared
                 begin = event.detected - self._origin
-                bars.append((begin, max(end - self._origin, begin + least), float(row)))
-        return bars
+                edges.append((begin, max(end - self._origin, begin + least)))
+        return edges
 
     def _data(self, now: float) -> tuple[Array, ...]:
-        """Times that increase, a row per bar that is NaN outside of them, and an upright line."""
-        count = sum(map(len, self._bars))
-        x = np.zeros(3 * count + 2)
-        ys = np.full((len(self._bars) + 1, len(x)), np.nan)
-        at = 0
-        for row, bars in enumerate(self._bars):
-            for begin, end, height in bars:
-                x[at : at + 3] = begin, end, end
-                ys[row, at : at + 2] = height
-                at += 3
-        x[at:] = now - self._origin
-        ys[-1, at:] = -0.5, len(self._rows) - 0.5
-        order = np.argsort(x, kind="stable")
-        return (x[order], *ys[:, order])
+        return with_now(self._times, self._heights, now - self._origin, self._box)
 
     def update(self, now: float) -> None:
         """Moves the line to a time [s]."""
         self._plot.data = self._data(now)
+
+
+def areas(bars: list[tuple[int, list[tuple[float, float]]]]) -> tuple[Array, Array]:
+    """Times (N,) that increase, and the upper border (R, N) of areas that are bars."""
+    times = np.array(sorted({t for _, edges in bars for edge in edges for t in edge}), float)
+    x = np.repeat(times, 2)  # before and after each edge
+    heights = []
+    for row, edges in bars:
+        y = np.full(len(x), row - THICK)
+        for begin, end in edges:
+            first, last = np.searchsorted(times, [begin, end])
+            y[2 * first + 1 : 2 * last + 1] = row + THICK
+        heights.append(y)
+    return x, np.array(heights).reshape(len(bars), len(x))
 
 
 def _of(events: list[Event], segment: str) -> list[Event]:

@@ -263,6 +263,8 @@
   const interact = (plot) => {
     const { svg, group } = plot;
     svg.setAttribute("tabindex", "0");
+    svg.setAttribute("aria-label", `${svg.getAttribute("aria-label")}; arrow keys move, ` +
+      "plus and minus zoom, 0 shows all");
     svg.addEventListener("pointerdown", (e) => {
       if (e.button !== 0 || e.pointerType === "touch") return;
       begun = { time: timeAt(plot, e), moves: e.shiftKey };
@@ -321,7 +323,11 @@
   const recording = new Group([0, length], 4 * data.width);
   const overall = { start: 0, width: data.width, count: data.count, curves: data.curves.map(unpack) };
   const add = (holder, group, source, panel, draw) => {
-    const svg = holder.querySelector("svg"), values = panel ? holder.querySelectorAll(".value") : [];
+    const svg = holder.querySelector("svg"), values = [];
+    if (panel) holder.querySelectorAll(".key").forEach((key) => {
+      values.push(key.appendChild(document.createElement("span")));
+      key.lastChild.className = "value";
+    });
     const plot = { svg, group, source, panel, draw, values, height: svg.viewBox.baseVal.height };
     group.plots.push(plot);
     interact(plot);

@@ -12,7 +12,7 @@ from touchline.report.render.raster import box, rasterize
 
 Array = NDArray[np.floating[Any]]
 
-MAP = 512  # pixels across the shadow map
+MAP, SMALL_MAP = 512, 256  # pixels across the shadow map, and across that of a small picture
 TAPS = [(x, y) for x in (-3, -1, 1, 3) for y in (-3, -1, 1, 3)]  # pixels of it
 SKY, GROUND = (0.56, 0.60, 0.66), (0.40, 0.38, 0.36)
 KEY, FILL, HEAD = (0.86, 0.83, 0.78), (0.16, 0.18, 0.22), (0.16, 0.16, 0.16)
@@ -42,9 +42,11 @@ class ShadowMap:
     Args:
         corners: (T, 3, 3) [m] in world.
         light: (3,) unit direction towards the light.
+        width: of the map [pixels].
     """
 
-    def __init__(self, corners: Array, light: Array) -> None:
+    def __init__(self, corners: Array, light: Array, width: int = MAP) -> None:
+        self._width = width
         x = np.cross(np.eye(3)[np.abs(light).argmin()], light)
         x /= np.linalg.norm(x)
         self._axes = np.array([x, np.cross(light, x), light])
@@ -52,10 +54,10 @@ class ShadowMap:
         low, high = box(seen)
         room = 0.08 * (high - low)[:2].max()
         self._low = np.append(low[:2] - room, low[2] - 1.0)  # heights begin at 1
-        self._scale = MAP / ((high - low)[:2].max() + 2 * room)
+        self._scale = self._width / ((high - low)[:2].max() + 2 * room)
         pixels = (seen[..., :2] - self._low[:2]) * self._scale
-        hit = rasterize(pixels, seen[..., 2] - self._low[2], (MAP, MAP))
-        self._height = np.zeros(MAP * MAP, np.float32)
+        hit = rasterize(pixels, seen[..., 2] - self._low[2], (self._width, self._width))
+        self._height = np.zeros(self._width * self._width, np.float32)
         self._height[hit.pixel] = hit.nearness
         self._blurred: Array | None = None
 
@@ -64,11 +66,11 @@ class ShadowMap:
         step = 1.5 / self._scale
         faces = np.flatnonzero(normals @ self._axes[2] > 0)
         seen = (points[faces] + normals[faces] * step) @ self._axes.T - self._low
-        column, row = (seen[:, :2] * self._scale).clip(4, MAP - 5).astype(np.int32).T
-        cell, height = row * MAP + column, (seen[:, 2] + step).astype(np.float32)
+        column, row = (seen[:, :2] * self._scale).clip(4, self._width - 5).astype(np.int32).T
+        cell, height = row * self._width + column, (seen[:, 2] + step).astype(np.float32)
         total = np.zeros(len(faces), np.float32)
         for x, y in TAPS:
-            total += self._height.take(cell + (y * MAP + x)) < height
+            total += self._height.take(cell + (y * self._width + x)) < height
         lit = np.zeros(len(points), np.float32)
         lit[faces] = total / len(TAPS)
         return lit
@@ -76,7 +78,11 @@ class ShadowMap:
     def shade_on_floor(self, points: Array) -> Array:
         """How much (N,) of the light the triangles keep from points below all of them."""
         if self._blurred is None:
-            shaded = (self._height > 0).astype(np.float32).reshape(MAP // 2, 2, MAP // 2, 2)
+            shaded = (
+                (self._height > 0)
+                .astype(np.float32)
+                .reshape(self._width // 2, 2, self._width // 2, 2)
+            )
             self._blurred = blur(shaded.mean(axis=(1, 3)), 2)
         place = points @ self._axes[:2].T - self._low[:2]
         return bilinear(self._blurred, place * (self._scale / 2))

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page of a replay in a browser: the arm as it stood, time that goes on, events jumped to."""
+
+import numpy as np
+from browser import until
+from projection import count_near, pixel
+
+from touchline.view.markers import COLOURS
+from touchline.view.replay import Replay
+from touchline.view.replay_page import ReplayPage
+from touchline.view.scene import TINT
+from touchline.view.server import PageServer
+
+
+class Visitor:
+    """A browser on the page, which is drawn while the browser waits."""
+
+    def __init__(self, browser, page, server):
+        self.browser, self.page = browser, page
+        browser.resize(1500, 900)
+        browser.open(server.url)
+        clients = server.page.get_clients
+        (self.client,) = until(lambda: list(clients().values()), pause=self.rest)
+        browser.wait_for("Play")
+
+    def rest(self, seconds):
+        self.page.step(seconds)
+        self.browser.rest(seconds)
+
+    def until(self, done, what):
+        return until(done, pause=self.rest, what=what)
+
+    def pixel(self, point):
+        """Where a point of the world stands in the window; the picture has panels beside it."""
+        box = "(() => {const b = document.querySelector('canvas').getBoundingClientRect();"
+        left, top = self.browser.run(f"{box} return [b.x, b.y]}})()")
+        column, row = pixel(self.client.camera, point)
+        return column + left, row + top
+
+    def arm_stands(self, time):
+        """Whether the arm covers the middles of its links as they were at a time."""
+        replay, image = self.page.replay, self.browser.picture()
+        poses = replay.robot.T_world_links(replay.posture(time))
+        places = [self.pixel(poses[link][:3, 3]) for link in ("link2", "link3", "link5", "link7")]
+        return all(image[round(row), round(column)].min() < 244 for column, row in places)
+
+
+def test_a_replay_is_seen_played_and_jumped_in(browser, touched):
+    replay = Replay(touched.out)
+    with PageServer("test", port=0) as server:
+        page = ReplayPage(replay, server)
+        visitor = Visitor(browser, page, server)
+        visitor.until(lambda: visitor.arm_stands(replay.start), "the arm at the start")
+
+        browser.press("next")
+        event = replay.events[0]
+        visitor.until(lambda: f"event {event.id}: {event.link}" in browser.text(), "the event")
+        time = page.player.time
+        assert event.detected < time < event.cleared
+        (contact,) = replay.contacts(time)
+        row = np.searchsorted(touched.samples.time, time)
+        off = np.linalg.norm(contact.position - touched.truth.point[row], axis=1)
+        assert np.nanmin(off) < 5e-3  # it is where the arm was touched
+
+        def point_is_shown():
+            place = visitor.pixel(contact.position)
+            return count_near(browser.picture(), *place, COLOURS["estimate"]) > 15
+
+        visitor.until(point_is_shown, "the contact's point")
+        assert visitor.arm_stands(time)
+        T = replay.robot.T_world_links(replay.posture(time))[event.link]
+        image, tinted = browser.picture(), visitor.pixel(T[:3, 3] + 0.08 * T[:3, 2])
+        assert count_near(image, *tinted, TINT, 12) > 60
+
+        browser.press("Play")
+        visitor.until(lambda: page.player.time > event.cleared + 0.05, "time to go on")
+        visitor.until(lambda: "nothing touches" in browser.text(), "the end of the event")
+        visitor.until(lambda: not page.player.playing, "the end of the recording")
+        visitor.until(lambda: f"{replay.end:.3f} s" in browser.text(), "the last time")
+        visitor.until(lambda: visitor.arm_stands(replay.end), "the arm at the end")
+        assert not point_is_shown()
+        charts = "Object.values(window.__viserTestpoints.uplots).map((u) => u.chart)"
+        drawn = browser.run(f"{charts}.map((c) => [c.scales.x.min, c.scales.x.max])")
+        assert len(drawn) == 3 and all(low < high for low, high in drawn)
+        assert browser.complaints == []
