@@ -201,6 +201,18 @@ inline nb::tuple follow(tl::Localizer& l, const In& time, const In& rows, const 
                         array(ended, ended.size() / event_width, event_width));
 }
 
+// Rows: surface, centre, probability, log of the density.
+inline Out region(const tl::Localizer& l) {
+  std::vector<double> out;
+  const std::vector<tl::SurfaceCell> cells = l.region();
+  for (const tl::SurfaceCell& c : cells) {
+    out.push_back(static_cast<double>(c.surface));
+    push(out, c.centre);
+    out.insert(out.end(), {c.probability, c.log_density});
+  }
+  return array(out, cells.size(), 6);
+}
+
 inline tl::NoiseFigures noise(std::vector<double> qd, std::vector<double> tau,
                               std::vector<double> wrench, double period, double wrench_error,
                               double torque_error) {
@@ -267,6 +279,7 @@ inline void bind(nb::module_& m) {
       })
       .def("locate", &locate, "segment"_a, "row"_a, "normalized"_a.none(), "q"_a, "qd"_a.none(),
            "quiet"_a.none())
+      .def("region", &region)
       .def("event", &event, "segment"_a)
       .def("follow", &follow, "time"_a, "rows"_a, "normalized"_a, "levels"_a, "quiet"_a,
            "q"_a, "qd"_a);

@@ -68,10 +68,15 @@ class Explanations {
   }
 
   int count() const { return count_; }
+  const Candidate* begin() const { return candidates_.data(); }
+  const Candidate* end() const { return candidates_.data() + count_; }
   Candidate* begin() { return candidates_.data(); }
   Candidate* end() { return candidates_.data() + count_; }
   void shrink(int count) { count_ = count; }
   double best() const { return best_; }
+  // The bodies that were looked at.
+  int views() const { return used_; }
+  const View& view(int i) const { return views_[i]; }
   const View& view(const Candidate& k) const { return views_[k.view]; }
   const LinkSurfaces& surfaces() const { return surfaces_; }
   const ForceFitter& fitter() const { return fitter_; }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "touchline/dense.hpp"
 #include "touchline/mesh.hpp"
@@ -35,6 +36,9 @@ struct Fit {
   double cosine = 0.0;  // between the push and the inward normal
   double cost() const { return chi2 + cone; }
 };
+
+// Logarithm of how dense forces are, per volume, when directions and sizes are equally likely.
+inline double log_prior(const Vec3& force) { return -std::log(std::max(dot(force, force), 1.0)); }
 
 inline double component(const Vec3& v, int i) { return i == 0 ? v.x : i == 1 ? v.y : v.z; }
 
@@ -77,6 +81,13 @@ class ForceFitter {
     if (!solve(A, g, force)) return std::numeric_limits<double>::infinity();
     wrench_of(point, force, w);
     return q(w);
+  }
+
+  // Logarithm of the volume of forces at `point` that explain as well as the best.
+  double log_volume(const Quadratic& q, const Vec3& point) const {
+    double A[9], g[3];
+    reduce(q, point, A, g);
+    return cholesky(A, 3) ? -0.5 * log_determinant(A, 3) : -std::numeric_limits<double>::infinity();
   }
 
   // Fills chi2, cone and cosine of a force that is given.

@@ -31,6 +31,8 @@ class Localizer {
   Localizer& operator=(const Localizer&) = delete;
 
   const std::vector<LinkSurface>& surfaces() const { return single_.surfaces().all(); }
+  // The posterior of the place that was located last, cell by cell.
+  std::vector<SurfaceCell> region() const { return single_.region(); }
   const Measurement& measurement() const { return measurement_; }
 
   // Sizes of what the methods below take.

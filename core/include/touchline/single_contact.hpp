@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "touchline/answer.hpp"
+#include "touchline/approach.hpp"
+#include "touchline/credible_region.hpp"
 #include "touchline/explanations.hpp"
 
 namespace touchline {
@@ -49,6 +51,8 @@ class SingleContact {
   }
 
   const Answer& answer() const { return answer_; }
+  // The posterior of the place that was located last, cell by cell.
+  std::vector<SurfaceCell> region() const { return CredibleRegion(found_, settings_).cells(); }
   const LinkSurfaces& surfaces() const { return found_.surfaces(); }
 
  private:
@@ -75,8 +79,8 @@ class SingleContact {
       const View& view = found_.view(k);
       found_.fitter().information(view.q, view.earlier(k.point), k.normal, k.fit.force, H, g);
       if (!cholesky(H, 5)) continue;
-      k.weight = -0.5 * (k.fit.cost() + log_determinant(H, 5)) +
-                 std::log(std::max(k.fit.cosine, 0.02)) - view.width;
+      k.weight = -0.5 * (k.fit.cost() + log_determinant(H, 5)) + log_prior(k.fit.force) -
+                 view.width;
       most = std::max(most, k.weight);
       covariance_along(H, k.along);
     }
@@ -85,7 +89,7 @@ class SingleContact {
       if (k.weight < most - kNegligible) {
         k.weight = -std::numeric_limits<double>::infinity();
       } else {
-        k.weight += reachable(k);
+        k.weight += approach(found_.surfaces(), k.point, k.fit.force, settings_.finger);
       }
       reached = std::max(reached, k.weight);
     }
@@ -100,26 +104,6 @@ class SingleContact {
     out[0] = a * a + c * c;
     out[1] = c * b;
     out[2] = b * b;
-  }
-
-  // Log of the plausibility that a push arrives at a point along its force: not from inside
-  // another link, and hardly through a narrow gap.
-  double reachable(const Candidate& k) const {
-    const double size = norm(k.fit.force);
-    if (size == 0.0) return 0.0;
-    const ForceLine line{k.point, (1.0 / size) * k.fit.force};
-    double nearest = -std::numeric_limits<double>::infinity();
-    bool inside = false;
-    for (const LinkSurface& surface : found_.surfaces().all()) {
-      const ForceLine local = found_.surfaces().to_node(line, surface.node);
-      surface.mesh.crossings(local, [&](const Crossing& c) {
-        if (c.t > -1e-6 || c.t <= nearest) return;
-        nearest = c.t;
-        inside = dot(c.normal, local.direction) < 0.0;
-      });
-    }
-    if (inside) return std::max(-6.0, nearest / 3e-3);
-    return 2.0 * std::log(std::clamp(-nearest / settings_.finger, 0.1, 1.0));
   }
 
   void conclude(int g, const Measurement& measurement) {

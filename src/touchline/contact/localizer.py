@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from touchline.contact.contact import Candidate
 from touchline.contact.detector import Detection, native_noise
+from touchline.contact.region import Region
 from touchline.contact.skin import Skin
 from touchline.contact.thresholds import Thresholds
 from touchline.estimation.observer import Estimate, Observer
@@ -162,6 +163,21 @@ class Localizer:
             detection.quiet,
             np.ascontiguousarray(q, float),
             np.ascontiguousarray(qd, float),
+        )
+
+    def region(self) -> Region:
+        """The posterior over links and surfaces of the contact that was located last.
+
+        Of the last call of `locate`, or of the last sample of `Pipeline.update` or `run`. Takes
+        milliseconds: worked out when asked for.
+        """
+        cells = self.core.region()
+        return Region(
+            tuple(patch.link for patch in self.skin.patches),
+            cells[:, 0].astype(int),
+            cells[:, 1:4],
+            cells[:, 4],
+            np.exp(cells[:, 5]),
         )
 
     def event(self, segment: int) -> EventAnswer:
