@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The posterior over links and surfaces: probabilities that add up, regions that keep their word."""
+"""The posterior over links and surfaces: it adds up, and its regions keep their word."""
 
 import numpy as np
 import pytest
