@@ -137,12 +137,13 @@ inline Out locate(tl::Localizer& l, int segment, const In& row, const std::optio
 // An event as numbers: status, time of the position, variance of the position, number of places,
 // the joint positions at that time, then per place surface, node, probability, point in the
 // frame of the node; the most probable body's best first.
-inline void push_event(tl::Localizer& l, int g, std::vector<double>& out) {
-  tl::EventPlace& event = l.conclude_event(g);
+inline void push_event(tl::Localizer& l, tl::Localizer::Memory& memory, std::vector<double>& out) {
+  l.conclude(memory);
+  const tl::EventPlace& event = memory.event;
   const std::size_t end = out.size() + 4 + l.joints() + kPerCandidate * tl::EventPlace::kPlaces;
-  out.insert(out.end(), {static_cast<double>(l.event_status(g)), event.time(), event.variance(),
+  out.insert(out.end(), {static_cast<double>(l.status(memory)), event.time(), event.variance(),
                          static_cast<double>(event.count())});
-  out.insert(out.end(), l.event_q(g).begin(), l.event_q(g).end());
+  out.insert(out.end(), memory.q.begin(), memory.q.end());
   for (int i = 0; i < event.count(); ++i) {
     const tl::Place& p = event.place(i);
     const tl::LinkSurface& surface = l.surfaces()[p.surface];
@@ -153,16 +154,30 @@ inline void push_event(tl::Localizer& l, int g, std::vector<double>& out) {
   out.resize(end, std::nan(""));
 }
 
-inline Out event(tl::Localizer& l, int segment) {
-  if (segment < 0 || static_cast<std::size_t>(segment) >= l.segments())
-    throw std::invalid_argument("there is no such segment");
-  std::vector<double> out;
-  push_event(l, segment, out);
-  return array(out, 1, out.size());
+inline std::size_t event_width(const tl::Localizer& l) {
+  return 7 + l.joints() + kPerCandidate * tl::EventPlace::kPlaces;
 }
 
-// N samples: for each sample and each segment that is touched, its sample, its segment, its answer;
-// and for each event that ends, sample, segment, event.
+inline void push_event(tl::Localizer& l, std::size_t sample, std::size_t g,
+                       tl::Localizer::Memory& memory, std::vector<double>& out) {
+  out.insert(out.end(), {static_cast<double>(sample), static_cast<double>(g),
+                         static_cast<double>(memory.serial)});
+  push_event(l, memory, out);
+}
+
+// The events that last: sample (0), segment, number, event.
+inline Out events(tl::Localizer& l) {
+  std::vector<double> out;
+  for (std::size_t g = 0; g < l.segments(); ++g) {
+    for (tl::Localizer::Memory& memory : l.memories(g)) {
+      if (memory.serial >= 0) push_event(l, 0, g, memory, out);
+    }
+  }
+  return array(out, out.size() / event_width(l), event_width(l));
+}
+
+// N samples: for each sample and each contact on a segment that is touched, its sample, its
+// segment, its number, its answer; and for each event that ends, sample, segment, number, event.
 inline nb::tuple follow(tl::Localizer& l, const In& time, const In& rows, const In& normalized,
                         const In& levels, const In& quiet, const In& q, const In& qd) {
   const std::size_t n = l.joints(), m = l.segments(), r = l.tests(), width = l.width();
@@ -177,28 +192,27 @@ inline nb::tuple follow(tl::Localizer& l, const In& time, const In& rows, const 
       bool ready = false;
       for (std::size_t g = 0; g < m; ++g) {
         const bool touched = levels.data()[i * m + g] > 0.0;
-        const int segment = static_cast<int>(g);
-        if (l.enter(segment, touched, time.data()[i])) {
-          ended.insert(ended.end(), {static_cast<double>(i), static_cast<double>(g)});
-          push_event(l, segment, ended);
+        if (touched && !ready) l.set_state(q.data() + i * n, qd.data() + i * n, quiet.data() + i * m);
+        ready = ready || touched;
+        l.follow(static_cast<int>(g), touched, rows.data() + i * width, normalized.data() + i * r,
+                 time.data()[i], q.data() + i * n);
+        for (tl::Localizer::Memory* memory : l.ended()) {
+          push_event(l, i, g, *memory, ended);
+          memory->serial = -1;
         }
-        if (!touched) continue;
-        if (!ready) l.set_state(q.data() + i * n, qd.data() + i * n, quiet.data() + i * m);
-        ready = true;
-        const std::size_t at = answers.size();
-        answers.resize(at + 2 + kWidth);
-        answers[at] = static_cast<double>(i);
-        answers[at + 1] = static_cast<double>(g);
-        const double* tests = normalized.data() + i * r;
-        write(l, l.locate_next(segment, rows.data() + i * width, tests, time.data()[i]),
-              answers.data() + at + 2);
-        l.remember(segment, tests, time.data()[i], q.data() + i * n);
+        for (int k = 0; touched && k < l.tracks().count(); ++k) {
+          const std::size_t at = answers.size();
+          answers.resize(at + 3 + kWidth);
+          answers[at] = static_cast<double>(i);
+          answers[at + 1] = static_cast<double>(g);
+          answers[at + 2] = static_cast<double>(l.tracks()[k].serial);
+          write(l, l.tracks()[k].answer, answers.data() + at + 3);
+        }
       }
     }
   }
-  const std::size_t event_width = 6 + n + kPerCandidate * tl::EventPlace::kPlaces;
-  return nb::make_tuple(array(answers, answers.size() / (2 + kWidth), 2 + kWidth),
-                        array(ended, ended.size() / event_width, event_width));
+  return nb::make_tuple(array(answers, answers.size() / (3 + kWidth), 3 + kWidth),
+                        array(ended, ended.size() / event_width(l), event_width(l)));
 }
 
 // Rows: surface, centre, probability, log of the density.
@@ -280,7 +294,7 @@ inline void bind(nb::module_& m) {
       .def("locate", &locate, "segment"_a, "row"_a, "normalized"_a.none(), "q"_a, "qd"_a.none(),
            "quiet"_a.none())
       .def("region", &region)
-      .def("event", &event, "segment"_a)
+      .def("events", &events)
       .def("follow", &follow, "time"_a, "rows"_a, "normalized"_a, "levels"_a, "quiet"_a,
            "q"_a, "qd"_a);
 }

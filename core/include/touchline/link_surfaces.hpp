@@ -57,6 +57,9 @@ class LinkSurfaces {
     return X.R * p + X.p;
   }
   Vec3 turn_to_world(const Vec3& v, int node) const { return posture_.pose(node).R * v; }
+  Vec3 turn_to_node(const Vec3& v, int node) const {
+    return transposed_times(posture_.pose(node).R, v);
+  }
 
   // The point of a surface nearest to a point of the world, in world; `face` is -1 beyond `limit`.
   SurfacePoint nearest(int surface, const Vec3& target, double limit) const {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "touchline/event_place.hpp"
-#include "touchline/single_contact.hpp"
+#include "touchline/tracks.hpp"
 
 namespace touchline {
 
@@ -23,8 +23,13 @@ class Localizer {
         period_(noise.period),
         measurement_(observer, std::move(tests), std::move(noise)),
         single_(observer, measurement_.posture(), settings_, std::move(surfaces)),
-        following_(observer.row_layout().segments) {
-    for (Following& f : following_) f.q.resize(observer.row_layout().joints, kNaN);
+        tracks_(single_, measurement_, settings_, measurement_.most_rows(), period_),
+        states_(observer.row_layout().segments),
+        memories_(observer.row_layout().segments, std::vector<Memory>(Tracks::kReports + 1)) {
+    for (std::vector<Memory>& of_segment : memories_) {
+      for (Memory& m : of_segment) m.q.resize(observer.row_layout().joints, kNaN);
+    }
+    ended_.reserve(Tracks::kReports + 1);
   }
 
   Localizer(const Localizer&) = delete;
@@ -69,68 +74,58 @@ class Localizer {
     return locate(g, row, normalized, steady_lag(g));
   }
 
-  // The same within an event. What a filtered wrench w speaks of is older by
-  //   int K exp(-K a) a w(t - a) da / int K exp(-K a) w(t - a) da,
-  // so that a second filter in series tells its age, also while the force grows.
-  const Answer& locate_next(int g, const double* row, const double* normalized, double time) {
-    Following& f = following_[g];
-    const double* w = row + observer_.row_layout().segment_wrench() + 6 * g;
-    const Vec3 force{w[0], w[1], w[2]};
-    const double size2 = dot(force, force);
-    if (!(size2 > 0.0)) return locate(g, row, normalized, 0.0);
-    const double keep = std::exp(-bandwidth(g) * std::max(0.0, time - f.time));
-    f.twice = keep * f.twice + (1.0 - keep) * force;
-    f.time = time;
-    const double age = std::clamp(dot(f.twice, force) / size2, 0.0, 2.0);
-    return locate(g, row, normalized, age * steady_lag(g));
-  }
-
   const Answer& locate(int g, const double* row, const double* normalized, double lag) {
     if (!measurement_.read(g, row, normalized)) return single_.clear();
     return single_.locate(g, lag, measurement_);
   }
 
-  // Notes whether segment g is touched; true when its event has just ended.
-  bool enter(int g, bool touched, double time) {
-    Following& f = following_[g];
-    if (touched && !f.touched) {
-      f.event.restart();
-      f.twice = {};
-      f.time = time;
+  // Takes a sample of segment g at `time` [s]: what is said of each contact on it is in `tracks()`,
+  // and the events that have ended in `ended()`.
+  void follow(int g, bool touched, const double* row, const double* normalized, double time,
+              const double* q) {
+    Segmented& s = states_[g];
+    ended_.clear();
+    if (touched && !s.touched) {
+      const int first = tracks_.next();
+      s = Segmented{};
+      s.first = first;
+      s.age.restart(time);
     }
-    const bool ended = f.touched && !touched;
-    f.touched = touched;
-    return ended;
-  }
-
-  // Adds the answer at hand to the event on segment g, at `time` [s] and joint positions `q`.
-  void remember(int g, const double* normalized, double time, const double* q) {
-    Following& f = following_[g];
+    if (s.touched && !touched) end_all(g);
+    s.touched = touched;
+    if (!touched) return;
+    tracks_.follow(s, g, bandwidth(g), time,
+                   [&] { return measurement_.read(g, row, normalized); });
+    for (int i = 0; i < tracks_.ended(); ++i) end(g, tracks_.ended(i));
     const double strength = measurement_.strength(g, normalized);
-    if (!f.event.begin_sample(strength, time, 0.5 * period_ * bandwidth(g))) return;
-    std::copy(q, q + f.q.size(), f.q.begin());
-    const Answer& answer = single_.answer();
-    const bool explained =
-        answer.status == Status::located || answer.status == Status::ambiguous;
-    if (!f.event.open(static_cast<int>(answer.status), explained)) return;
-    for (int i = 0; i < answer.count; ++i) {
-      const Candidate& k = answer.candidates[i];
-      f.event.add(k.surface, single_.surfaces().to_node(k.point, surfaces()[k.surface].node), k.weight,
-                  k.along[0] + k.along[2], settings_.place_radius);
+    double sum = 0.0;
+    for (int i = 0; i < tracks_.count(); ++i) sum += size(tracks_[i].answer);
+    for (int i = 0; i < tracks_.count(); ++i) {
+      const double share = tracks_.count() > 1 && sum > 0.0 ? size(tracks_[i].answer) / sum : 1.0;
+      remember(g, tracks_[i], share * strength, time, q);
     }
-    f.event.close(explained ? answer.spread * answer.spread : kNaN);
   }
 
-  // The event on segment g with its places weighed, those of the most probable body first.
-  EventPlace& conclude_event(int g) {
-    following_[g].event.conclude([this](int surface) { return surfaces()[surface].node; });
-    return following_[g].event;
-  }
-  // Joint positions at the time of the event's position.
-  const std::vector<double>& event_q(int g) const { return following_[g].q; }
+  const Tracks& tracks() const { return tracks_; }
 
-  Status event_status(int g) const {
-    const EventPlace& event = following_[g].event;
+  // An event: its number, its places, and the joint positions at the time of its position.
+  struct Memory {
+    int serial = -1;
+    EventPlace event;
+    std::vector<double> q;
+  };
+
+  // Those that ended with the last sample; those that last or were the last on segment g.
+  const std::vector<Memory*>& ended() const { return ended_; }
+  std::vector<Memory>& memories(int g) { return memories_[g]; }
+
+  // Weighs the places of an event, those of the most probable body first.
+  void conclude(Memory& m) {
+    m.event.conclude([this](int surface) { return surfaces()[surface].node; });
+  }
+
+  Status status(const Memory& m) const {
+    const EventPlace& event = m.event;
     if (event.count() == 0 || event.mostly_unexplained())
       return static_cast<Status>(event.frequent(3, 4));
     double here = 0.0;
@@ -146,13 +141,51 @@ class Localizer {
  private:
   static constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-  struct Following {
-    EventPlace event;
-    bool touched = false;
-    std::vector<double> q;  // at the time of the event's position
-    Vec3 twice;             // the force, filtered twice
-    double time = 0.0;      // of the last sample
-  };
+  // Finds the memory of an event, or makes room for it in place of one that has ended.
+  Memory& memory(int g, int serial) {
+    Memory* room = nullptr;
+    for (Memory& m : memories_[g]) {
+      if (m.serial == serial) return m;
+      if (m.serial < 0 && room == nullptr) room = &m;
+    }
+    if (room == nullptr) room = &memories_[g].back();
+    room->serial = serial;
+    room->event.restart();
+    return *room;
+  }
+
+  void end(int g, int serial) {
+    for (Memory& m : memories_[g]) {
+      if (m.serial == serial) ended_.push_back(&m);
+    }
+  }
+  void end_all(int g) {
+    for (Memory& m : memories_[g]) {
+      if (m.serial >= 0) ended_.push_back(&m);
+    }
+  }
+
+  static double size(const Answer& a) {
+    const double f = norm(a.force);
+    return std::isfinite(f) ? f : 0.0;
+  }
+
+  // Adds what is said of a contact to its event.
+  void remember(int g, const Report& report, double strength, double time, const double* q) {
+    Memory& m = memory(g, report.serial);
+    const Answer& answer = report.answer;
+    if (!m.event.begin_sample(strength, time, 0.5 * period_ * bandwidth(g))) return;
+    std::copy(q, q + m.q.size(), m.q.begin());
+    const bool explained =
+        answer.status == Status::located || answer.status == Status::ambiguous;
+    if (!m.event.open(static_cast<int>(answer.status), explained)) return;
+    for (int i = 0; i < answer.count; ++i) {
+      const Candidate& k = answer.candidates[i];
+      m.event.add(k.surface, single_.surfaces().to_node(k.point, surfaces()[k.surface].node),
+                  k.weight, k.along[0] + k.along[2], settings_.place_radius);
+    }
+    m.event.close(explained ? answer.spread * answer.spread : kNaN);
+  }
 
   double steady_lag(int g) const {
     return observer_.layout().segments[g].sensor >= 0 ? 1.0 / bandwidth(g) : 0.0;
@@ -171,7 +204,10 @@ class Localizer {
   double period_;
   Measurement measurement_;
   SingleContact single_;
-  std::vector<Following> following_;  // per segment
+  Tracks tracks_;
+  std::vector<Segmented> states_;              // per segment
+  std::vector<std::vector<Memory>> memories_;  // per segment: of events
+  std::vector<Memory*> ended_;
 };
 
 }  // namespace touchline

@@ -33,6 +33,7 @@ class Measurement {
     used_.resize(most);
     own_.resize(most);
     outboard_.resize(most);
+    covariance_.resize(size * size);
     factor_.resize(size * size);
     design_.resize(size * 7);
   }
@@ -75,6 +76,7 @@ class Measurement {
   // Rows in use: six of a wrench and the others.
   int size() const { return size_; }
   int scalars() const { return count_; }
+  std::size_t most_rows() const { return 6 + used_.size(); }
   const Posture& posture() const { return posture_; }
   std::size_t tests() const { return tests_.size(); }
 
@@ -87,6 +89,63 @@ class Measurement {
           out[6 * i + j] += factor_[i * size_ + k] * factor_[j * size_ + k];
       }
     }
+  }
+
+  // The measured numbers of all rows, as they are for contacts anywhere.
+  void values(double* out, int stride) const {
+    const int first = has_wrench_ ? 6 : 0;
+    for (int i = 0; i < first; ++i) out[i * stride] = wrench_[i];
+    for (int i = 0; i < count_; ++i) out[(first + i) * stride] = own_[i];
+  }
+
+  // What a wrench on the body of `node`, `lag` [s] old, does to all rows.
+  void load(int node, const Spatial& w, double lag, double* out, int stride) const {
+    const int first = has_wrench_ ? 6 : 0;
+    double values[6];
+    bool loaded;
+    store(w, values);
+    for (int i = 0; i < first; ++i) out[i * stride] = values[i];
+    for (int i = 0; i < count_; ++i)
+      out[(first + i) * stride] = load(*used_[i], node, w, lag, loaded);
+  }
+
+  // To the scale of the noise: independent rows of variance one.
+  void whiten(double* rows, int stride) const { solve_lower(factor_.data(), size_, rows, stride); }
+
+  // Takes out a contact that is known: its wrench `w` on the body of `node`, `lag` [s] old.
+  void take_out(int node, const Spatial& w, double lag) {
+    double values[6];
+    store(w, values);
+    for (int i = 0; i < 6; ++i) {
+      wrench_[i] -= values[i];
+      raw_wrench_[i] -= values[i];
+    }
+    for (int i = 0; i < count_; ++i) {
+      const Row& r = *used_[i];
+      bool loaded;
+      own_[i] -= load(r, node, w, lag, loaded);
+      if (loaded || r.joint < 0) continue;
+      // A joint outboard of the contact: what the wrench says of it has not reached it.
+      for (int own : observer_.joints()[r.joint].nodes)
+        outboard_[i] += dot(earlier(posture_.subspace(own), own, lag), w);
+    }
+  }
+
+  // Widens the noise of all rows but forces by that of a moment of `sigma` [Nm]; `spread` follows.
+  void loosen_moments(double sigma) {
+    for (int i = has_wrench_ ? 3 : 0; i < size_; ++i) covariance_[i * (size_ + 1)] += sigma * sigma;
+  }
+
+  // Adds to the covariance the outer products of `count` vectors of all rows, one after the other;
+  // false if the rows cannot be weighed any more.
+  bool spread(const double* vectors, int count) {
+    for (int k = 0; k < count; ++k) {
+      const double* v = vectors + k * size_;
+      for (int i = 0; i < size_; ++i) {
+        for (int j = 0; j <= i; ++j) covariance_[i * size_ + j] += v[i] * v[j];
+      }
+    }
+    return factor();
   }
 
   // What all rows say of one contact on the body of `node`.
@@ -278,7 +337,37 @@ class Measurement {
         noise_.add_axis(first + i, r.sensor, r.axis, own_[i]);
       }
     }
-    return noise_.factor(size_, has_wrench_ ? 3 : 0, factor_.data());
+    noise_.covariance(size_, has_wrench_ ? 3 : 0, covariance_.data());
+    return factor();
+  }
+
+  bool factor() {
+    std::copy_n(covariance_.data(), size_ * size_, factor_.data());
+    return cholesky(factor_.data(), size_, 1e-15);
+  }
+
+  // How the twist along which a row measures was `lag` ago; it moves with the body of `node`.
+  Spatial earlier(const Spatial& s, int node, double lag) const {
+    const Spatial& v = posture_.twist(node);
+    return {s.linear - lag * (cross(v.angular, s.linear) + cross(v.linear, s.angular)),
+            s.angular - lag * cross(v.angular, s.angular)};
+  }
+
+  // What a wrench on the body of `node`, `lag` old, does to a row; `loaded`: is it felt there?
+  double load(const Row& r, int node, const Spatial& w, double lag, bool& loaded) const {
+    double sum = 0.0;
+    loaded = false;
+    if (r.joint < 0) {
+      const int own = observer_.sensors()[r.sensor].node;
+      loaded = observer_.layout().is_outboard(node, own);
+      return loaded ? dot(earlier(posture_.axis(own, r.axis), own, lag), w) : 0.0;
+    }
+    for (int own : observer_.joints()[r.joint].nodes) {
+      if (!observer_.layout().is_outboard(node, own)) continue;
+      sum += dot(earlier(posture_.subspace(own), own, lag), w);
+      loaded = true;
+    }
+    return sum;
   }
 
   const Observer& observer_;
@@ -296,7 +385,7 @@ class Measurement {
   std::vector<const Row*> used_;
   std::vector<double> own_;       // if the contact is inboard of the joint
   std::vector<double> outboard_;  // if it is outboard, less what the wrench says
-  std::vector<double> factor_, design_;
+  std::vector<double> covariance_, factor_, design_;
 };
 
 }  // namespace touchline

@@ -64,9 +64,9 @@ class RowNoise {
     }
   }
 
-  // The Cholesky factor (size, size) of the covariance of the first rows, of which `forces` are
-  // forces; false if there is none.
-  bool factor(int size, int forces, double* out) const {
+  // The lower triangle of the covariance (size, size) of the first rows, of which `forces` are
+  // forces.
+  void covariance(int size, int forces, double* out) const {
     for (int a = 0; a < size; ++a) {
       for (int b = 0; b <= a; ++b) {
         const double* x = coefficients_.data() + a * sources_;
@@ -78,7 +78,6 @@ class RowNoise {
       const double least = a < forces ? figures_.force : figures_.moment;
       out[a * size + a] += least * least;
     }
-    return cholesky(out, size, 1e-15);
   }
 
  private:

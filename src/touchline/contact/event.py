@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from touchline.contact.classification import Classes, Kind
 from touchline.contact.contact import Candidate
 from touchline.contact.detector import Detection, Detector
-from touchline.contact.localizer import EventAnswer, Localizer
+from touchline.contact.localizer import CONTACT, FORCE, EventAnswer, Localizer
 from touchline.contact.zones import Zones
 from touchline.estimation.observer import Estimate
 
@@ -162,28 +162,45 @@ class _Gathered:
         return self._sum / max(self._count, 1)
 
 
+@dataclass(frozen=True)
+class _Part:
+    """Samples of one contact: `sample` (M,), `share` (M,) of the segment's load, native answers."""
+
+    sample: NDArray[np.int64]
+    share: Array
+    answers: Array
+
+
+def _shares(sample: NDArray[np.int64], segment: NDArray[np.int64], answers: Array) -> Array:
+    """The share (M,) that each contact has of the forces on its segment; 1 for the only one."""
+    size = np.linalg.norm(np.nan_to_num(answers[:, FORCE]), axis=1)
+    key = sample * (segment.max(initial=0) + 1) + segment
+    _, group, count = np.unique(key, return_inverse=True, return_counts=True)
+    total = np.bincount(group, size)[group] if len(size) else size
+    return np.where((count[group] > 1) & (total > 0.0), size / np.maximum(total, 1e-300), 1.0)
+
+
 class EventRecorder:
-    """Turns levels into events, for a live stream or for a recording read in parts.
+    """Turns contacts into events, for a live stream or for a recording read in parts.
 
     `events` are all events so far; those of `open_events()` still last.
 
     Args:
         detector: that judges the samples.
-        localizer: that follows the same samples, in the same parts; None: no places.
+        localizer: that follows the same samples, in the same parts.
     """
 
-    def __init__(self, detector: Detector, localizer: Localizer | None = None) -> None:
+    def __init__(self, detector: Detector, localizer: Localizer) -> None:
         self._localizer = localizer
         self.events: list[Event] = []
         self._robot = detector.observer.robot
         self._rows = detector.thresholds.rows
         self._zones = Zones(self._robot)
         self._open: dict[int, tuple[Event, _Gathered]] = {}
-        self._announced: dict[tuple[int, int], Event] = {}  # by segment and sample of a part
 
     def open_events(self) -> dict[int, Event]:
-        """Events that last, by number of their segment."""
-        return {segment: event for segment, (event, _) in self._open.items()}
+        """Events that last, by number of the contact."""
+        return {number: event for number, (event, _) in self._open.items()}
 
     def add(
         self,
@@ -192,7 +209,8 @@ class EventRecorder:
         estimate: Estimate,
         detection: Detection,
         classes: Classes,
-        ended: Array | None = None,
+        answers: Array,
+        ended: Array,
     ) -> NDArray[np.int64]:
         """Takes N samples: `time` (N,) [s], `q` (N, n), and what was made of them.
 
@@ -202,100 +220,84 @@ class EventRecorder:
             estimate: of these samples.
             detection: of these samples.
             classes: of these samples.
-            ended: the native events that ended, see `Localizer.follow`.
+            answers: (M, ...) the native answers, see `Localizer.follow`.
+            ended: the native events that ended.
 
         Returns:
-            (N, m) the number of the event on each segment, -1 where there is none.
+            (M,) the number of the event that each answer belongs to.
         """
-        ids = np.full(detection.levels.shape, -1)
-        self._announce(time, detection.levels)
-        for g in range(len(self._robot.segment_names)):
-            levels = detection.levels[:, g]
-            if g in self._open or levels.any():
-                places = [row[2:] for row in ended if row[1] == g] if ended is not None else []
-                self._add_segment(g, levels, time, q, estimate, detection, classes, ids, places)
+        sample, segment, number = (answers[:, i].astype(int) for i in range(CONTACT))
+        ids = np.full(len(answers), -1)
+        shares = _shares(sample, segment, answers[:, CONTACT:])
+        _, first = np.unique(number, return_index=True)
+        for row in np.sort(first).tolist():
+            contact = int(number[row])
+            own = np.flatnonzero(number == contact)
+            g = int(segment[row])
+            event, gathered = self._opened(contact, g, float(time[sample[row]]))
+            ids[own] = event.id
+            part = _Part(sample[own], shares[own], answers[own, CONTACT:])
+            self._extend(event, gathered, g, part, q, estimate, detection)
+            _classify(event, time, classes, part.sample, g)
+        for row in ended:
+            self._close(int(row[2]), float(time[int(row[0])]), row[CONTACT:])
         return ids
 
     def locate_open(self) -> None:
         """Brings the places of the events that last up to date."""
-        if self._localizer is None:
-            return
-        for g, (event, _) in self._open.items():
-            self._place(event, self._localizer.event(g))
+        for number, answer in self._localizer.open_events().items():
+            if number in self._open:
+                self._place(self._open[number][0], answer)
 
     def _place(self, event: Event, answer: EventAnswer) -> None:
         for name, value in vars(answer).items():
             setattr(event, name, value)
         event.zone = self._zones.of(event.segment, event.link)
 
-    def _announce(self, time: Array, levels: Array) -> None:
-        """Numbers the events that begin in these samples in the order in which they do."""
-        active = levels > 0
-        before = np.zeros_like(active[:1])
-        before[:, list(self._open)] = True
-        rises = np.argwhere(active & ~np.vstack([before, active[:-1]]))
-        self._announced = {}
-        for row, g in rises.tolist():
-            name = self._robot.segment_names[g]
-            event = Event(len(self.events), name, "contact", float(time[row]))
-            event.zone = self._zones.of(name)
+    def _opened(self, number: int, g: int, time: float) -> tuple[Event, "_Gathered"]:
+        if number not in self._open:
+            event = Event(len(self.events), self._robot.segment_names[g], "contact", time)
+            event.zone = self._zones.of(event.segment)
             self.events.append(event)
-            self._announced[g, row] = event
+            gathered = _Gathered(len(self._rows) + 3, len(self._robot.joint_names))
+            self._open[number] = (event, gathered)
+        return self._open[number]
 
-    def _add_segment(
+    def _close(self, number: int, time: float, place: Array) -> None:
+        event, gathered = self._open.pop(number)
+        event.cleared = time
+        self._place(event, self._localizer.event_answer(place))
+        self._name_joint(event, gathered)
+
+    def _extend(
         self,
+        event: Event,
+        gathered: _Gathered,
         g: int,
-        levels: Array,
-        time: Array,
+        part: "_Part",
         q: Array,
         estimate: Estimate,
         detection: Detection,
-        classes: Classes,
-        ids: NDArray[np.int64],
-        places: list[Array],
     ) -> None:
-        active = levels > 0
-        edges = np.flatnonzero(np.diff(active.astype(int), prepend=int(g in self._open)))
-        bounds = sorted({0, *edges.tolist(), len(time)})  # an edge may be the first sample
-        for start, stop in zip(bounds[:-1], bounds[1:], strict=True):
-            if start in edges and not active[start]:
-                self._close(g, float(time[start]), places)
-            if start == stop or not active[start]:
-                continue
-            if g not in self._open:
-                event = self._announced[g, start]
-                gathered = _Gathered(len(self._rows) + 3, len(self._robot.joint_names))
-                self._open[g] = (event, gathered)
-            ids[start:stop, g] = self._open[g][0].id
-            self._extend(g, slice(start, stop), q, estimate, detection)
-            _classify(self._open[g][0], time, classes, slice(start, stop), g)
-
-    def _close(self, g: int, time: float, places: list[Array]) -> None:
-        event, _ = self._open.pop(g)
-        event.cleared = time
-        if self._localizer is not None and places:
-            self._place(event, self._localizer.event_answer(places.pop(0)))
-
-    def _extend(
-        self, g: int, part: slice, q: Array, estimate: Estimate, detection: Detection
-    ) -> None:
-        event, gathered = self._open[g]
         own = np.array([row.segment == g for row in self._rows])
-        normalized = detection.normalized[part]
-        wrenches = estimate.segment_wrench[part, g]
+        normalized = detection.normalized[part.sample]
+        alone = part.share == 1.0
+        wrenches = estimate.segment_wrench[part.sample, g].copy()
+        wrenches[~alone, :3] = part.answers[~alone, FORCE]
+        strength = part.share * np.abs(normalized[:, own]).max(axis=1)
         forces = np.nan_to_num(wrenches[:, :3])
-        gathered.add_rows(np.abs(normalized[:, own]).max(axis=1), np.hstack([normalized, forces]))
-        gathered.add_peaks(wrenches, q[part], estimate.tau_ext[part])
+        gathered.add_rows(strength, np.hstack([normalized, forces]))
+        gathered.add_peaks(wrenches, q[part.sample], estimate.tau_ext[part.sample])
         if event.segment != "root":
             event.force, event.force_peak = gathered.mean[-3:], gathered.force
-        self._name_joint(event, g, gathered)
+        self._name_joint(event, gathered)
 
-    def _name_joint(self, event: Event, g: int, gathered: _Gathered) -> None:
+    def _name_joint(self, event: Event, gathered: _Gathered) -> None:
         mean, names = gathered.mean, self._robot.joint_names
         loaded = [
             (row.joint, abs(mean[i]))
             for i, row in enumerate(self._rows)
-            if row.segment == g and row.joint >= 0
+            if self._robot.segment_names[row.segment] == event.segment and row.joint >= 0
         ]
         beyond = [joint for joint, x in loaded if x > 1.0]
         if beyond:

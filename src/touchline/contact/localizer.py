@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 RULES = ("likelihood", "paper")
 STATUS = (None, "located", "ambiguous", "not_separable", "wrench_only")
 TORQUE_ERROR = 0.02  # a joint's torque sensor is no better, and a touch is no point
+CONTACT = 3  # numbers before an answer or an event: sample, segment, number of the contact
+FORCE = slice(7, 10)  # in an answer
 HEAD, PER_CANDIDATE = 23, 6  # numbers of a native answer (see core/contact_bindings.hpp)
 
 
@@ -151,9 +153,10 @@ class Localizer:
         """Takes N samples: answers where a segment is touched, and keeps track of the events.
 
         Returns:
-            (M, 2 + w): sample, segment, then a native answer for `answer`; one row for each sample
-            and touched segment. And (E, 2 + v): sample, segment, then a native event, for
-            `event_answer`, of each event that ended.
+            (M, 3 + w): sample, segment, number of the contact, then a native answer for `answer`;
+            one row for each sample and contact on a touched segment. And (E, 3 + v): sample,
+            segment, number of the contact, then a native event, for `event_answer`, of each event
+            that ended.
         """
         return self.core.follow(
             np.ascontiguousarray(time, float),
@@ -180,9 +183,9 @@ class Localizer:
             np.exp(cells[:, 5]),
         )
 
-    def event(self, segment: int) -> EventAnswer:
-        """The event on a segment, by its index, that is touched or was last."""
-        return self.event_answer(self.core.event(segment)[0])
+    def open_events(self) -> dict[int, EventAnswer]:
+        """The events that last, by the number of the contact."""
+        return {int(row[2]): self.event_answer(row[CONTACT:]) for row in self.core.events()}
 
     def event_answer(self, row: Array) -> EventAnswer:
         """Names the numbers of a native event."""

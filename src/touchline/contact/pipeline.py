@@ -10,7 +10,7 @@ from touchline.contact.classification import Classes, Classifier, Kind
 from touchline.contact.contact import Contact
 from touchline.contact.detector import Detection, Detector
 from touchline.contact.event import Event, EventRecorder
-from touchline.contact.localizer import TORQUE_ERROR, Localizer
+from touchline.contact.localizer import CONTACT, TORQUE_ERROR, Localizer
 from touchline.contact.skin import Skin
 from touchline.contact.table import ContactTable
 from touchline.contact.zones import Zones
@@ -28,7 +28,7 @@ class Result:
 
     Attributes:
         estimate: torques and wrenches.
-        contacts: one per segment that is touched.
+        contacts: at least one per segment that is touched.
         detection: levels per segment.
         health: health bits of the sample (`touchline.Health`).
     """
@@ -120,19 +120,17 @@ class Pipeline:
     ) -> tuple[Estimate, Detection]:
         """Takes a recording or the next part of one.
 
-        Afterwards `contacts` holds a row for each touched segment and sample of this part, and
-        `events` tells what was found so far.
+        Afterwards `contacts` holds a row for each contact and sample of this part, and `events`
+        tells what was found so far.
         """
         self._record()
         estimate, detection = self.detector.run(time, q, qd, tau, wrench)
         stamps, q, qd = (np.asarray(signal, dtype=float) for signal in (time, q, qd))
         answers, ended = self.localizer.follow(stamps, q, qd, estimate, detection)
         classes = self.classifier.follow(stamps, estimate, detection.levels)
-        ids = self.recorder.add(stamps, q, estimate, detection, classes, ended)
+        ids = self.recorder.add(stamps, q, estimate, detection, classes, answers, ended)
         sample, segment = answers[:, 0].astype(int), answers[:, 1].astype(int)
-        self.contacts = ContactTable(
-            sample, segment, ids[sample, segment], answers[:, 2:], self.localizer
-        )
+        self.contacts = ContactTable(sample, segment, ids, answers[:, CONTACT:], self.localizer)
         if len(stamps):
             self._touched = detection.levels[-1].tobytes()
         return estimate, detection
@@ -143,8 +141,9 @@ class Pipeline:
         answers, ended = self.localizer.follow(stamp, q, qd, estimate, detection)
         batch = self.observer.estimate(estimate.rows[None])
         classes = self.classifier.follow(stamp, batch, detection.levels[None])
-        self._pending.append((time, q.copy(), estimate.rows, detection, classes, ended))
-        if touched != self._touched or len(self._pending) >= PENDING:
+        self._pending.append((time, q.copy(), estimate.rows, detection, classes, answers, ended))
+        new = set(answers[:, 2].astype(int)) - self.recorder.open_events().keys()
+        if new or len(ended) or touched != self._touched or len(self._pending) >= PENDING:
             self._record()
         return [self._contact(row, estimate, classes) for row in answers]
 
@@ -152,25 +151,30 @@ class Pipeline:
         """Hands the samples of a live stream on to the events."""
         if not self._pending:
             return
-        times, qs, rows, detections, classes, ended = zip(*self._pending, strict=True)
+        times, qs, rows, detections, classes, answers, ended = zip(*self._pending, strict=True)
         self._pending = []
+        for sample, part in enumerate(answers):
+            part[:, 0] = sample
         levels = np.array([detection.levels for detection in detections])
         normalized = np.array([detection.normalized for detection in detections])
         quiet = np.array([detection.quiet for detection in detections])
+        for sample, part in enumerate(ended):
+            part[:, 0] = sample
         self.recorder.add(
             np.array(times),
             np.array(qs),
             self.observer.estimate(np.array(rows)),
             Detection(levels, normalized, quiet),
             Classes.joined(classes),
+            np.concatenate(answers),
             np.concatenate(ended),
         )
 
     def _contact(self, row: Array, estimate: Estimate, classes: Classes) -> Contact:
         g = int(row[1])
         kind = int(classes.kinds[0, g])
-        event = self.recorder.open_events()[g]
-        answer = self.localizer.answer(row[2:])
+        event = self.recorder.open_events()[int(row[2])]
+        answer = self.localizer.answer(row[CONTACT:])
         return Contact(
             event.segment,
             event.id,

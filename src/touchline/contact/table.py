@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The contacts of a recording as columns: one row per touched segment and sample."""
+"""The contacts of a recording as columns: one row per contact and sample."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.localizer import HEAD, STATUS, Localizer
+from touchline.contact.localizer import FORCE, HEAD, STATUS, Localizer
 
 Array = NDArray[np.float64]
 
 SURFACE, NODE, PROBABILITY = 1, 2, 3  # columns of a native answer
-POSITION, FORCE, COVARIANCE = slice(4, 7), slice(7, 10), slice(10, 19)
+POSITION, COVARIANCE = slice(4, 7), slice(10, 19)
 UPPER = {"pxx": 0, "pxy": 1, "pxz": 2, "pyy": 4, "pyz": 5, "pzz": 8}
 
 

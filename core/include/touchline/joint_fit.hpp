@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+// Several contacts whose places are known explain one measurement: their forces, and small shifts
+// of their places, from a linear Gaussian model,
+//   rows = sum of H_c (p_c) (f_c + df_c) + G_c dp_c + noise,   df_c ~ (0, s_c^2),  dp_c ~ (0, P_c).
+// No allocation after construction.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "touchline/known_contact.hpp"
+#include "touchline/measurement.hpp"
+
+namespace touchline {
+
+class JointFit {
+ public:
+  static constexpr int kMost = 4, kEach = 5;  // contacts; unknowns of each
+
+  JointFit(const Posture& posture, const LinkSurfaces& surfaces, std::size_t rows)
+      : posture_(posture),
+        surfaces_(surfaces),
+        rows_(rows * (kEach * kMost + 1)),
+        loose_(rows * (kEach * kMost + 1)) {}
+
+  // Where a contact was at the time that its force speaks of [world].
+  Vec3 earlier(const KnownContact& k) const {
+    const Vec3 p = surfaces_.to_world(k.point, k.node);
+    const Spatial& v = posture_.twist(k.node);
+    return p - k.lag * (v.linear + cross(v.angular, p));
+  }
+
+  // Widens the noise of the rows by what is not known of how the contacts moved in the meantime.
+  void allow_for_motion(const KnownContact* known, int count, Measurement& measurement) const {
+    double moment = 0.0;
+    for (int c = 0; c < count; ++c) {
+      const Vec3 way = surfaces_.to_world(known[c].point, known[c].node) - earlier(known[c]);
+      moment += kUncertainWay * norm(way) * norm(known[c].force);
+    }
+    if (moment > 1e-6) measurement.loosen_moments(moment);
+  }
+
+  // The best explanation of `measurement` with standard deviations `sigma` of the forces [N] about
+  // their last values; returns the squared distance of the measurement from its prediction, a
+  // chi-squared variable of as many degrees of freedom as there are rows.
+  double fit(const Measurement& measurement, const KnownContact* known, int count,
+             const double* sigma) {
+    count_ = count;
+    const int n = kEach * count;
+    fill(measurement, known, count);
+    double* b = solution_;
+    for (int i = 0; i < n; ++i) b[i] = 0.0;
+    std::fill(factor_, factor_ + n * n, 0.0);
+    double cost = 0.0;
+    for (int r = 0; r < measurement.size(); ++r) {
+      const double* d = rows_.data() + r * (n + 1);
+      for (int i = 0; i < n; ++i) {
+        b[i] += d[i] * d[n];
+        for (int j = 0; j <= i; ++j) factor_[i * n + j] += d[i] * d[j];
+      }
+      cost += d[n] * d[n];
+    }
+    for (int c = 0; c < count; ++c) {
+      double* to = factor_ + kEach * c * (n + 1);
+      for (int i = 0; i < 3; ++i) to[i * (n + 1)] += 1.0 / (sigma[c] * sigma[c]);
+      const Spread prior = known[c].place.inverse();
+      to[3 * (n + 1)] += prior.a;
+      to[4 * n + 3] += prior.b;
+      to[4 * (n + 1)] += prior.c;
+    }
+    double rhs[kEach * kMost];
+    std::copy(b, b + n, rhs);
+    if (!cholesky(factor_, n)) return std::numeric_limits<double>::infinity();
+    solve_cholesky(factor_, n, b);
+    for (int i = 0; i < n; ++i) cost -= rhs[i] * b[i];
+    return cost;
+  }
+
+  // Takes the last fit over: forces, and of the places the part `independence` that a sample of
+  // filtered rows brings; `drift`: how fast places may move, as a variance [m2].
+  void apply(KnownContact* known, double independence, double drift) const {
+    for (int c = 0; c < count_; ++c) {
+      const double* x = solution_ + kEach * c;
+      known[c].force = known[c].force + Vec3{x[0], x[1], x[2]};
+      move(known[c], x[3], x[4], place_after(c), independence, drift);
+    }
+  }
+
+  // Standard deviation of the force of a contact after the last fit [N], in its worst direction at
+  // most.
+  double force_sigma(int c) const {
+    double sum = 0.0;
+    for (int i = 0; i < 3; ++i) sum += variance(kEach * c + i, kEach * c + i);
+    return std::sqrt(sum);
+  }
+
+  // How uncertain contacts are, as vectors whose outer products add up to the covariance of the
+  // unknowns; valid for the contacts of the fit that it was taken from.
+  struct Uncertainty {
+    int size = 0;
+    double root[kEach * kMost * kEach * kMost];  // columns of the inverse, transposed factor
+  };
+  void uncertainty(Uncertainty& out) const {
+    const int n = out.size = kEach * count_;
+    for (int k = 0; k < n; ++k) {
+      double* x = out.root + k * n;  // L^-T e_k
+      for (int i = 0; i < n; ++i) x[i] = i == k ? 1.0 : 0.0;
+      for (int i = n - 1; i >= 0; --i) {
+        double s = x[i];
+        for (int j = i + 1; j < n; ++j) s -= factor_[j * n + i] * x[j];
+        x[i] = s / factor_[i * n + i];
+      }
+    }
+  }
+
+  // Takes contacts out of a measurement, with their uncertainty; false if nothing can be weighed.
+  bool take_out(const KnownContact* known, int count, const Uncertainty& uncertainty,
+                Measurement& measurement) {
+    const int n = kEach * count, rows = measurement.size();
+    allow_for_motion(known, count, measurement);
+    for (int c = 0; c < count; ++c) columns(measurement, known[c], rows_.data() + kEach * c, n);
+    for (int c = 0; c < count; ++c)
+      measurement.take_out(known[c].node, wrench(known[c]), known[c].lag);
+    for (int k = 0; k < n; ++k) {
+      double* column = loose_.data() + k * rows;
+      for (int r = 0; r < rows; ++r) {
+        column[r] = 0.0;
+        for (int i = 0; i < n; ++i)
+          column[r] += rows_[r * n + i] * uncertainty.root[k * n + i];
+      }
+    }
+    return measurement.spread(loose_.data(), n);
+  }
+
+ private:
+  static constexpr double kUncertainWay = 0.1;  // of the way that a contact has come
+  static constexpr double kSharpest = 1e-8;     // variance of a place [m2]
+
+  Spatial wrench(const KnownContact& k) const {
+    const Vec3 p = earlier(k);
+    return {k.force, cross(p, k.force)};
+  }
+
+  // What force and shift of a contact do to the rows, in columns of a matrix of that width.
+  void columns(const Measurement& m, const KnownContact& k, double* out, int width) const {
+    const Vec3 p = earlier(k);
+    const Vec3 unit[3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
+    for (int i = 0; i < 3; ++i) m.load(k.node, {unit[i], cross(p, unit[i])}, k.lag, out + i, width);
+    Vec3 s[2];
+    tangents(k.normal, s[0], s[1]);
+    for (int i = 0; i < 2; ++i) {
+      const Vec3 along = surfaces_.turn_to_world(s[i], k.node);
+      m.load(k.node, {{}, cross(along, k.force)}, k.lag, out + 3 + i, width);
+    }
+  }
+
+  // The whitened model, and in the last column what the last values leave unexplained.
+  void fill(const Measurement& m, const KnownContact* known, int count) {
+    const int n = kEach * count, width = n + 1;
+    double* d = rows_.data();
+    for (int c = 0; c < count; ++c) columns(m, known[c], d + kEach * c, width);
+    m.values(d + n, width);
+    for (int r = 0; r < m.size(); ++r) {
+      double* row = d + r * width;
+      for (int c = 0; c < count; ++c) {
+        const Vec3& f = known[c].force;
+        row[n] -= row[kEach * c] * f.x + row[kEach * c + 1] * f.y + row[kEach * c + 2] * f.z;
+      }
+    }
+    for (int i = 0; i < width; ++i) m.whiten(d + i, width);
+  }
+
+  // An element of the covariance after the fit.
+  double variance(int i, int j) const {
+    const int n = kEach * count_;
+    double x[kEach * kMost] = {};
+    x[i] = 1.0;
+    solve_cholesky(factor_, n, x);
+    return x[j];
+  }
+
+  Spread place_after(int c) const {
+    const int s = kEach * c + 3, t = s + 1;
+    return {variance(s, s), variance(s, t), variance(t, t)};
+  }
+
+  // The shift that the sample's own part of the information leads to.
+  void move(KnownContact& k, double along, double across, const Spread& after, double independence,
+            double drift) const {
+    const Spread prior = k.place.inverse(), information = after.inverse();
+    const Spread gain = information.plus(prior, -1.0);
+    const double x = independence * (information.a * along + information.b * across);
+    const double y = independence * (information.b * along + information.c * across);
+    k.place = prior.plus(gain, independence).inverse();
+    const double ds = k.place.a * x + k.place.b * y, dt = k.place.b * x + k.place.c * y;
+    k.place.a += drift;
+    k.place.c += drift;
+    k.place.a = std::max(k.place.a, kSharpest);
+    k.place.c = std::max(k.place.c, kSharpest);
+    if (std::fabs(ds) + std::fabs(dt) < 1e-7) return;
+    Vec3 s, t;
+    tangents(k.normal, s, t);
+    const SurfacePoint p =
+        surfaces_[k.surface].mesh.nearest_to_point(k.point + ds * s + dt * t, 0.06);
+    if (p.face < 0) return;
+    k.point = p.point;
+    k.normal = p.normal;
+  }
+
+  const Posture& posture_;
+  const LinkSurfaces& surfaces_;
+  int count_ = 0;
+  std::vector<double> rows_, loose_;
+  double factor_[kEach * kMost * kEach * kMost], solution_[kEach * kMost];
+};
+
+}  // namespace touchline

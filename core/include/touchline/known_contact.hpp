@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+// A contact whose place on its link is known, while its force may change. No allocation.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "touchline/answer.hpp"
+#include "touchline/link_surfaces.hpp"
+
+namespace touchline {
+
+// How old that is which a filtered force w speaks of:
+//   int K exp(-K a) a w(t - a) da / int K exp(-K a) w(t - a) da.
+// A second filter in series tells, also while the force grows; a steady one is 1 / K old.
+class Age {
+ public:
+  void restart(double time) {
+    twice_ = {};
+    time_ = time;
+  }
+  // In parts of 1 / K.
+  double follow(const Vec3& force, double bandwidth, double time) {
+    const double size2 = dot(force, force);
+    if (!(size2 > 0.0)) return 0.0;
+    const double keep = std::exp(-bandwidth * std::max(0.0, time - time_));
+    twice_ = keep * twice_ + (1.0 - keep) * force;
+    time_ = time;
+    return std::clamp(dot(twice_, force) / size2, 0.0, kOldest);
+  }
+
+ private:
+  static constexpr double kOldest = 5.0;  // what is left of a force by then is hardly felt
+  Vec3 twice_;
+  double time_ = 0.0;
+};
+
+// Symmetric, of the two tangent coordinates of a place [m2].
+struct Spread {
+  double a = 0.0, b = 0.0, c = 0.0;  // 00, 01, 11
+  double determinant() const { return a * c - b * b; }
+  Spread inverse() const {
+    const double d = 1.0 / determinant();
+    return {d * c, -d * b, d * a};
+  }
+  Spread plus(const Spread& o, double factor = 1.0) const {
+    return {a + factor * o.a, b + factor * o.b, c + factor * o.c};
+  }
+  double trace() const { return a + c; }
+};
+
+struct KnownContact {
+  int serial = -1, surface = -1, node = -1;
+  Vec3 point, normal;  // in the frame of the node
+  Vec3 force;          // in world [N]
+  Spread place;        // in the tangents of `normal`
+  double lag = 0.0;    // how old that is which the force speaks of [s]
+  Age age;
+  double gone = 0.0;   // since when there is no force [s]; 0: there is
+  // What was said when it was found: its other explanations keep their places on their links.
+  Status status = Status::located;
+  double body_probability = 1.0;
+  int count = 0;
+  struct Other {
+    int surface, node;
+    Vec3 point;  // in the frame of the node
+    double weight;
+  } others[Answer::kCandidates];
+};
+
+// Takes over what was said of a contact at one instant.
+inline void keep(const Answer& answer, const LinkSurfaces& surfaces, KnownContact& known) {
+  const Candidate& best = answer.candidates[0];
+  known.surface = best.surface;
+  known.node = surfaces[best.surface].node;
+  known.point = surfaces.to_node(best.point, known.node);
+  known.normal = surfaces.turn_to_node(best.normal, known.node);
+  known.force = best.fit.force;
+  known.status = answer.status;
+  known.body_probability = answer.body_probability;
+  known.count = answer.count;
+  for (int i = 0; i < answer.count; ++i) {
+    const Candidate& k = answer.candidates[i];
+    const int node = surfaces[k.surface].node;
+    known.others[i] = {k.surface, node, surfaces.to_node(k.point, node), k.weight};
+  }
+  // The covariance, in the tangents of the node's frame.
+  Vec3 world[2], own[2];
+  tangents(best.normal, world[0], world[1]);
+  tangents(known.normal, own[0], own[1]);
+  double turn[2][2];
+  for (int i = 0; i < 2; ++i) {
+    const Vec3 along = surfaces.turn_to_world(own[i], known.node);
+    for (int k = 0; k < 2; ++k) turn[i][k] = dot(along, world[k]);
+  }
+  const auto element = [&](int i, int k) {
+    return turn[i][0] * (best.along[0] * turn[k][0] + best.along[1] * turn[k][1]) +
+           turn[i][1] * (best.along[1] * turn[k][0] + best.along[2] * turn[k][1]);
+  };
+  known.place = {element(0, 0), element(0, 1), element(1, 1)};
+}
+
+// What is said of a known contact now.
+inline void report(const KnownContact& known, const LinkSurfaces& surfaces, Answer& answer) {
+  answer = Answer{};
+  answer.status = known.status;
+  answer.body_probability = known.body_probability;
+  answer.force = known.force;
+  answer.count = std::max(known.count, 1);
+  for (int i = 0; i < known.count; ++i) {
+    const KnownContact::Other& other = known.others[i];
+    Candidate& k = answer.candidates[i];
+    k.surface = other.surface;
+    k.point = surfaces.to_world(other.point, other.node);
+    k.weight = other.weight;
+  }
+  Candidate& best = answer.candidates[0];
+  best.surface = known.surface;
+  best.point = surfaces.to_world(known.point, known.node);
+  best.normal = surfaces.turn_to_world(known.normal, known.node);
+  best.fit.force = known.force;
+  if (known.count == 0) best.weight = 1.0;
+  best.along[0] = known.place.a;
+  best.along[1] = known.place.b;
+  best.along[2] = known.place.c;
+  Vec3 own[2];
+  tangents(known.normal, own[0], own[1]);
+  const Vec3 s = surfaces.turn_to_world(own[0], known.node);
+  const Vec3 t = surfaces.turn_to_world(own[1], known.node);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      const double si = component(s, i), sj = component(s, j);
+      const double ti = component(t, i), tj = component(t, j);
+      answer.covariance[3 * i + j] = known.place.a * si * sj +
+                                     known.place.b * (si * tj + ti * sj) + known.place.c * ti * tj;
+    }
+  }
+  answer.spread = std::sqrt(known.place.trace());
+}
+
+}  // namespace touchline
