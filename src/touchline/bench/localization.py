@@ -18,7 +18,14 @@ from time import perf_counter
 import numpy as np
 
 from touchline.bench.arm import ARMS
-from touchline.bench.localization_table import failures, published, rank_table, tables
+from touchline.bench.localization_baselines import BASELINES
+from touchline.bench.localization_table import (
+    baseline_table,
+    failures,
+    published,
+    rank_table,
+    tables,
+)
 from touchline.bench.localization_trial import (
     Cell,
     Trial,
@@ -45,6 +52,7 @@ class Plan:
         speeds: of the joints [rad/s].
         runs: per cell.
         seed: of all that is random.
+        baselines: names of those that run along.
     """
 
     robots: tuple[str, ...] = ARMS
@@ -54,6 +62,7 @@ class Plan:
     speeds: tuple[float, ...] = (0.0,)
     runs: int = 1000
     seed: int = 0
+    baselines: tuple[str, ...] = tuple(BASELINES)
 
     def cells(self) -> list[Cell]:
         """Every combination that there is."""
@@ -76,7 +85,7 @@ def run_plan(plan: Plan, processes: int | None = None) -> Iterator[list[Trial]]:
         processes: default: one for each core; 0: in this process.
     """
     chunks = [
-        (cell, range(start, min(start + CHUNK, plan.runs)), plan.seed)
+        (cell, range(start, min(start + CHUNK, plan.runs)), plan.seed, plan.baselines)
         for cell in plan.cells()
         for start in range(0, plan.runs, CHUNK)
     ]
@@ -93,8 +102,8 @@ def run_plan(plan: Plan, processes: int | None = None) -> Iterator[list[Trial]]:
             pool.shutdown(cancel_futures=True)
 
 
-def _run_chunk(cell: Cell, runs: range, seed: int) -> list[Trial]:
-    return [run_trial(cell, run, seed) for run in runs]
+def _run_chunk(cell: Cell, runs: range, seed: int, baselines: tuple[str, ...]) -> list[Trial]:
+    return [run_trial(cell, run, seed, baselines) for run in runs]
 
 
 def update_time(cell: Cell, seed: int = 0, runs: int = TIMED) -> float:
@@ -129,7 +138,8 @@ def main(plan: Plan | None = None, out: Path | None = None, processes: int | Non
     order = {cell: i for i, cell in enumerate(cells)}
     trials.sort(key=lambda trial: (order[trial.cell], trial.run))
     times = {cell: update_time(cell, plan.seed) for cell in cells}
-    parts = [tables(trials, times), rank_table(trials), published(), failures(trials)]
+    parts = [tables(trials, times), published(), rank_table(trials), baseline_table(trials)]
+    parts.append(failures(trials))
     text = "\n\n".join(part for part in parts if part)
     print(text)
     if out is not None:

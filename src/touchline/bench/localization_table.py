@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.bench.arm import TIERS
+from touchline.bench.localization_baselines import BASELINES
 from touchline.bench.localization_trial import GROSS, NEAR, Cell, Touched, Trial
 from touchline.bench.tables import Row, aligned
 
@@ -85,6 +86,32 @@ def rank_table(trials: Iterable[Trial]) -> str:
         rows.append((arm, str(TIERS[tier]), name, str(len(own)), *shares))
     legend = "rank: independent equations of a pair on one segment; two contacts need 10"
     return f"{aligned(rows, text_columns=(0, 1))}\n{legend}"
+
+
+def baseline_table(trials: Iterable[Trial]) -> str:
+    """Every baseline beside our estimator on the same runs; empty without baselines."""
+    rows: list[Row] = [("arm", "noise", "contacts", "begin", "method", "runs", "found", "> 10 cm",
+                        "median", "RMS found")]  # fmt: skip
+    groups: dict[tuple[Cell, str], list[Trial]] = {}
+    for trial in trials:
+        for name, _ in trial.baselines:
+            groups.setdefault((trial.cell, name), []).append(trial)
+    for (cell, name), own in groups.items():
+        errors = np.array([dict(trial.baselines)[name] for trial in own])
+        ours = np.array([[touch.error for touch in trial.touches] for trial in own])
+        for method, error in ((BASELINES[name], errors), ("  ours, on these runs", ours)):
+            near = error < NEAR
+            rows.append((
+                cell.arm, str(TIERS[cell.tier]), str(cell.contacts), _timing(cell), method,
+                str(len(own)), _percent(np.mean(near.all(axis=1))),
+                _percent(np.mean(error > GROSS)),
+                _mm(np.nanmedian(error)) if np.isfinite(error).any() else "-",
+                _mm(_rms(error[near])),
+            ))  # fmt: skip
+    if len(rows) == 1:
+        return ""
+    legend = "here found does not mind what is named besides; lengths in mm"
+    return f"{aligned(rows, text_columns=(0, 1, 3, 4))}\n{legend}"
 
 
 def failures(trials: Iterable[Trial]) -> str:

@@ -14,13 +14,16 @@ from numpy.typing import NDArray
 
 from touchline.bench.arm import load_arm
 from touchline.bench.credibility import credibility
+from touchline.bench.localization_baselines import baseline_places
 from touchline.bench.matching import distances, match
 from touchline.bench.moving import moving_signals
 from touchline.bench.touches import Signals, Touch, TouchSampler, resting_signals
+from touchline.contact.detector import Detection
 from touchline.contact.event import Event
 from touchline.contact.localizer import Answer
 from touchline.contact.pipeline import Pipeline
 from touchline.contact.skin import Skin
+from touchline.estimation.observer import Estimate
 from touchline.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -91,7 +94,8 @@ class Trial:
     """One run: its touches, how many places the last sample names, and how many events there are.
 
     `rank` is the number of independent equations of a pair on one segment, which needs ten; 0
-    where the touches do not share one. `statuses` are those of all contacts at the last sample.
+    where the touches do not share one. `baselines` are names and errors [m].
+    `statuses` are those of all contacts at the last sample.
     """
 
     cell: Cell
@@ -157,13 +161,13 @@ def make_scene(cell: Cell, run: int, seed: int = 0) -> Scene:
     return Scene(onsets, signals)
 
 
-def run_trial(cell: Cell, run: int, seed: int = 0) -> Trial:
-    """One run through the whole pipeline."""
+def run_trial(cell: Cell, run: int, seed: int = 0, baselines: tuple[str, ...] = ()) -> Trial:
+    """One run through the whole pipeline, and through the named `BASELINES`."""
     robot, skin = arm_and_skin(cell.arm, cell.tier)
     scene = make_scene(cell, run, seed)
     pipeline = make_pipeline(robot, skin)
     s = scene.signals
-    pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+    estimate, detection = pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
     touches = tuple(_judge(pipeline, scene))
     answers = _last_answers(pipeline, scene)
     named = sum(answer.position is not None for answer in answers)
@@ -176,7 +180,24 @@ def run_trial(cell: Cell, run: int, seed: int = 0) -> Trial:
         len(pipeline.events),
         tuple(answer.status or "" for answer in answers),
         pair_rank(robot, [touch.body for touch in touches]),
+        tuple(
+            (name, errors)
+            for name in baselines
+            if (errors := _baseline(name, skin, scene, estimate, detection, run)) is not None
+        ),
     )
+
+
+def _baseline(
+    name: str, skin: Skin, scene: Scene, estimate: Estimate, detection: Detection, run: int
+) -> tuple[float, ...] | None:
+    """Errors [m] of a baseline, one per touch; NaN where it names too few places."""
+    named = baseline_places(name, skin, scene.signals, estimate, detection, run)
+    if named is None:
+        return None
+    apart = distances(true_places(skin.robot, scene, scene.signals.q[-1]), named)
+    mine = match(apart)
+    return tuple(np.nan if k is None else float(apart[i, k]) for i, k in enumerate(mine))
 
 
 def make_pipeline(robot: Robot, skin: Skin, rule: str = "likelihood") -> Pipeline:

@@ -26,6 +26,11 @@ def bench(
     seed: int = 0,
     encounters: int = 2,
     out: Annotated[Path | None, arg(metavar="DIR")] = None,
+    baselines: tuple[Literal["first", "nearest", "particles"], ...] = (
+        "first",
+        "nearest",
+        "particles",
+    ),
 ) -> int:
     """Measures speed and accuracy beside the peers that are installed.
 
@@ -44,6 +49,8 @@ def bench(
         seed: localization, wrench: of all that is random.
         encounters: reaction: collisions for each link and speed.
         out: localization, reaction, wrench: folder for the tables, every run, and figures.
+        baselines: localization: what runs along: the first entry of the line of force action, the
+            surface nearest to the line, a contact particle filter (on 100 runs a line).
     """
     wanted = names or NAMES
     if "observer" in wanted:
@@ -54,7 +61,7 @@ def bench(
         from touchline.bench.localization import Plan
         from touchline.bench.localization import main as measure_localization
 
-        plan = Plan(robots, contacts, noise, begin, speeds, runs, seed)
+        plan = Plan(robots, contacts, noise, begin, speeds, runs, seed, baselines)
         measure_localization(plan, out)
     if "reaction" in wanted:
         from touchline.bench.reaction import main as measure_reaction
