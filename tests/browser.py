@@ -174,7 +174,7 @@ class Browser:
 
     def text(self) -> str:
         """All that is written on the page."""
-        return self.run("document.body.innerText") or ""
+        return self.run("document.body && document.body.innerText") or ""
 
     def wait_for(self, text: str) -> None:
         """Until a text stands on the page."""
@@ -189,6 +189,22 @@ class Browser:
     def press(self, text: str) -> None:
         """Clicks on the element with a text."""
         self.click(*self.place(text))
+
+    def choose(self, label: str, option: str) -> None:
+        """Takes an option of the drop-down list with a label."""
+        found = self.run(
+            FIND_INPUT % (json.dumps("input:not([type=checkbox])"), *self.place(label))
+        )
+        assert found, f"nothing to choose beside '{label}'"
+        self.click(*found)
+        until(lambda: self.run(FIND % json.dumps(option)), pause=self.rest, what=f"'{option}'")
+        self.press(option)
+
+    def check(self, label: str) -> None:
+        """Clicks on the box with a label."""
+        found = self.run(FIND_INPUT % (json.dumps("input[type=checkbox]"), *self.place(label)))
+        assert found, f"no box beside '{label}'"
+        self.click(*found)
 
     def click(self, x: float, y: float) -> None:
         """Moves there and clicks [pixels]."""
@@ -265,6 +281,17 @@ FIND = """(() => {
   e.scrollIntoView({block: "nearest"});
   const box = e.getBoundingClientRect();
   return [box.x + box.width / 2, box.y + box.height / 2];
+})()"""
+
+
+# The input to the right of a label.
+FIND_INPUT = """(() => {
+  for (const e of document.querySelectorAll(%s)) {
+    const box = e.getBoundingClientRect();
+    if (box.x > %f && Math.abs(box.y + box.height / 2 - %f) < 12 && box.width > 0)
+      return [box.x + box.width / 2, box.y + box.height / 2];
+  }
+  return null;
 })()"""
 
 

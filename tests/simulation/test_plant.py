@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from robots import describe, random_mechanism, random_pose, random_robot
 
+import touchline as tl
 from touchline.errors import InputError
 from touchline.model.description import JointDescription
 from touchline.model.mechanism import Inertia, Mimic
@@ -15,7 +16,7 @@ from touchline.simulation.contacts import Profile, ScriptedContact, ScriptedForc
 from touchline.simulation.control import GravityCompensation, JointImpedance, hold
 from touchline.simulation.plant import Plant
 from touchline.simulation.setup import read_setup
-from touchline.simulation.simulator import Rates, run
+from touchline.simulation.simulator import Rates, Simulation, run
 
 
 def state(robot, seed=1):
@@ -136,3 +137,23 @@ def test_energy_grows_by_the_work_of_contacts_and_motors(sara):
 def test_rates_must_divide_the_physics(sara):
     with pytest.raises(ValueError, match="log rate 3000"):
         run(Plant(sara), GravityCompensation(), rates=Rates(3000))
+
+
+def test_a_simulation_in_parts_is_the_same_as_in_one():
+    robot = tl.load_robot("sara")
+    setup = read_setup(robot)
+
+    def simulation():
+        plant = Plant(robot, 2000.0)
+        plant.reset(setup.home, time=-1e-3)
+        controller = JointImpedance(hold(setup.home), setup.stiffness, setup.damping)
+        push = ScriptedContact("link4", (0, 0, 0.1), (15.0, 0, -5.0), Profile(0.02, 0.04))
+        return Simulation(plant, controller, [ScriptedForces([push])], Rates(1000.0, 500.0))
+
+    whole = simulation().advance(150)
+    other = simulation()
+    parts = [other.advance(rows) for rows in (1, 40, 59, 50)]
+    for of, names in ((0, ("time", "q", "qd", "link_torque", "wrench")), (1, ("link", "force"))):
+        for name in (*names, *(("wrench_mean",) if of else ())):
+            joined = np.concatenate([getattr(part[of], name) for part in parts])
+            assert np.array_equal(joined, getattr(whole[of], name), equal_nan=True), name

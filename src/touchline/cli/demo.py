@@ -6,30 +6,69 @@ from typing import Annotated
 
 from tyro.conf import arg
 
+from touchline.errors import InputError
+
+HEADLESS_DURATION = 12.0  # s
+
 
 def demo(
     headless: bool = False,
-    duration: Annotated[float, arg(metavar="S")] = 12.0,
+    duration: Annotated[float | None, arg(metavar="S")] = None,
     out: Annotated[Path, arg(metavar="DIR")] = Path("out/demo"),
     seed: int = 1,
+    host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1",
+    port: int = 8080,
+    browser: bool = True,
 ) -> int:
-    """Simulates the SARA-class arm being touched, analyzes it, and shows what was felt.
+    """Opens a page with the SARA-class arm, simulated live: push it, and see what it feels.
 
-    Example: touchline demo --headless --duration 8
+    Example: touchline demo
 
-    The arm moves, is touched near its base, then on the structure, the handle and the tool at
-    once, and on the upper arm. Estimates are compared with the truth of the simulation. Opens the
-    report in a browser.
+    Drag on the arm to pull it, click on it to push it. What the estimator feels is drawn beside
+    what is true; methods, noise and faults can be switched. Nothing leaves this machine. Ctrl-C
+    ends it.
+
+    With --headless, the arm moves and is touched near its base, then on the structure, the handle
+    and the tool at once, and on the upper arm; the log is analyzed, compared with the truth of the
+    simulation, and the table of errors is printed.
 
     Args:
-        headless: Print the table of errors only; no browser.
-        duration: Of the simulated recording [s].
-        out: Directory for the log and the results.
+        headless: No page: simulate, analyze, print.
+        duration: Of the recording with --headless [s], default 12; of the page, default: until
+            Ctrl-C.
+        out: Directory for the log and the results of --headless.
         seed: Of the motion, the places and the noise.
+        host: Address at which the page is served. Another than 127.0.0.1 lets other machines see
+            and push the arm: it needs the token that is then printed.
+        port: The first port that is tried.
+        browser: Open the page in the browser.
     """
-    import webbrowser
+    if headless:
+        return _print(HEADLESS_DURATION if duration is None else duration, out, seed)
+    if duration is not None and not duration > 0.0:
+        raise InputError(f"--duration {duration}: must be a positive number")
+    return _show(host, port, seed, browser, duration)
 
-    from touchline.errors import InputError
+
+def _show(host: str, port: int, seed: int, browser: bool, duration: float | None) -> int:
+    from touchline.view.server import PageServer, open_page
+
+    with PageServer("Touchline", host, port) as server:
+        from touchline.view.live import LivePage
+
+        print("preparing the arm ...", flush=True)
+        page = LivePage(server, seed)
+        print(f"the arm is at {server.url}\nCtrl-C ends it.", flush=True)
+        if browser:
+            open_page(server.url)
+        try:
+            page.run(float("inf") if duration is None else duration)
+        except KeyboardInterrupt:
+            print()
+    return 0
+
+
+def _print(duration: float, out: Path, seed: int) -> int:
     from touchline.logs import write_table
     from touchline.model.robot import load_robot
     from touchline.report.analysis import analyze
@@ -47,8 +86,5 @@ def demo(
     simulate_to_log("demo", robot, log, write_table, settings, {"seconds": duration})
     analysis = analyze(log, "sara", out)
     print(comparison_text(analysis.comparisons, analysis.events))
-    report = out / "report.html"
-    print(f"report: {report}")
-    if not headless:
-        webbrowser.open(report.resolve().as_uri())
+    print(f"report: {out / 'report.html'}")
     return 0

@@ -128,31 +128,38 @@ def no_touch(link: str) -> Touch:
     return Touch(False, link, NOTHING, NOTHING, NOTHING)
 
 
-class ScriptedForces:
-    """Applies scripted contacts to a plant, each held over a step."""
+class Forces:
+    """Applies forces to a plant, each held over a step.
+
+    Args:
+        idle: what each slot tells while nothing acts in it.
+    """
 
     physical = False
 
-    def __init__(self, contacts: Sequence[ScriptedContact]) -> None:
-        self.contacts = tuple(contacts)
-        self._idle = [no_touch(contact.link) for contact in self.contacts]
+    def __init__(self, idle: Sequence[Touch]) -> None:
+        self._idle = list(idle)
         self._touches = self._idle
         self._arms: dict[int, Array] = {}  # of active slots, from the centre of mass
 
     def __len__(self) -> int:
-        return len(self.contacts)
+        return len(self._idle)
+
+    def acting(self, slot: int, plant: Plant) -> Touch | None:
+        """What is to act in a slot from the plant's present time on."""
+        raise NotImplementedError
 
     def apply(self, plant: Plant) -> bool:
         """Sets the forces of the plant's present time; to be called after `evaluate`."""
         acted = bool(self._arms)
         for slot in self._arms:
-            plant.data.xfrc_applied[plant.bodies[self.contacts[slot].link]] = 0.0
+            plant.data.xfrc_applied[plant.bodies[self._touches[slot].link]] = 0.0
         self._arms = {}
         self._touches = list(self._idle)
-        for slot, contact in enumerate(self.contacts):
-            strength = contact.profile.at(plant.time)
-            if strength > 0.0:
-                self._touches[slot] = touch = _touch(contact, strength, plant)
+        for slot in range(len(self)):
+            touch = self.acting(slot, plant)
+            if touch is not None:
+                self._touches[slot] = touch
                 self._arms[slot] = _push(plant, touch)
         return acted or bool(self._arms)
 
@@ -170,6 +177,19 @@ class ScriptedForces:
             point = plant.data.xipos[plant.bodies[touch.link]] + arm
             now[slot] = Touch(True, touch.link, point, touch.force, touch.moment)
         return now
+
+
+class ScriptedForces(Forces):
+    """Applies scripted contacts to a plant."""
+
+    def __init__(self, contacts: Sequence[ScriptedContact]) -> None:
+        self.contacts = tuple(contacts)
+        super().__init__([no_touch(contact.link) for contact in self.contacts])
+
+    def acting(self, slot: int, plant: Plant) -> Touch | None:
+        """The contact of a slot while its profile is not over."""
+        strength = self.contacts[slot].profile.at(plant.time)
+        return _touch(self.contacts[slot], strength, plant) if strength > 0.0 else None
 
 
 def _push(plant: Plant, touch: Touch) -> Array:

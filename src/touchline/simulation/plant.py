@@ -79,6 +79,7 @@ class Plant:
         moved = any(j.torque == "motor" for j in joints)
         self._friction = _Friction(robot) if moved else None
         self._motor_torque = np.zeros(len(joints))
+        self._own_mass: dict[int, float] = {}
 
     def _set_couplings(self, joints: Mapping[str, int]) -> None:
         """Positions are P q + offset for the robot's coordinates, mimicking joints included."""
@@ -162,6 +163,13 @@ class Plant:
         m.jnt_stiffness[m.dof_jntid[self._dofs]], m.dof_damping[self._dofs] = stiffness, damping
         m.qpos_spring[self._dofs] = q
         return stiffness, damping
+
+    def load(self, link: str, mass: float) -> None:
+        """Lets a link carry a point mass [kg] at its centre of mass, besides its own mass."""
+        body = self.bodies[link]
+        own = self._own_mass.setdefault(body, float(self.model.body_mass[body]))
+        self.model.body_mass[body] = own + mass
+        self._mj.mj_setConst(self.model, self._mj.MjData(self.model))
 
     def accelerate(self) -> None:
         """Computes accelerations and contact forces for the inputs that are set."""

@@ -82,34 +82,70 @@ def run(
     Returns:
         Ideal readings and the truth, `seconds * log rate + 1` samples.
     """
-    log_stride, control_stride = (rates or Rates()).strides(plant.rate)
-    rows = 1 + round(seconds * plant.rate / log_stride)
-    stepper = _Stepper(plant, contacts, rows, log_stride)
-    command = np.zeros(len(plant.robot.joint_names))
-    for step in range(rows * log_stride + 1):
-        plant.evaluate()
-        row = step // log_stride - 1 if step % log_stride == 0 else -1
-        if step:
-            stepper.end_step(row)
-        if step % control_stride == 0:
-            command = controller.torque(plant)
-        stepper.begin_step(row, command)
-        if sampled is not None and row >= 0:
-            sampled(stepper.readings, row)
-        if step < rows * log_stride:
-            plant.integrate()
-    return stepper.readings, stepper.truth.truth
+    simulation = Simulation(plant, controller, contacts, rates, sampled)
+    log_stride = simulation.strides[0]
+    return simulation.advance(1 + round(seconds * plant.rate / log_stride))
+
+
+class Simulation:
+    """A simulation that goes on from one part of its log to the next.
+
+    Arguments as for `run`.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        controller: Controller,
+        contacts: Sequence[Contacts] = (),
+        rates: Rates | None = None,
+        sampled: Callable[[Readings, int], None] | None = None,
+    ) -> None:
+        self.plant, self.controller = plant, controller
+        self.strides = (rates or Rates()).strides(plant.rate)
+        self._sampled = sampled
+        self._stepper = _Stepper(plant, contacts, self.strides[0])
+        self._command = np.zeros(len(plant.robot.joint_names))
+        self._step = 0
+
+    def advance(self, rows: int) -> tuple[Readings, Truth]:
+        """Ideal readings and the truth of the next `rows` samples of the log."""
+        self._stepper.make_room(rows)
+        if self._step == 0:
+            self._visit(-1)
+        for row in range(rows):
+            for left in range(self.strides[0] - 1, -1, -1):
+                self.plant.integrate()
+                self._step += 1
+                self._visit(-1 if left else row)
+        return self._stepper.readings, self._stepper.truth.truth
+
+    def _visit(self, row: int) -> None:
+        """A state: the end of a physics step and the beginning of the next."""
+        self.plant.evaluate()
+        if self._step:
+            self._stepper.end_step(row)
+        if self._step % self.strides[1] == 0:
+            self._command = self.controller.torque(self.plant)
+        self._stepper.begin_step(row, self._command)
+        if self._sampled is not None and row >= 0:
+            self._sampled(self._stepper.readings, row)
 
 
 class _Stepper:
     """One physics step after the other, with what is recorded at its two ends."""
 
-    def __init__(self, plant: Plant, contacts: Sequence[Contacts], rows: int, stride: int) -> None:
+    def __init__(self, plant: Plant, contacts: Sequence[Contacts], stride: int) -> None:
         self._plant, self._contacts = plant, contacts
         self._physical = any(contact.physical for contact in contacts)
-        self.readings = Readings.empty(plant, rows)
         slots = sum(len(contact) for contact in contacts)
-        self.truth = TruthRecorder(tuple(plant.bodies), slots, rows, stride)
+        self.truth = TruthRecorder(tuple(plant.bodies), slots, stride)
+        self.make_room(0)
+
+    def make_room(self, rows: int) -> None:
+        """For the next samples of the log."""
+        self.readings = Readings.empty(self._plant, rows)
+        self.truth.make_room(rows)
 
     def _touches(self) -> list[Touch]:
         return [touch for contact in self._contacts for touch in contact.touches(self._plant)]

@@ -80,26 +80,30 @@ class Simulated:
 class TruthRecorder:
     """Collects a run's truth: at the log's instants, and the means over the time between."""
 
-    def __init__(self, links: tuple[str, ...], slots: int, rows: int, stride: int) -> None:
+    def __init__(self, links: tuple[str, ...], slots: int, stride: int) -> None:
+        self._links, self._slots = links, slots
         self._index = {name: i for i, name in enumerate(links)}
         self._weight = 0.5 / stride
-        none = np.full((rows, slots), -1)
-        three = (rows, slots, 3)
+        self.make_room(0)
+        self._clear()
+
+    def make_room(self, rows: int) -> None:
+        """For the next samples; the means over the time since the last one go on."""
+        none = np.full((rows, self._slots), -1)
+        three = (rows, self._slots, 3)
         self.truth = Truth(
-            links,
+            self._links,
             none,
             np.full(three, np.nan),
             np.zeros(three),
             np.zeros(three),
-            np.zeros((rows, slots, 6)),
+            np.zeros((rows, self._slots, 6)),
             none.copy(),
         )
-        self._clear()
 
     def _clear(self) -> None:
-        slots = self.truth.link.shape[1]
-        self._sum = np.zeros((slots, 6))
-        self._touched = [-1] * slots
+        self._sum = np.zeros((self._slots, 6))
+        self._touched = [-1] * self._slots
 
     def add(self, touches: list[Touch]) -> None:
         """What acts at either end of a physics step counts half."""

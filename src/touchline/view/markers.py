@@ -18,7 +18,9 @@ COLOURS: dict[str, Colour] = {
 }
 METRES_PER_NEWTON = 0.008
 WEAK = 0.5  # N; a smaller force has no arrow
-POINT_RADIUS, ARROW_RADIUS, HEAD_RADIUS, HEAD_LENGTH = 0.011, 0.007, 0.017, 0.045  # m
+POINT_RADIUS, ARROW_RADIUS, HEAD_RADIUS, HEAD_LENGTH = 0.011, 0.008, 0.019, 0.045  # m
+SLIM = 0.45  # of the true arrow, which is seen within the one that is felt
+CLEAR = 0.55  # opacity of the latter
 LINE = ((0.0, 0.0, -0.9), (0.0, 0.0, 0.9))  # m
 SIGMAS = 2.0  # radius of the disc
 SMALLEST_DISC, LARGEST_DISC, DISC_THICKNESS = 0.016, 0.4, 0.004  # m
@@ -38,14 +40,17 @@ class ContactMarker:
     def __init__(self, scene: viser.SceneApi, name: str, kind: str = "estimate") -> None:
         colour = COLOURS[kind]
         self._root = scene.add_frame(name, show_axes=False, visible=False)
-        self._point = scene.add_icosphere(f"{name}/point", POINT_RADIUS, color=colour)
         self._arrow = scene.add_frame(f"{name}/arrow", show_axes=False)
-        head = trimesh.creation.cone(HEAD_RADIUS, HEAD_LENGTH, sections=24)
+        slim, clear = (SLIM, None) if kind == "truth" else (1.0, CLEAR)
+        self._point = scene.add_icosphere(
+            f"{name}/point", (0.8 if kind == "truth" else 1.0) * POINT_RADIUS, color=colour
+        )
+        head = trimesh.creation.cone(slim * HEAD_RADIUS, HEAD_LENGTH, sections=24)
         head.apply_transform(np.diag([1.0, -1.0, -1.0, 1.0]))  # its tip at the origin, towards z
-        shaft = trimesh.creation.cylinder(ARROW_RADIUS, 1.0, sections=16)
+        shaft = trimesh.creation.cylinder(slim * ARROW_RADIUS, 1.0, sections=16)
         shaft.apply_translation((0.0, 0.0, -0.5))
-        _add(scene, f"{name}/arrow/head", head, colour)
-        self._shaft = _add(scene, f"{name}/arrow/shaft", shaft, colour)
+        _add(scene, f"{name}/arrow/head", head, colour, clear)
+        self._shaft = _add(scene, f"{name}/arrow/shaft", shaft, colour, clear)
         self._line = scene.add_line_segments(
             f"{name}/line", np.array([LINE]), colour, thickness=2.0, thickness_units="screen"
         )

@@ -16,7 +16,8 @@ from touchline.view.pose import quaternions
 Array = NDArray[np.float64]
 Colour = tuple[int, int, int]
 
-SHELL, TRIM, TINT = (241, 242, 244), (93, 100, 109), (255, 190, 110)
+SHELL, TRIM = (241, 242, 244), (93, 100, 109)
+TINT, ALARM = (255, 190, 110), (235, 90, 80)  # of links that are touched, or hit
 CREASE = np.deg2rad(35.0)  # edges sharper than this stay sharp
 GROUND = 4.0  # m
 
@@ -36,7 +37,7 @@ class RobotScene:
         self.robot, self._scene = robot, scene
         self.meshes: dict[str, list[viser.MeshHandle]] = {}
         self._frames: dict[str, viser.FrameHandle] = {}
-        self._tinted: frozenset[str] = frozenset()
+        self._tinted: dict[str, Colour] = {}
         for link in robot.mechanism.links.values():
             self._add(link)
         self.place(np.zeros(len(robot.joint_names)))
@@ -57,14 +58,15 @@ class RobotScene:
         for (name, frame), wxyz in zip(self._frames.items(), turns, strict=True):
             frame.wxyz, frame.position = wxyz, poses[name][:3, 3]
 
-    def tint(self, links: frozenset[str]) -> None:
-        """Colours links, and gives the others their own colours back."""
-        for link in links ^ self._tinted:
-            for mesh, (_, own) in zip(
-                self.meshes[link], _colours(self.robot.mechanism.links[link]), strict=True
-            ):
-                mesh.color = TINT if link in links else own
-        self._tinted = links
+    def tint(self, links: frozenset[str], alarmed: frozenset[str] = frozenset()) -> None:
+        """Colours links, some of them as alarmed; the others get their own colours back."""
+        wanted = {link: ALARM if link in alarmed else TINT for link in links | alarmed}
+        for link in wanted.keys() | self._tinted.keys():
+            if wanted.get(link) != self._tinted.get(link):
+                own = _colours(self.robot.mechanism.links[link])
+                for mesh, (_, colour) in zip(self.meshes[link], own, strict=True):
+                    mesh.color = wanted.get(link, colour)
+        self._tinted = wanted
 
 
 def dress(page: viser.ViserServer) -> None:
@@ -73,9 +75,11 @@ def dress(page: viser.ViserServer) -> None:
     scene.configure_environment_map(None)  # the light below is enough, and costs less
     scene.configure_default_lights(True, cast_shadow=False)
     scene.add_light_ambient("/light/ambient", intensity=1.2)
-    scene.add_grid("/ground", GROUND, GROUND, cell_color=(225, 228, 232))
-    page.initial_camera.position = (1.75, 1.25, 1.15)
-    page.initial_camera.look_at = (0.2, 0.0, 0.55)
+    scene.add_grid(
+        "/ground", GROUND, GROUND, cell_color=(236, 238, 240), section_color=(222, 225, 229)
+    )
+    page.initial_camera.position = (1.45, 1.05, 1.05)
+    page.initial_camera.look_at = (0.2, 0.05, 0.5)
 
 
 def _drawn(link: Link) -> list[tuple[Surface, Colour]]:

@@ -3,6 +3,7 @@
 
 import contextlib
 import io
+import os
 import secrets
 import socket
 import sys
@@ -119,6 +120,18 @@ def _answering(guard: Guard, answer: Any) -> Any:
         return response
 
     return process
+
+
+def open_page(url: str) -> None:
+    """Opens a page in the browser, if there is a screen to show it on.
+
+    Without one, a browser for terminals would take the terminal.
+    """
+    import webbrowser
+
+    screen = sys.platform in ("darwin", "win32")
+    if screen or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):
+        webbrowser.open(url)
 
 
 def _no_sharing(*_: Any, **__: Any) -> None:

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pushes that begin, change and end while the simulation runs, as a visitor's hands do."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.simulation.contacts import Forces, Touch, no_touch
+from touchline.simulation.plant import Plant
+
+Array = NDArray[np.float64]
+
+RISE = 0.03  # s; no hand's force jumps
+GONE = 0.05  # N; a released hand that weak has left
+FELT = 1.0  # N; a contact begins with that much
+
+
+@dataclass
+class Hand:
+    """One push or pull.
+
+    A pull is felt like a push from the other side along the same line, and a finger can only push;
+    so the place of contact may lie behind the point that is drawn.
+
+    Attributes:
+        link: that is touched.
+        grip: (3,) point of the link through which the force passes, link frame [m].
+        force: (3,) in link axes [N]; a hand with a target takes no heed of it.
+        target: (3,) in world to which the grip is drawn [m]; None: a constant force.
+        stiffness: of the spring to the target [N/m].
+        limit: of its force [N].
+        behind: how far behind the grip, against the force, the contact lies [m].
+        began: when the force first exceeded FELT [s].
+        released: whether it is on its way off.
+        acting: (3,) force in world [N].
+    """
+
+    link: str
+    grip: Array
+    force: Array = field(default_factory=lambda: np.zeros(3))
+    target: Array | None = None
+    stiffness: float = 200.0
+    limit: float = 30.0
+    behind: float = 0.0
+    began: float | None = field(default=None, init=False)
+    released: bool = field(default=False, init=False)
+    acting: Array = field(default_factory=lambda: np.zeros(3), init=False)  # world [N]
+
+    def wanted(self, T_world_link: Array) -> Array:
+        """Force (3,) in world [N] at which it aims."""
+        if self.released:
+            return np.zeros(3)
+        if self.target is None:
+            return T_world_link[:3, :3] @ self.force
+        force = self.stiffness * (self.target - place(T_world_link, self.grip))
+        return force * min(1.0, self.limit / max(float(np.linalg.norm(force)), 1e-9))
+
+
+class Hands(Forces):
+    """All hands on the robot.
+
+    Args:
+        slots: how many there can be at once.
+    """
+
+    def __init__(self, slots: int = 6) -> None:
+        super().__init__([no_touch("")] * slots)
+        self.slots: list[Hand | None] = [None] * slots
+
+    def active(self) -> list[Hand]:
+        """Those that have not been released, the oldest first."""
+        hands = [hand for hand in self.slots if hand is not None and not hand.released]
+        return sorted(hands, key=lambda hand: hand.began if hand.began is not None else np.inf)
+
+    def add(self, hand: Hand) -> None:
+        """Puts a hand on the robot; where there is no room the oldest has to go."""
+        if None not in self.slots:
+            gone = [h for h in self.slots if h is not None and h.released] or self.active()
+            self.slots[self.slots.index(gone[0])] = None
+        self.slots[self.slots.index(None)] = hand
+
+    def release_all(self) -> None:
+        """Takes all hands away."""
+        for hand in self.active():
+            hand.released = True
+
+    def acting(self, slot: int, plant: Plant) -> Touch | None:
+        """What a hand does at the plant's present time."""
+        hand = self.slots[slot]
+        if hand is None:
+            return None
+        T = plant.link_pose(hand.link)
+        hand.acting += (hand.wanted(T) - hand.acting) * (1.0 - np.exp(-1.0 / (plant.rate * RISE)))
+        size = float(np.linalg.norm(hand.acting))
+        if hand.began is None and size > FELT:
+            hand.began = plant.time
+        if hand.released and size < GONE:
+            self.slots[slot] = None
+            return None
+        point = place(T, hand.grip) - hand.behind / max(size, 1e-9) * hand.acting
+        return Touch(True, hand.link, point, hand.acting.copy(), np.zeros(3))
+
+
+def place(T: Array, point: Array) -> Array:
+    """A point (3,) in another frame, by the pose (4, 4) of its own frame in that."""
+    return T[:3, :3] @ point + T[:3, 3]

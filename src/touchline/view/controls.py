@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The live page's panel: what to do, what is felt, and what can be switched."""
+
+from collections.abc import Callable
+
+import viser
+
+from touchline.view.arm import Conditions
+from touchline.view.faults import FAULTS
+from touchline.view.methods import METHODS
+
+ADVICE = (
+    "**Drag on the arm** to pull it, **click** on it to push it; "
+    "drag beside it to look from elsewhere."
+)
+LEGEND = """\
+<div style="font-size:12px;padding:0 0.75em">
+<span style="color:#d55e00">&#9679; felt</span> with line of action and uncertainty (2 sigma)
+&nbsp; <span style="color:#0072b2">&#9679; true</span></div>"""
+MOTIONS = {"stands": False, "moves": True}
+
+
+class Controls:
+    """The panel.
+
+    Args:
+        gui: of a viser server.
+        push: makes a random push.
+        release: takes all pushes away.
+    """
+
+    def __init__(
+        self, gui: viser.GuiApi, push: Callable[[], None], release: Callable[[], None]
+    ) -> None:
+        gui.add_markdown(ADVICE)
+        self.readout = gui.add_html("")
+        gui.add_html(LEGEND)
+        self._force = gui.add_slider("Force [N]", 5.0, 60.0, 1.0, 25.0, hint="Of the next push.")
+        self._keep = gui.add_checkbox(
+            "Keep pulls", False, hint="A pull goes on when the mouse is released."
+        )
+        gui.add_button("Random push").on_click(lambda _: push())
+        gui.add_button("Remove all pushes", color="gray").on_click(lambda _: release())
+        self._motion = gui.add_dropdown("Arm", tuple(MOTIONS))
+        self._stiffness = gui.add_slider("Stiffness [%]", 5, 100, 5, 20)
+        self._method = gui.add_dropdown("Method", tuple(METHODS))
+        self._noise = gui.add_checkbox("Sensor noise", True)
+        self._fault = gui.add_dropdown("Sensor fault", tuple(FAULTS))
+        self._payload = gui.add_slider(
+            "Unknown load [kg]", 0.0, 1.0, 0.05, 0.0, hint="At the tool; the model lacks it."
+        )
+
+    @property
+    def force(self) -> float:
+        """Of the next push [N]."""
+        return float(self._force.value)
+
+    @property
+    def keep(self) -> bool:
+        """Whether pulls stay when the mouse is released."""
+        return bool(self._keep.value)
+
+    @property
+    def method(self) -> str:
+        """One of `METHODS`."""
+        return self._method.value
+
+    def conditions(self) -> Conditions:
+        """As they are set now."""
+        return Conditions(
+            MOTIONS[self._motion.value],
+            self._stiffness.value / 100.0,
+            bool(self._noise.value),
+            self._fault.value,
+            float(self._payload.value),
+        )

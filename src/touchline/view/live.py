@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The live page: the simulated arm, what touches it and what it feels, in real time."""
+
+import queue
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.contact.skin import Skin
+from touchline.model.robot import Robot, load_robot
+from touchline.simulation.hands import Hand
+from touchline.view.arm import RATE, LiveArm
+from touchline.view.contacts import ContactScene
+from touchline.view.controls import Controls
+from touchline.view.grasp import let_touch
+from touchline.view.history import History
+from touchline.view.judge import Judge, Verdict, touched
+from touchline.view.methods import METHODS, Felt, Method
+from touchline.view.plots import WrenchPlots
+from touchline.view.readout import Speed, readout
+from touchline.view.scene import RobotScene, dress
+from touchline.view.server import PageServer
+
+Array = NDArray[np.float64]
+
+FRAME = 1.0 / 30.0  # s between two pictures
+READOUT, PLOTS = 0.2, 0.25  # s between two of them
+LATEST = 0.2  # s by which the simulation may be late before it gives up catching up
+SMOOTHING = 0.05  # weight of a frame in the mean speed
+
+
+class LivePage:
+    """Everything on the page; nothing moves while nobody looks.
+
+    Args:
+        server: without anything on its page.
+        seed: of the motion, the noise and random pushes.
+
+    Attributes:
+        arm: that is simulated.
+        verdicts: of the last frame.
+        felt: in the last frame.
+    """
+
+    def __init__(self, server: PageServer, seed: int = 1) -> None:
+        # The sensors of `sara`, and a torque sensor in every joint for the methods that need one.
+        self._sara, self._full = load_robot("sara"), load_robot("sara-full")
+        self._skin = Skin(self._sara)
+        self.arm = LiveArm(self._full, self._skin, seed)
+        self._todo: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._pulls: dict[int, Hand] = {}
+        self._page = server.page
+        dress(self._page)
+        self._robot = RobotScene(self._page.scene, self._sara)
+        self._robot.place(self.arm.q)
+        self._contacts = ContactScene(self._page.scene, self._robot)
+        self._controls = Controls(
+            self._page.gui,
+            lambda: self._todo.put(self._push_anywhere),
+            lambda: self._todo.put(self.arm.hands.release_all),
+        )
+        self._history = History(self._sara.segment_names)
+        self._plots = _in_panel_of_their_own(self._page, self._history)
+        let_touch(self._robot, self, self._todo.put)
+        self._method = _Chosen(self._sara, self._full, self._skin)
+        self._judge = Judge(self._sara)
+        self.felt: Felt | None = None
+        self.verdicts: list[Verdict] = []
+        self._speed = Speed()
+        self._due = {READOUT: 0.0, PLOTS: 0.0}
+        self._stopping = threading.Event()
+        self._watched = threading.Event()
+        self._page.on_client_connect(lambda _: self._watched.set())
+
+    def press(self, origin: Array, direction: Array) -> None:
+        """A visitor clicks along a ray."""
+        self.arm.press(origin, direction, self._controls.force)
+
+    def pull_begins(self, visitor: int, link: str, point: Array, eye: Array) -> None:
+        """A visitor takes hold of a link."""
+        self.pull_ends(visitor)
+        self._pulls[visitor] = self.arm.pull(link, point, eye, self._controls.force)
+
+    def pull_moves(self, visitor: int, way: Array) -> None:
+        """A visitor's mouse is that way (3,) [m] from the place that he holds."""
+        hand = self._pulls.get(visitor)
+        if hand is not None:
+            hand.target = self.arm.grip(hand) + way
+
+    def pull_ends(self, visitor: int) -> None:
+        """A visitor lets it go, or leaves the pull where it is."""
+        hand = self._pulls.pop(visitor, None)
+        if hand is not None and not self._controls.keep:
+            hand.released = True
+
+    def _push_anywhere(self) -> None:
+        self.arm.push_anywhere(self._controls.force)
+
+    def stop(self) -> None:
+        """Ends `run`."""
+        self._stopping.set()
+        self._watched.set()
+
+    def run(self, seconds: float = np.inf) -> None:
+        """Simulates in real time while somebody looks, for some seconds at most."""
+        end = time.monotonic() + seconds
+        last = time.monotonic()
+        while not self._stopping.is_set() and (now := time.monotonic()) < end:
+            if not self._page.get_clients():
+                self._watched.clear()
+                self._watched.wait(min(1.0, end - now))
+                last = time.monotonic()
+                continue
+            rows = round(min(now - last, LATEST) * RATE)
+            if rows >= 2:
+                self._measure(rows / RATE, now - last)
+                last = now if now - last > LATEST else last + rows / RATE
+                self.frame(rows)
+            self._stopping.wait(max(0.0, FRAME - (time.monotonic() - now)))
+
+    def _measure(self, simulated: float, real: float) -> None:
+        share = self._speed.real_time + SMOOTHING * (simulated / real - self._speed.real_time)
+        self._speed = Speed(self._speed.step, share)
+
+    def frame(self, rows: int) -> None:
+        """Simulates `rows` samples and shows what came of them."""
+        while not self._todo.empty():
+            self._todo.get()()
+        self.arm.set(self._controls.conditions())
+        method = self._method.get(self._controls.method)
+        samples, truth = self.arm.advance(rows)
+        began = time.perf_counter()
+        felt = self.felt = method.take(samples)
+        step = (time.perf_counter() - began) / rows
+        smooth = self._speed.step + SMOOTHING * (step - self._speed.step)
+        self._speed = Speed(smooth, self._speed.real_time)
+        self.verdicts = self._judge.judge(felt, truth, self.arm.hands.active())
+        self._history.add(felt.time, felt.segments, felt.wrench)
+        self._show(samples.q[-1], touched(truth))
+
+    def _show(self, q: Array, true) -> None:
+        with self._page.atomic():
+            self._robot.place(q)
+            self._contacts.show(self.verdicts, true, q)
+            self._contacts.show_pulls(self.arm.springs())
+        if self._is_due(READOUT) and self.felt is not None:
+            self._controls.readout.content = readout(self.verdicts, self.felt.health, self._speed)
+        if self._is_due(PLOTS):
+            self._plots.refresh()
+
+    def _is_due(self, pause: float) -> bool:
+        now = time.monotonic()
+        if now < self._due[pause]:
+            return False
+        self._due[pause] = now + pause
+        return True
+
+
+class _Chosen:
+    """The method that is chosen; one that takes long to make starts when it is ready."""
+
+    def __init__(self, sara: Robot, full: Robot, skin: Skin) -> None:
+        self._parts = (sara, full, skin)
+        self._maker = ThreadPoolExecutor(1)
+        self._name = next(iter(METHODS))
+        self._method: Method = METHODS[self._name](*self._parts)
+        self._making: Future[Method] | None = None
+
+    def get(self, name: str) -> Method:
+        """The method to use now, for one that is wanted."""
+        if name != self._name:
+            self._name = name
+            self._making = self._maker.submit(METHODS[name], *self._parts)
+        if self._making is not None and self._making.done():
+            self._method, self._making = self._making.result(), None
+        return self._method
+
+
+def _in_panel_of_their_own(page, history: History) -> WrenchPlots:
+    panel = page.gui.add_panel()
+    with panel.add_tab("Segments"):
+        plots = WrenchPlots(page.gui, history)
+    panel.dock_left()
+    panel.set_width(300)
+    page.gui.main_panel.dock_right()
+    page.gui.main_panel.set_width(370)
+    return plots
