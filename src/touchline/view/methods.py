@@ -152,7 +152,7 @@ class Classical:
                 self._limits[row.segment, row.component] = NOISIER * row.contact
         self._window: deque[tuple] = deque(maxlen=WINDOW)
         self._count, self._next = 0, -np.inf
-        self._wrench, self._levels = np.full((m, 6), np.nan), np.zeros(m, np.int64)
+        self._wrench, self._levels = np.full((m, 6), np.nan), np.zeros(m)
         self._contacts: list[Contact] = []
 
     def take(self, samples: Samples) -> Felt:
@@ -180,9 +180,9 @@ class Classical:
         except InputError:  # a torque that is not a number: it has no answer
             wrench = np.full((WINDOW, len(self._limits), 6), np.nan)
         self._wrench = filter_truth(wrench, signals[0], self._bandwidth)[-1]
-        self._levels = (np.abs(self._wrench) > self._limits).any(axis=1).astype(np.int64)
+        self._levels = (np.abs(self._wrench) > self._limits).any(axis=1).astype(float)
         q = signals[1][-1]
-        self._contacts = [self._contact(g, q) for g in np.flatnonzero(self._levels)]
+        self._contacts = [self._contact(g, q) for g in np.flatnonzero(self._levels).tolist()]
 
     def _contact(self, g: int, q: Array) -> Contact:
         segment, wrench = self._robot.segment_names[g], self._wrench[g]
