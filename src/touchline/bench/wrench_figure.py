@@ -43,8 +43,8 @@ def save_figures(
 
 
 def errors_figure(outcomes: Sequence[Outcome], methods: Sequence[Method]) -> Any:
-    """Force error of every method in every scenario but the impacts, by segment."""
-    shown = [o for o in outcomes if "force_rms" in {key[2] for key in o.scores[0].values}]
+    """Force error of every method by segment, but for impacts and ideal sensors."""
+    shown = [o for o in outcomes if not o.scenario.name.startswith(("impacts", "ideal"))]
     rows = np.arange(len(shown))
     with styled():
         figure = new_figure(PAGE, 0.9 + 0.17 * len(shown))
@@ -77,13 +77,16 @@ def _label(outcome: Outcome) -> str:
 
 
 def time_figure(stage: Stage, methods: Sequence[Method]) -> Any:
-    """The force on the structure, all with the same bandwidth, in three situations."""
+    """The force on the structure, all with the same bandwidth, in three situations.
+
+    `idyn-out` and `paper` would lie on `segment`.
+    """
     parts = (
         ("sets off at 20 rad/s²", stage.set_off(20.0), (SET_OFF - 0.02, SET_OFF + SPAN)),
         ("joint 5 disturbed", stage.disturbed(), (0.5, 2.5)),
         ("20 N on link4, then elsewhere", stage.three_pushes(), (0.5, 2.4)),
     )
-    real = [m for m in methods if m.real and m.name not in ("paper", "joints")]
+    real = [m for m in methods if m.real and m.name not in ("paper", "joints", "idyn-out")]
     with styled():
         figure = new_figure(PAGE, 2.2)
         panels = figure.subplots(1, len(parts))
@@ -103,17 +106,8 @@ def _draw(axes: Any, log: Log, span: tuple[float, float], methods: Sequence[Meth
     for method in reversed(methods):
         trial = next(trial for trial in method.trials(log) if trial.bandwidth == DEFAULT)
         force = np.linalg.norm(trial.wrench[rows, BASE, :3], axis=1)
-        dashes = {"linestyle": (0, (4, 3))} if method.name == "idyn-out" else {}
         colour = LOOKS[method.name][0]
-        axes.plot(
-            log.time[rows],
-            force,
-            color=colour,
-            linewidth=0.9,
-            label=method.name,
-            **dashes,
-            zorder=3 if dashes else 2,
-        )
+        axes.plot(log.time[rows], force, color=colour, linewidth=0.6, label=method.name)
     axes.set_xlabel("time [s]")
     axes.margins(x=0)
     axes.set_ylim(bottom=0)

@@ -18,6 +18,10 @@ from touchline.bench.wrench_scores import (
     leaders,
 )
 
+EQUIVALENT = (
+    "With a low-pass on its result, iDynTree's estimator is the segment observer in other words:\n"
+    "against the best of the peers ours can tie or lose."
+)
 OURS, SHIPPED = "segment", "shipped"
 ALL_QUANTITIES = QUANTITIES | IMPACT_QUANTITIES
 
@@ -126,7 +130,7 @@ def tally(outcomes: Sequence[Outcome], methods: Sequence[Method]) -> str:
             rows.append((method.name, *(str(found.count(x)) for x in ("win", "tie", "loss"))))
     found = [verdict(row) for row in table]
     rows.append(("the best of the peers", *(str(found.count(x)) for x in ("win", "tie", "loss"))))
-    return aligned(rows)
+    return f"{aligned(rows)}\n{EQUIVALENT}"
 
 
 def few(names: Sequence[str]) -> str:

@@ -226,7 +226,7 @@ def _tables(way: Passage, table: list[Row]) -> dict[str, Table]:
             "configuration": name,
             "time": instant,
             "condition": float(EndEffector(way.robot, "tool").condition(q)),
-            **{joint: float(value) for joint, value in zip(way.robot.joint_names, q, strict=True)},
+            **dict(zip(way.robot.joint_names, (np.round(q, 9) + 0.0).tolist(), strict=True)),
         }
         for name, instant, q in (
             ("best conditioned", BEST, way.best),
@@ -239,12 +239,33 @@ def _tables(way: Passage, table: list[Row]) -> dict[str, Table]:
             "is zero. Frequency of the disturbance in Hz, bandwidth K in rad/s.",
             table,
         ),
+        "sweep": Table(
+            "Largest false force [N] at base and wrist, by frequency [Hz] and K [rad/s].",
+            sweep(way, table),
+        ),
         "configurations": Table(
             "The two configurations [rad], the time [s] at which the arm passes them, and the "
             "condition number there.",
             configurations,
         ),
     }
+
+
+def sweep(way: Passage, table: list[Row]) -> list[Row]:
+    """One row for each frequency and bandwidth: the largest force by method at two sensors."""
+    out: list[Row] = []
+    for frequency in FREQUENCIES:
+        for bandwidth in BANDWIDTHS:
+            own = [r for r in table if (r["frequency"], r["bandwidth"]) == (frequency, bandwidth)]
+            row: dict[str, str | float | int | None] = {
+                "frequency": frequency,
+                "bandwidth": bandwidth,
+            }
+            for sensor in way.robot.sensor_names[:2]:
+                forces = {r["method"]: r["force_max"] for r in own if r["sensor"] == sensor}
+                row |= {f"{sensor}_{m}": forces[m] for m in ("classical", "paper", "segment")}
+            out.append(row)
+    return out
 
 
 def _checks(shown: Outcome, outcomes: list[Outcome]) -> list[Check]:

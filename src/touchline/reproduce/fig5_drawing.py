@@ -19,7 +19,16 @@ from touchline.figure import (
 )
 from touchline.reproduce.arm_view import ArmView
 from touchline.reproduce.experiment import Drawing
-from touchline.reproduce.fig5 import HAND, RECOIL, SEGMENTS, STRUCTURE, Pushes, Recoil, point_errors
+from touchline.reproduce.fig5 import (
+    HAND,
+    RECOIL,
+    SEGMENTS,
+    STRONG,
+    STRUCTURE,
+    Pushes,
+    Recoil,
+    point_errors,
+)
 from touchline.reproduce.fig5 import ghost as ghost_of
 from touchline.reproduce.replay import FORCE, Replay
 
@@ -43,22 +52,24 @@ def drawings(pushes: Pushes, after: list[Recoil]) -> dict[str, Drawing]:
         second.start + 0.12,
     )
     with styled():
-        figure = new_figure(PAGE, 4.7)
-        upper, lower = figure.subfigures(2, 1, height_ratios=(1.0, 2.4))
+        figure = new_figure(PAGE, 5.9)
+        upper, lower = figure.subfigures(2, 1, height_ratios=(1.0, 3.5))
         _pictures(upper, replay, instants)
-        axes = lower.subplots(2, 2, sharex=True)
+        axes = lower.subplots(3, 2, sharex=True)
         _forces(axes[0, 0], replay)
-        _points(axes[0, 1], replay)
+        _force_errors(axes[0, 1], replay)
         _speed(axes[1, 0], replay)
-        _ghosts(axes[1, 1], pushes.ideal)
+        _points(axes[1, 1], replay)
+        for panel, segment in zip(axes[2], SEGMENTS, strict=True):
+            _ghosts(panel, pushes.ideal, segment)
         for panel in axes.flat:
             _marks(panel, instants, after)
-        for panel in axes[1]:
+        for panel in axes[-1]:
             panel.set_xlabel("time [s]")
             panel.set_xlim(replay.time[0], replay.time[-1])
         for number, instant in enumerate(instants, 1):
             axes[1, 0].text(
-                instant, 0.93, str(number), ha="center", va="center", fontsize=7, zorder=6,
+                instant, 0.92, str(number), ha="center", va="center", fontsize=7, zorder=6,
                 transform=axes[1, 0].get_xaxis_transform(),
                 bbox={"boxstyle": "circle,pad=0.15", "fc": "white", "ec": INK, "lw": 0.5},
             )  # fmt: skip
@@ -67,9 +78,11 @@ def drawings(pushes: Pushes, after: list[Recoil]) -> dict[str, Drawing]:
 
 CAPTION = (
     "Above: the arm at six instants, numbered below; grey arrows: true forces, rings: true points, "
-    "dots: points located from the sensors. Below: norms of the forces (grey: true), errors of the "
-    "located points, joint velocities, and the false force on the structure (ideal sensors; error "
-    "against the truth low-passed alike). Shaded: the arm springs back."
+    "dots: points located from the sensors. Below: norms of the forces (grey: true); their errors "
+    "beyond the filter's lag, and those of the located points, while the true force is over 10 N; "
+    "joint velocities; what is false in the forces with ideal sensors: in the printed form a ghost "
+    "of the other contact, and of the segment's own in a turning frame. Shaded: the arm springs "
+    "back."
 )
 
 
@@ -111,6 +124,17 @@ def _forces(axes: Any, replay: Replay) -> None:
     legend_above(axes, 2)
 
 
+def _force_errors(axes: Any, replay: Replay) -> None:
+    for segment in SEGMENTS:
+        strong = np.linalg.norm(replay.true_force(segment), axis=1) > STRONG
+        error = np.where(strong, ghost_of(replay, segment, "segment"), np.nan)
+        time, error = thin(replay.time, error)
+        axes.semilogy(time, error, color=TONES[segment], lw=0.7)
+    axes.set_ylim(3e-3, 3.0)
+    axes.set_ylabel("N")
+    panel_label(axes, "Error of the forces")
+
+
 def _points(axes: Any, replay: Replay) -> None:
     for segment in SEGMENTS:
         time, error = thin(replay.time, point_errors(replay, segment))
@@ -129,12 +153,12 @@ def _speed(axes: Any, replay: Replay) -> None:
     panel_label(axes, "$\\|\\dot{q}\\|$")
 
 
-def _ghosts(axes: Any, replay: Replay) -> None:
+def _ghosts(axes: Any, replay: Replay, segment: str) -> None:
     names = {"paper": "as printed, (18)", "segment": "segment form"}
     for method, name in names.items():
-        time, force = thin(replay.time, ghost_of(replay, STRUCTURE, method))
+        time, force = thin(replay.time, ghost_of(replay, segment, method))
         axes.semilogy(time, np.maximum(force, 1e-6), color=COLORS[method], lw=1.0, label=name)
     axes.set_ylim(1e-5, 1.0)
     axes.set_ylabel("N")
-    panel_label(axes, "False force, structure")
+    panel_label(axes, f"False force, {NAMES[segment]}")
     legend_above(axes, 2)

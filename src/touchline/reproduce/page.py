@@ -40,11 +40,11 @@ border-top:1px solid #dfe3e7}h3{font-size:1rem;margin:1.4rem 0 .2rem}
 .soft,figcaption{color:#5d656e;font-size:.92rem}
 figure{margin:1.4rem 0}figure img{width:100%;height:auto;max-width:var(--width)}
 dt{font-weight:bold;margin-top:.7rem}dd{margin:0}
-.scroll{overflow:auto;max-height:26rem;margin:.5rem 0}
+.scroll{overflow:auto;max-height:30rem;margin:.5rem 0}
 table{border-collapse:collapse;font:.85rem/1.4 ui-monospace,monospace}
 th,td{padding:.2rem .7rem;text-align:right;border-bottom:1px solid #e8ebee;white-space:nowrap}
-th{position:sticky;top:0;background:#fff}
-th:first-child,td:first-child{text-align:left}
+th{position:sticky;top:0;background:#fff;white-space:normal;vertical-align:bottom}
+th:first-child,td:first-child,.text{text-align:left}
 .holds{color:#2c7a52}.fails{color:#b3341f;font-weight:bold}
 """
 DOTS = 96  # per inch, at which a figure is shown at most 1.35 times its size in print
@@ -106,7 +106,8 @@ def _table(name: str, table: Table) -> str:
     if not table.rows:
         return ""
     keys = table.shown or list(table.rows[0])
-    head = "".join(f"<th>{escape(key.replace('_', ' '))}</th>" for key in keys)
+    first = table.rows[0]
+    head = "".join(f"<th{_kind(first[k])}>{escape(k.replace('_', ' '))}</th>" for k in keys)
     rows = "".join(f"<tr>{_cells(row, keys)}</tr>" for row in table.rows)
     return (
         f'<h3>{escape(name)}.csv</h3><div class="soft">{escape(table.caption)}</div>'
@@ -116,7 +117,11 @@ def _table(name: str, table: Table) -> str:
 
 
 def _cells(row: Row, keys: Sequence[str]) -> str:
-    return "".join(f"<td>{escape(_text(row[key]))}</td>" for key in keys)
+    return "".join(f"<td{_kind(row[key])}>{escape(_text(row[key]))}</td>" for key in keys)
+
+
+def _kind(value: str | float | int | None) -> str:
+    return ' class="text"' if isinstance(value, str) else ""
 
 
 def _text(value: str | float | int | None) -> str:
