@@ -269,9 +269,10 @@ inline void bind(nb::module_& m) {
       .def_rw("first_entry", &tl::LocalizerSettings::first_entry);
   nb::class_<tl::LinkSurface>(m, "LinkSurface")
       .def("__init__",
-           [](tl::LinkSurface* self, int node, const tl::Mesh& mesh) {
-             new (self) tl::LinkSurface{node, mesh};
-           })
+           [](tl::LinkSurface* self, int node, const tl::Mesh& mesh, bool graspable) {
+             new (self) tl::LinkSurface{node, mesh, graspable};
+           },
+           "node"_a, "mesh"_a, "graspable"_a)
       .def_ro("node", &tl::LinkSurface::node);
   nb::class_<tl::Localizer>(m, "Localizer")
       .def("__init__",

@@ -27,7 +27,7 @@ def sphere(radius, at=(0.0, 0.0, 0.0)):
     return Geometry("sphere", pose(p=at), (radius,))
 
 
-def describe(mechanism, sensors, torque="sensor", qd=1e-4):
+def describe(mechanism, sensors, torque="sensor", qd=1e-4, graspable=()):
     names = [joint.name for joint in mechanism.joints.values()]
     n = len(names)
     return Robot(
@@ -42,6 +42,7 @@ def describe(mechanism, sensors, torque="sensor", qd=1e-4):
                 (0.05,) * n,
                 {name: (0.05,) * 3 + (0.01,) * 3 for name, _ in sensors},
             ),
+            graspable=graspable,
             bandwidth_joints=(100.0,) * n,
             bandwidth_sensors={name: 100.0 for name, _ in sensors},
         ),
@@ -49,13 +50,13 @@ def describe(mechanism, sensors, torque="sensor", qd=1e-4):
     )
 
 
-def still(shape):
+def still(shape, graspable=()):
     """One link with one shape, bolted to a sensor."""
     mechanism = Mechanism("still", "body", {"body": Link("body", BODY, (shape,))}, {}, np.zeros(3))
-    return describe(mechanism, [("base", "body")])
+    return describe(mechanism, [("base", "body")], graspable=graspable)
 
 
-def chain(lengths=(0.3, 0.3, 0.3), sensors=(("base", "link0"),), torque="sensor"):
+def chain(lengths=(0.3, 0.3, 0.3), sensors=(("base", "link0"),), torque="sensor", graspable=()):
     """Boxes in a row along x on joints whose axes alternate between y and z."""
     links = {"link0": Link("link0", BODY, (box(0.1, 0.1, 0.1),))}
     joints = {}
@@ -69,7 +70,7 @@ def chain(lengths=(0.3, 0.3, 0.3), sensors=(("base", "link0"),), torque="sensor"
             f"joint{i + 1}", "revolute", f"link{i}", name, pose(p=at), axis
         )
     mechanism = Mechanism("chain", "link0", links, joints, np.array([0.0, 0.0, -9.81]))
-    return describe(mechanism, list(sensors), torque)
+    return describe(mechanism, list(sensors), torque, graspable=graspable)
 
 
 def measured(robot, q, loads, rng=None, duration=0.3):

@@ -272,6 +272,8 @@ def test_one_error(folder, old, new, problem):
         ("package_dirs: here", "package_dirs: 'here' is text, not a list"),
         ("loads: [{link: hand}]", "loads[0].mass: is missing"),
         ("loads: [{link: hand, mass: -1}]", "loads[0].mass: -1 is negative; allowed: 0 or more"),
+        ("graspable: [hnd]", "graspable[0]: unknown link 'hnd'; known: base, "),
+        ("graspable: hand", "graspable: 'hand' is text, not a list"),
         ("loads: [{link: hnd, mass: 1}]", "loads[0].link: unknown link 'hnd'; known: base, "),
         ("loads: [{link: hand, mass: 1, com: 0}]", "loads[0].com: 0 is a number, not a list"),
         ("loads: [{link: hand, mass: 1, inertia: [1, 1, 1]}]", "loads[0].inertia: [1, 1, 1] has"),

@@ -115,9 +115,11 @@ class CredibleRegion {
         continue;
       }
       const double area = 0.5 * norm(cross(p.b - p.a, p.c - p.a));
-      const Fit fit = found_.fitter().fit(view.q, view.earlier(centre), normal);
+      const bool grasped = found_.surfaces()[surface].graspable;
+      const Fit fit = found_.fitter().fit(view.q, view.earlier(centre), normal, grasped);
       const double volume = found_.fitter().log_volume(view.q, view.earlier(centre));
-      const double log_density = -0.5 * fit.cost() + volume + log_prior(fit.force) - view.width;
+      const double prior = found_.fitter().log_prior(fit.force, grasped);
+      const double log_density = -0.5 * fit.cost() + volume + prior - view.width;
       if (std::isfinite(log_density)) {
         cells_.push_back({surface, centre, normal, area, log_density});
         forces_.push_back(fit.force);
@@ -172,7 +174,7 @@ class CredibleRegion {
     most = -std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < cells_.size(); ++i) {
       SurfaceCell& c = cells_[i];
-      if (c.log_density > floor)
+      if (c.log_density > floor && !found_.surfaces()[c.surface].graspable)
         c.log_density += approach(found_.surfaces(), c.centre, forces_[i], settings_.finger);
       most = std::max(most, c.log_density);
     }

@@ -108,7 +108,7 @@ class Explanations {
         k.point = point;
         k.normal = normal;
         k.fit.force = view.wrench.linear;
-        fitter_.judge(view.q, view.earlier(point), normal, k.fit);
+        fitter_.judge(view.q, view.earlier(point), normal, surfaces_[surface].graspable, k.fit);
         view.steep = view.steep || k.fit.cone < kGrazing;
         view.met = true;
         if (!known(before, 1e-7)) keep();  // an edge is met twice
@@ -173,7 +173,7 @@ class Explanations {
     Candidate& k = fresh(view, surface);
     k.point = point;
     k.normal = normal;
-    k.fit = fitter_.fit(view.q, view.earlier(k.point), k.normal, limit);
+    k.fit = fitter_.fit(view.q, view.earlier(k.point), k.normal, surfaces_[surface].graspable, limit);
   }
 
   // Without a line: the best of the points spread over each link, each improved.

@@ -37,9 +37,6 @@ struct Fit {
   double cost() const { return chi2 + cone; }
 };
 
-// Logarithm of how dense forces are, per volume, when directions and sizes are equally likely.
-inline double log_prior(const Vec3& force) { return -std::log(std::max(dot(force, force), 1.0)); }
-
 inline double component(const Vec3& v, int i) { return i == 0 ? v.x : i == 1 ? v.y : v.z; }
 
 inline void wrench_of(const Vec3& point, const Vec3& force, double* w) {
@@ -59,16 +56,16 @@ class ForceFitter {
   explicit ForceFitter(const LocalizerSettings& settings)
       : settings_(settings), cone_(std::atan(settings.friction)) {}
 
-  // The force at `point` that explains best, in the friction cone of the outward `normal`. Beyond
-  // a chi2 of `limit` nothing is worked out.
-  Fit fit(const Quadratic& q, const Vec3& point, const Vec3& normal,
+  // The force at `point` that explains best, in the friction cone of the outward `normal`, or, if
+  // it may be `grasped`, in any direction. Beyond a chi2 of `limit` nothing is worked out.
+  Fit fit(const Quadratic& q, const Vec3& point, const Vec3& normal, bool grasped,
           double limit = std::numeric_limits<double>::infinity()) const {
     double A[9], g[3];
     reduce(q, point, A, g);
     Fit free;
     free.cone = std::numeric_limits<double>::infinity();
-    if (solve(A, g, free.force)) judge(q, point, normal, free);
-    if (free.cone < 1.0 || free.chi2 > limit) return free;
+    if (solve(A, g, free.force)) judge(q, point, normal, grasped, free);
+    if (grasped || free.cone < 1.0 || free.chi2 > limit) return free;
     const Fit bound = on_cone(q, point, normal, A, g);
     return bound.cost() < free.cost() ? bound : free;
   }
@@ -91,13 +88,22 @@ class ForceFitter {
   }
 
   // Fills chi2, cone and cosine of a force that is given.
-  void judge(const Quadratic& q, const Vec3& point, const Vec3& normal, Fit& fit) const {
+  void judge(const Quadratic& q, const Vec3& point, const Vec3& normal, bool grasped,
+             Fit& fit) const {
     double w[6];
     wrench_of(point, fit.force, w);
     fit.chi2 = q(w);
     const double size = norm(fit.force);
     fit.cosine = size > 0.0 ? -dot(normal, fit.force) / size : 0.0;
-    fit.cone = cone_cost(fit.cosine) + size * size / (settings_.force_scale * settings_.force_scale);
+    fit.cone = grasped ? 0.0 : cone_cost(fit.cosine);
+    fit.cone += size * size / (settings_.force_scale * settings_.force_scale);
+  }
+
+  // Logarithm of how dense forces are, per volume: their directions, in the friction cone or all
+  // of them, and sizes are equally likely.
+  double log_prior(const Vec3& force, bool grasped) const {
+    const double directions = grasped ? 2.0 : 1.0 - std::cos(cone_);
+    return -std::log(directions * std::max(dot(force, force), 1.0));
   }
 
   double cone_cost(double cosine) const {
@@ -211,7 +217,7 @@ class ForceFitter {
     Fit fit;
     fit.force = force;
     fit.cone = std::numeric_limits<double>::infinity();
-    if (best > 0.0) judge(q, point, normal, fit);
+    if (best > 0.0) judge(q, point, normal, false, fit);
     return fit;
   }
 

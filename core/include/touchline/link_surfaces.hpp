@@ -17,6 +17,7 @@ namespace touchline {
 struct LinkSurface {
   int node;
   Mesh mesh;
+  bool graspable = false;  // may be pulled, along its surface too
 };
 
 // A rigid body: measurements cannot tell its surfaces apart.
@@ -73,13 +74,15 @@ class LinkSurfaces {
     return in_world(surfaces_[surface].mesh.nearest_to_line(to_node(line, node), limit), node);
   }
 
-  // Calls `visit(surface, point, normal, t)` for each entry of a line into a surface.
+  // Calls `visit(surface, point, normal, t)` for each entry of a line into a surface; where it is
+  // graspable, for each exit too.
   template <class Visit>
   void entries(int surface, const ForceLine& line, Visit&& visit) const {
     const int node = surfaces_[surface].node;
     surfaces_[surface].mesh.crossings(to_node(line, node), [&](const Crossing& c) {
       const Vec3 normal = turn_to_world(c.normal, node);
-      if (dot(normal, line.direction) < 0.0) visit(surface, line.at(c.t), normal, c.t);
+      if (surfaces_[surface].graspable || dot(normal, line.direction) < 0.0)
+        visit(surface, line.at(c.t), normal, c.t);
     });
   }
 

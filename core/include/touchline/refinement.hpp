@@ -58,7 +58,8 @@ class Refinement {
   bool try_point(const View& view, Candidate& k, const Vec3& target) const {
     const SurfacePoint p = surfaces_.nearest(k.surface, target, 0.06);
     if (p.face < 0) return false;
-    const Fit fit = fitter_.fit(view.q, view.earlier(p.point), p.normal);
+    const bool grasped = surfaces_[k.surface].graspable;
+    const Fit fit = fitter_.fit(view.q, view.earlier(p.point), p.normal, grasped);
     if (!(fit.cost() < k.fit.cost() - 1e-6)) return false;
     k.point = p.point;
     k.normal = p.normal;

@@ -79,8 +79,8 @@ class SingleContact {
       const View& view = found_.view(k);
       found_.fitter().information(view.q, view.earlier(k.point), k.normal, k.fit.force, H, g);
       if (!cholesky(H, 5)) continue;
-      k.weight = -0.5 * (k.fit.cost() + log_determinant(H, 5)) + log_prior(k.fit.force) -
-                 view.width;
+      k.weight = -0.5 * (k.fit.cost() + log_determinant(H, 5)) + 
+                 found_.fitter().log_prior(k.fit.force, graspable(k)) - view.width;
       most = std::max(most, k.weight);
       covariance_along(H, k.along);
     }
@@ -88,7 +88,7 @@ class SingleContact {
     for (Candidate& k : found_) {
       if (k.weight < most - kNegligible) {
         k.weight = -std::numeric_limits<double>::infinity();
-      } else {
+      } else if (!graspable(k)) {
         k.weight += approach(found_.surfaces(), k.point, k.fit.force, settings_.finger);
       }
       reached = std::max(reached, k.weight);
@@ -122,7 +122,7 @@ class SingleContact {
     spread_over_surface(best);
     copy_candidates();
     if (std::fabs(view.pitch) > settings_.pitch_limit ||
-        found_.fitter().cone_cost(best.fit.cosine) > 16.0 ||
+        (!graspable(best) && found_.fitter().cone_cost(best.fit.cosine) > 16.0) ||
         best.fit.chi2 > chi2_limit(answer_.degrees, settings_.pitch_limit)) {
       answer_.status = unexplained(g, measurement);
     } else {
@@ -139,15 +139,23 @@ class SingleContact {
     }
   }
 
-  // A tool or a handle may be loaded by a moment: then its wrench is the answer.
+  // What can be grasped, and what only a tool's or a handle's own sensor feels, may be loaded by a
+  // moment: then its wrench is the answer.
   Status unexplained(int g, const Measurement& measurement) const {
+    if (!measurement.has_wrench()) return Status::not_separable;
     const Segment& segment = observer_.layout().segments[g];
-    const bool end = segment.sensor >= 0 && segment.successors.empty();
-    return end && measurement.has_wrench() && measurement.scalars() == 0
-               ? Status::wrench_only
-               : Status::not_separable;
+    if (segment.successors.empty() && measurement.scalars() == 0) return Status::wrench_only;
+    const double limit = chi2_limit(std::max(1, measurement.size() - 6), settings_.pitch_limit);
+    for (int i = 0; i < found_.views(); ++i) {
+      const View& view = found_.view(i);
+      const bool held = std::any_of(view.surfaces->begin(), view.surfaces->end(),
+                                    [this](int s) { return found_.surfaces()[s].graspable; });
+      if (held && view.least < limit) return Status::wrench_only;
+    }
+    return Status::not_separable;
   }
 
+  bool graspable(const Candidate& k) const { return found_.surfaces()[k.surface].graspable; }
   int node_of(const Candidate& k) const { return found_.surfaces()[k.surface].node; }
 
   void lead_with_best_body() {

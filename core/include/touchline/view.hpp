@@ -33,6 +33,7 @@ struct View {
   const std::vector<int>* surfaces = nullptr;
   Quadratic q;
   bool line = false;   // is there a line of force action?
+  double least = 0.0;  // chi2 of the best wrench, forces and moments
   double floor = 0.0;  // chi2 that no point of the body goes below
   double pitch = 0.0;
   Spatial wrench;      // the pure force that explains best
@@ -68,6 +69,7 @@ struct View {
     if (!line) return;
     std::copy(q.vector, q.vector + 6, w);
     solve_cholesky(L, 6, w);
+    least = std::max(0.0, q(w));
     for (int pass = 0; pass < 3; ++pass) {
       const double g[6] = {w[3], w[4], w[5], w[0], w[1], w[2]};
       double step[6];

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.contact.line import line_point
+
 Array = NDArray[np.float64]
 
 STATUSES = ("located", "ambiguous", "not_separable", "wrench_only")
@@ -65,6 +67,22 @@ class Contact:
         """Of the force, or of the segment's where the contact's own is not known [N]."""
         force = self.force if self.wrench is None or self.force is not None else self.wrench[:3]
         return 0.0 if force is None else float(np.linalg.norm(force))
+
+    @property
+    def line(self) -> tuple[Array, Array] | None:
+        """Line of force action in world: its point (3,) [m] nearest to the origin, unit vector.
+
+        None without a wrench or a force.
+        """
+        if self.wrench is None or not np.linalg.norm(self.wrench[:3]) > 0.0:
+            return None
+        return line_point(self.wrench), self.wrench[:3] / np.linalg.norm(self.wrench[:3])
+
+    @property
+    def moment(self) -> float | None:
+        """Of the wrench about its own line [Nm]: zero for one pure force; None without a line."""
+        line = self.line
+        return None if line is None or self.wrench is None else float(line[1] @ self.wrench[3:])
 
     @property
     def likely_link(self) -> str | None:

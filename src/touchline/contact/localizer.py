@@ -107,6 +107,7 @@ class Localizer:
         self.observer, self.robot = observer, observer.robot
         self.skin = skin or Skin(self.robot)
         self._body_names = {body.node: body.name for body in self.robot.bodies}
+        graspable = self.robot.description.graspable
         settings = core.LocalizerSettings()
         settings.friction = friction
         settings.first_entry = rule == "paper"
@@ -115,7 +116,10 @@ class Localizer:
             observer.kernel,
             [core.DetectionRow(**vars(row)) for row in rows],
             native_noise(self.robot, period, wrench_error, torque_error),
-            [core.LinkSurface(patch.node, patch.mesh) for patch in self.skin.patches],
+            [
+                core.LinkSurface(patch.node, patch.mesh, patch.link in graspable)
+                for patch in self.skin.patches
+            ],
             settings,
         )
 

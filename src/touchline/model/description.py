@@ -229,7 +229,11 @@ class PolicyDescription:
 
 @dataclass(frozen=True)
 class RobotDescription:
-    """A whole `robot.yaml`, checked; per-joint values are expanded to the order of `joints`."""
+    """A whole `robot.yaml`, checked; per-joint values are expanded to the order of `joints`.
+
+    `graspable` names the links that a hand may close around: they can be pulled and twisted, not
+    only pushed.
+    """
 
     name: str
     model: Path
@@ -243,6 +247,7 @@ class RobotDescription:
     locked: dict[str, float] = field(default_factory=dict)
     loads: tuple[Load, ...] = ()
     links: dict[str, LinkCorrection] = field(default_factory=dict)
+    graspable: tuple[str, ...] = ()
     detection: DetectionDescription = field(default_factory=DetectionDescription)
     policy: PolicyDescription = field(default_factory=PolicyDescription)
     log: dict[str, Any] = field(default_factory=dict)

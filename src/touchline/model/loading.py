@@ -170,6 +170,7 @@ class _Draft:
             locked=file.locked,
             loads=tuple(file.loads),
             links=file.links,
+            graspable=tuple(file.graspable),
             detection=self.detection,
             policy=file.policy,
             log=file.log,

@@ -147,6 +147,7 @@ def _link_names(file: RobotFile, mechanism: Mechanism) -> Iterator[Problem]:
     used = [(f"{place}.link", sensor.link) for place, sensor in sensor_entries(file)]
     used += [(f"{place}.link", load.link) for place, load in numbered(file.loads, "loads")]
     used += [(f"links.{name}", name) for name in file.links]
+    used += list(numbered(file.graspable, "graspable"))
     for place, link in used:
         if link is not None and link not in links:
             yield place, unknown(link, "link", links)
