@@ -242,7 +242,8 @@ def test_tables_hold_every_method_and_quantity(stage, few, tmp_path):
     with (tmp_path / "wrench.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == len(keys)
-    assert {row["ours"] for row in rows} <= {"win", "tie", "loss"}
+    assert {row["verdict"] for row in rows} <= {"win", "tie", "loss"}
+    assert [(row["scene"], row["part"], row["quantity"]) for row in rows] == keys
     assert float(rows[0]["segment"]) == pytest.approx(
         outcome.best("segment").values[keys[0]], rel=1e-5
     )

@@ -74,7 +74,7 @@ def verdict(row: dict[str, float], peer: str | None = None) -> str:
 
 def scenario_table(outcome: Outcome, methods: Sequence[Method]) -> str:
     """A scenario: one row per segment and quantity, one column per method, who is best."""
-    head = ("segment", "", SHIPPED, *(m.name for m in methods), "best", "ours")
+    head = ("", "", SHIPPED, *(m.name for m in methods), "best", "verdict")
     rows: list[tuple[str, ...]] = [head]
     shipped = outcome.shipped()
     for _, segment, quantity in row_keys(outcome, scenes=False):
@@ -107,7 +107,7 @@ def link_table(outcome: Outcome, methods: Sequence[Method]) -> str:
         for scene, segment, _ in row_keys(outcome)
         if scene and outcome.touched.get(scene) == segment
     }
-    rows: list[tuple[str, ...]] = [("pushed", *(m.name for m in methods), "best", "ours")]
+    rows: list[tuple[str, ...]] = [("pushed", *(m.name for m in methods), "best", "verdict")]
     for scene, segment in touched.items():
         row = values(outcome, methods, (scene, segment, "force_rms"))
         cells = [number(value) for value in row.values()]
@@ -148,9 +148,10 @@ def number(value: float) -> str:
 
 def write_tables(folder: Path, outcomes: Sequence[Outcome], methods: Sequence[Method]) -> None:
     """Writes wrench.csv (best settings), wrench_settings.csv and wrench_all.csv (all settings)."""
-    head = ("scenario", "scene", "segment", "quantity", SHIPPED, *(m.name for m in methods))
-    _write(folder / "wrench.csv", (*head, "best", "ours"), _wide(outcomes, methods))
-    head = ("scenario", "method", "bandwidth", "setting", "scene", "segment", "quantity", "value")
+    where = ("scene", "part", "quantity")  # a part is a segment, which is also a method's name
+    head = ("scenario", *where, SHIPPED, *(m.name for m in methods), "best", "verdict")
+    _write(folder / "wrench.csv", head, _wide(outcomes, methods))
+    head = ("scenario", "method", "bandwidth", "setting", *where, "value")
     _write(folder / "wrench_all.csv", head, _long(outcomes))
     chosen = (
         (o.scenario.name, m.name, o.best(m.name).bandwidth, o.best(m.name).setting)
