@@ -64,7 +64,8 @@ class Touched:
         found_link: that was named, on `found_body`.
         status: of the contact that was matched with this touch.
         std: root of the trace of its covariance [m].
-        level: smallest credible region that holds the truth, 0 to 1 (`credibility`).
+        level: probability of the smallest credible region that holds the truth: `Region.level` of
+            a single contact, `credibility` of one of several.
         event_error: distance of the event's position at its own time [m].
         event_body: of the event.
         candidate: probability of the best candidate within reach of the truth; 0: there is none.
@@ -253,6 +254,9 @@ def _judge(pipeline: Pipeline, scene: Scene) -> list[Touched]:
             about |= {"event_error": float(apart[i, k]), "event_body": body}
         if (k := mine[i]) is not None:
             about |= _of_answer(answers[k], touch, places[i])
+            if len(answers) == 1:
+                region = pipeline.localizer.region()
+                about["level"] = region.level(touch.patch.link, places[i])
         about |= _of_candidates(answers, touch, places[i])
         here = touch.patch
         T = robot.poses(touch.q)[here.node] @ here.T_node_link
