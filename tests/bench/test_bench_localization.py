@@ -14,6 +14,7 @@ from touchline.bench.localization import Plan, main, run_plan
 from touchline.bench.localization_table import wilson
 from touchline.bench.localization_trial import Cell, make_scene, pair_rank, run_trial
 from touchline.bench.matching import distances, match
+from touchline.bench.surface_map import SurfaceMap
 from touchline.bench.touches import TouchSampler, touch_loads
 from touchline.contact.skin import Skin
 from touchline.errors import InputError
@@ -174,7 +175,7 @@ def test_wilson_interval():
 
 
 def test_processes_do_not_change_the_trials():
-    plan = Plan(("sara",), (1, 2), (1,), ("apart",), runs=27, seed=2)
+    plan = Plan(("sara",), (1, 2), (1,), ("apart",), runs=27, seed=2, baselines=())
     alone = [trial for chunk in run_plan(plan, 0) for trial in chunk]
     shared = [trial for chunk in run_plan(plan, 2) for trial in chunk]
     assert {(t.cell, t.run): repr(t) for t in alone} == {(t.cell, t.run): repr(t) for t in shared}
@@ -182,10 +183,27 @@ def test_processes_do_not_change_the_trials():
 
 
 def test_tables_and_files_hold_every_trial(tmp_path, capsys):
-    plan = Plan(("sara",), (1, 2), (0, 1), ("apart", "together"), runs=3)
+    plan = Plan(("sara",), (1, 2), (0, 1), ("apart", "together"), runs=2, baselines=("first",))
     main(plan, tmp_path, processes=0)
     printed = capsys.readouterr().out
     assert "sara, noise-free" in printed and "Han and Kim" in printed
-    assert (tmp_path / "tables.txt").read_text() == printed
+    assert printed.startswith((tmp_path / "tables.txt").read_text())
     with (tmp_path / "trials.csv").open() as file:
-        assert len(list(csv.DictReader(file))) == 2 * 3 * (1 + 2 + 2)
+        assert len(list(csv.DictReader(file))) == 2 * 2 * (1 + 2 + 2)
+    for name in ("errors_sara", "arm_sara"):
+        assert (tmp_path / f"{name}.png").stat().st_size > 10_000
+
+
+def test_a_folder_that_cannot_be_made_is_told_before_the_work(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="cannot be used as a directory"):
+        main(Plan(("sara",), runs=10**6), tmp_path / "file" / "out")
+
+
+def test_colours_are_those_of_the_nearest_touches():
+    skin = Skin(tl.load_robot("sara"))
+    points = np.array([[0.0, 0.0, 0.01 * i] for i in range(40)])
+    values = SurfaceMap(skin, ["link3"] * 40, points, np.where(points[:, 2] < 0.2, 1e-3, 1e-2))
+    near = values.at("link3", np.array([[0.0, 0.0, 0.02], [0.0, 0.0, 0.37]]))
+    np.testing.assert_allclose(near, [1e-3, 1e-2])
+    assert np.isnan(values.at("link4", points)).all()

@@ -11,6 +11,7 @@ import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
 from time import perf_counter
@@ -35,6 +36,7 @@ from touchline.bench.localization_trial import (
     make_scene,
     run_trial,
 )
+from touchline.errors import InputError
 
 CHUNK = 25  # runs handed to a process at once
 TIMED = 6  # runs whose updates are timed
@@ -127,6 +129,8 @@ def main(plan: Plan | None = None, out: Path | None = None, processes: int | Non
     from tqdm import tqdm
 
     plan = plan or Plan()
+    if out is not None:
+        _prepare(out)
     for arm in plan.robots:
         arm_and_skin(arm, plan.noise[0])  # a missing model is told before the work
     cells = plan.cells()
@@ -137,15 +141,27 @@ def main(plan: Plan | None = None, out: Path | None = None, processes: int | Non
             bar.update(len(chunk))
     order = {cell: i for i, cell in enumerate(cells)}
     trials.sort(key=lambda trial: (order[trial.cell], trial.run))
-    times = {cell: update_time(cell, plan.seed) for cell in cells}
+    times = {cell: update_time(cell, plan.seed, min(TIMED, plan.runs)) for cell in cells}
     parts = [tables(trials, times), published(), rank_table(trials), baseline_table(trials)]
     parts.append(failures(trials))
     text = "\n\n".join(part for part in parts if part)
     print(text)
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
         (out / "tables.txt").write_text(text + "\n", encoding="utf-8")
         write(out / "trials.csv", trials)
+        from touchline.bench.localization_figures import save_figures
+
+        save_figures(out, trials)
+        print(f"\nTables, every touch, and figures are in {out}")
+
+
+def _prepare(out: Path) -> None:
+    """Makes the folder, and misses before the work what is missing."""
+    import_module("matplotlib")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{out}: cannot be used as a directory: {error.strerror}") from error
 
 
 def write(path: Path, trials: Sequence[Trial]) -> None:

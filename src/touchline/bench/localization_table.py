@@ -14,8 +14,9 @@ from touchline.bench.tables import Row, aligned
 Array = NDArray[np.float64]
 
 HEAD: Row = (
-    "contacts", "begin", "arm", "runs", "found", "95 % interval", "as event", "body", "> 10 cm",
-    "median", "p99", "RMS", "RMS found", "force", "90 % holds", "unsure", "us",
+    "contacts", "begin", "arm", "runs", "found", "95 % interval", "as event", "in the set",
+    "surely wrong", "body", "> 10 cm", "median", "p99", "RMS", "RMS found", "force",
+    "90 % holds", "unsure", "us",
 )  # fmt: skip
 # Contacts, found, RMS [mm], RMS of the force [N], time [ms], source.
 PUBLISHED = (
@@ -30,10 +31,11 @@ PUBLISHED = (
 )
 LEGEND = (
     "found: every touch within 22.5 mm at the last sample, nothing else named; as event: the same\n"
-    "of the events' positions; body: the right rigid body named; lengths in mm, force RMS in N;\n"
-    "RMS over all that was located, RMS found without what is farther off than 22.5 mm;\n"
-    "90 % holds: share of truths inside the 90 % region; unsure: not answered by `located`;\n"
-    "us: median time of Pipeline.update while touched."
+    "of the events' positions; in the set: every touch near one of the returned explanations;\n"
+    "surely wrong: as many places as touches, all of them `located`, but not found; body: the right\n"
+    "rigid body named; lengths in mm, force RMS in N; RMS over all that was located, RMS found\n"
+    "without what is farther off than 22.5 mm; 90 % holds: share of truths in the 90 % region;\n"
+    "unsure: not answered by `located`; us: median time of Pipeline.update while touched."
 )
 
 
@@ -161,6 +163,8 @@ def _line(cell: Cell, trials: list[Trial], time: float) -> Row:
         _percent(good / len(trials)),
         f"{100 * low:.2f}-{100 * high:.2f}",
         _percent(np.mean([trial.event_found for trial in trials])),
+        _percent(np.mean([trial.in_set for trial in trials])),
+        _percent(np.mean([trial.confidently_wrong for trial in trials])),
         _percent(np.mean([touch.found_body == touch.body for touch in touches])),
         _percent(np.mean(error > GROSS)),
         *(_mm(np.percentile(known, p) if len(known) else np.nan) for p in (50, 99)),
