@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "arrays.hpp"
 #include "touchline/localizer.hpp"
 
 namespace contact {
@@ -176,43 +177,79 @@ inline Out events(tl::Localizer& l) {
   return array(out, out.size() / event_width(l), event_width(l));
 }
 
-// N samples: for each sample and each contact on a segment that is touched, its sample, its
-// segment, its number, its answer; and for each event that ends, sample, segment, number, event.
-inline nb::tuple follow(tl::Localizer& l, const In& time, const In& rows, const In& normalized,
-                        const In& levels, const In& quiet, const In& q, const In& qd) {
+// One sample on its way through the localizer.
+struct FollowedSample {
+  double time;
+  const double *row, *normalized, *levels, *quiet, *q, *qd;
+};
+
+// For each contact on a segment that is touched: sample `i`, segment, number, answer; and for each
+// event that ends: sample, segment, number, event.
+inline void follow(tl::Localizer& l, std::size_t i, const FollowedSample& x,
+                   std::vector<double>& answers, std::vector<double>& ended) {
+  bool ready = false;
+  for (std::size_t g = 0; g < l.segments(); ++g) {
+    const bool touched = x.levels[g] > 0.0;
+    if (touched && !ready) l.set_state(x.q, x.qd, x.quiet);
+    ready = ready || touched;
+    l.follow(static_cast<int>(g), touched, x.row, x.normalized, x.time, x.q);
+    for (tl::Localizer::Memory* memory : l.ended()) {
+      push_event(l, i, g, *memory, ended);
+      memory->serial = -1;
+    }
+    for (int k = 0; touched && k < l.tracks().count(); ++k) {
+      const std::size_t at = answers.size();
+      answers.resize(at + 3 + kWidth);
+      answers[at] = static_cast<double>(i);
+      answers[at + 1] = static_cast<double>(g);
+      answers[at + 2] = static_cast<double>(l.tracks()[k].serial);
+      write(l, l.tracks()[k].answer, answers.data() + at + 3);
+    }
+  }
+}
+
+inline nb::object table(const std::vector<double>& values, std::size_t columns) {
+  arrays::Out out({values.size() / columns, columns});
+  std::copy(values.begin(), values.end(), out.data());
+  return out.release();
+}
+
+// N samples.
+inline nb::tuple follow_run(tl::Localizer& l, nb::handle time, nb::handle rows,
+                            nb::handle normalized, nb::handle levels, nb::handle quiet,
+                            nb::handle q, nb::handle qd) {
   const std::size_t n = l.joints(), m = l.segments(), r = l.tests(), width = l.width();
-  const std::size_t count = time.size();
-  if (rows.size() != count * width || normalized.size() != count * r ||
-      levels.size() != count * m || quiet.size() != count * m || q.size() != count * n || qd.size() != count * n)
-    throw std::invalid_argument("the arrays do not belong to the same samples");
+  const std::size_t count = arrays::length(time);
+  const double* stamps = arrays::numbers(time, {count});
+  FollowedSample x{0.0, arrays::numbers(rows, {count, width}),
+                   arrays::numbers(normalized, {count, r}), arrays::numbers(levels, {count, m}),
+                   arrays::numbers(quiet, {count, m}), arrays::numbers(q, {count, n}),
+                   arrays::numbers(qd, {count, n})};
   std::vector<double> answers, ended;
   {
     nb::gil_scoped_release release;
     for (std::size_t i = 0; i < count; ++i) {
-      bool ready = false;
-      for (std::size_t g = 0; g < m; ++g) {
-        const bool touched = levels.data()[i * m + g] > 0.0;
-        if (touched && !ready) l.set_state(q.data() + i * n, qd.data() + i * n, quiet.data() + i * m);
-        ready = ready || touched;
-        l.follow(static_cast<int>(g), touched, rows.data() + i * width, normalized.data() + i * r,
-                 time.data()[i], q.data() + i * n);
-        for (tl::Localizer::Memory* memory : l.ended()) {
-          push_event(l, i, g, *memory, ended);
-          memory->serial = -1;
-        }
-        for (int k = 0; touched && k < l.tracks().count(); ++k) {
-          const std::size_t at = answers.size();
-          answers.resize(at + 3 + kWidth);
-          answers[at] = static_cast<double>(i);
-          answers[at + 1] = static_cast<double>(g);
-          answers[at + 2] = static_cast<double>(l.tracks()[k].serial);
-          write(l, l.tracks()[k].answer, answers.data() + at + 3);
-        }
-      }
+      x.time = stamps[i];
+      follow(l, i, x, answers, ended);
+      x = {0.0, x.row + width, x.normalized + r, x.levels + m, x.quiet + m, x.q + n, x.qd + n};
     }
   }
-  return nb::make_tuple(array(answers, answers.size() / (3 + kWidth), 3 + kWidth),
-                        array(ended, ended.size() / event_width(l), event_width(l)));
+  return nb::make_tuple(table(answers, 3 + kWidth), table(ended, event_width(l)));
+}
+
+// One sample.
+inline nb::tuple follow_sample(tl::Localizer& l, double time, nb::handle row,
+                               nb::handle normalized, nb::handle levels, nb::handle quiet,
+                               nb::handle q, nb::handle qd) {
+  const std::size_t n = l.joints(), m = l.segments();
+  const FollowedSample x{time, arrays::numbers(row, {l.width()}),
+                         arrays::numbers(normalized, {l.tests()}), arrays::numbers(levels, {m}),
+                         arrays::numbers(quiet, {m}), arrays::numbers(q, {n}),
+                         arrays::numbers(qd, {n})};
+  std::vector<double> answers, ended;
+  answers.reserve(4 * (3 + kWidth));
+  follow(l, 0, x, answers, ended);
+  return nb::make_tuple(table(answers, 3 + kWidth), table(ended, event_width(l)));
 }
 
 // Rows: surface, centre, probability, log of the density.
@@ -296,8 +333,9 @@ inline void bind(nb::module_& m) {
            "quiet"_a.none())
       .def("region", &region)
       .def("events", &events)
-      .def("follow", &follow, "time"_a, "rows"_a, "normalized"_a, "levels"_a, "quiet"_a,
-           "q"_a, "qd"_a);
+      .def("follow", &follow_run, "time"_a, "rows"_a, "normalized"_a, "levels"_a, "quiet"_a,
+           "q"_a, "qd"_a)
+      .def("follow_sample", &follow_sample);
 }
 
 }  // namespace contact

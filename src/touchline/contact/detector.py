@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Detection of contacts and collisions on the residuals, one sample or a recording at a time."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -36,6 +37,15 @@ class Detection:
     levels: Array
     normalized: Array
     quiet: Array
+
+    @staticmethod
+    def joined(samples: "Sequence[Detection]") -> "Detection":
+        """Single samples as N samples."""
+        return Detection(
+            np.array([sample.levels for sample in samples]),
+            np.array([sample.normalized for sample in samples]),
+            np.array([sample.quiet for sample in samples]),
+        )
 
 
 @dataclass(frozen=True)

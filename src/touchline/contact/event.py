@@ -196,11 +196,15 @@ class EventRecorder:
         self._robot = detector.observer.robot
         self._rows = detector.thresholds.rows
         self._zones = Zones(self._robot)
-        self._open: dict[int, tuple[Event, _Gathered]] = {}
+        self._open: dict[float, tuple[Event, _Gathered]] = {}
 
-    def open_events(self) -> dict[int, Event]:
-        """Events that last, by number of the contact."""
-        return {number: event for number, (event, _) in self._open.items()}
+    def knows(self, numbers: list[float]) -> bool:
+        """Has an event begun for each of these numbers of contacts?"""
+        return all(number in self._open for number in numbers)
+
+    def event(self, number: float) -> Event:
+        """The event that lasts, by number of its contact."""
+        return self._open[number][0]
 
     def add(
         self,

@@ -172,6 +172,20 @@ class Localizer:
             np.ascontiguousarray(qd, float),
         )
 
+    def follow_sample(
+        self, time: float, q: Array, qd: Array, estimate: Estimate, detection: Detection
+    ) -> tuple[Array, Array]:
+        """Takes one sample, as `follow` takes N."""
+        return self.core.follow_sample(
+            time,
+            estimate.rows,
+            detection.normalized,
+            detection.levels,
+            detection.quiet,
+            q,
+            qd,
+        )
+
     def region(self) -> Region:
         """The posterior over links and surfaces of the contact that was located last.
 

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from touchline.contact.classification import Classes, Classifier, Kind
+from touchline.contact.classification import Classifier
 from touchline.contact.contact import Contact
 from touchline.contact.detector import Detection, Detector
 from touchline.contact.event import Event, EventRecorder
+from touchline.contact.live_contact import LiveContact, LiveStream
 from touchline.contact.localizer import CONTACT, TORQUE_ERROR, Localizer
 from touchline.contact.skin import Skin
 from touchline.contact.table import ContactTable
@@ -80,7 +81,7 @@ class Pipeline:
         self.classifier = Classifier(self.observer, self.detector.thresholds, self.zones)
         self.recorder = EventRecorder(self.detector, self.localizer)
         self.contacts = ContactTable.empty(self.localizer)
-        self._pending: list[tuple] = []
+        self._stream = LiveStream(self.classifier)
         self._touched = b""
         self._idle = np.zeros(len(robot.segment_names)).tobytes()
 
@@ -136,60 +137,32 @@ class Pipeline:
         return estimate, detection
 
     def _follow(self, time, q, qd, estimate, detection, touched: bytes) -> list[Contact]:
-        q, qd = np.asarray(q, float), np.asarray(qd, float)
-        stamp = np.array([time], float)
-        answers, ended = self.localizer.follow(stamp, q, qd, estimate, detection)
-        batch = self.observer.estimate(estimate.rows[None])
-        classes = self.classifier.follow(stamp, batch, detection.levels[None])
-        self._pending.append((time, q.copy(), estimate.rows, detection, classes, answers, ended))
-        new = set(answers[:, 2].astype(int)) - self.recorder.open_events().keys()
-        if new or len(ended) or touched != self._touched or len(self._pending) >= PENDING:
+        q, qd = np.array(q, float), np.ascontiguousarray(qd, float)
+        answers, ended = self.localizer.follow_sample(time, q, qd, estimate, detection)
+        sample = self._stream.add(float(time), q, estimate, detection, answers, ended)
+        numbers = answers[:, 2].tolist()
+        known = self.recorder.knows(numbers)
+        changed = touched != self._touched or len(ended)
+        if changed or not known or len(self._stream.samples) >= PENDING:
             self._record()
-        return [self._contact(row, estimate, classes) for row in answers]
+        return [
+            LiveContact(sample, row, self.recorder.event(number), self.localizer, self.zones)
+            for row, number in zip(answers, numbers, strict=True)
+        ]
 
     def _record(self) -> None:
         """Hands the samples of a live stream on to the events."""
-        if not self._pending:
+        if not self._stream.samples:
             return
-        times, qs, rows, detections, classes, answers, ended = zip(*self._pending, strict=True)
-        self._pending = []
-        for sample, part in enumerate(answers):
-            part[:, 0] = sample
-        levels = np.array([detection.levels for detection in detections])
-        normalized = np.array([detection.normalized for detection in detections])
-        quiet = np.array([detection.quiet for detection in detections])
-        for sample, part in enumerate(ended):
-            part[:, 0] = sample
+        samples, classes = self._stream.take()
+        for i, sample in enumerate(samples):
+            sample.answers[:, 0] = sample.ended[:, 0] = i
         self.recorder.add(
-            np.array(times),
-            np.array(qs),
-            self.observer.estimate(np.array(rows)),
-            Detection(levels, normalized, quiet),
-            Classes.joined(classes),
-            np.concatenate(answers),
-            np.concatenate(ended),
-        )
-
-    def _contact(self, row: Array, estimate: Estimate, classes: Classes) -> Contact:
-        g = int(row[1])
-        kind = int(classes.kinds[0, g])
-        event = self.recorder.open_events()[int(row[2])]
-        answer = self.localizer.answer(row[CONTACT:])
-        return Contact(
-            event.segment,
-            event.id,
-            "collision" if kind == Kind.COLLISION else "contact",
-            answer.status or "wrench_only",
-            None if event.segment == "root" else estimate.segment_wrench[g],
-            answer.link,
-            answer.body,
-            answer.body_probability,
-            answer.position,
-            answer.force,
-            answer.covariance,
-            answer.candidates,
-            kind >= Kind.CONTACT,
-            self.zones.of(event.segment, answer.link),
-            bool(classes.clamped[0, g]),
-            float(classes.rates[0, g]),
+            np.array([sample.time for sample in samples]),
+            np.array([sample.q for sample in samples]),
+            self.observer.estimate(np.array([sample.estimate.rows for sample in samples])),
+            Detection.joined([sample.detection for sample in samples]),
+            classes,
+            np.concatenate([sample.answers for sample in samples]),
+            np.concatenate([sample.ended for sample in samples]),
         )

@@ -27,6 +27,10 @@ class Estimate:
         self.rows = rows
         self._slices = slices
 
+    def like(self, rows: Array) -> "Estimate":
+        """Other rows of the same observer."""
+        return Estimate(rows, self._slices)
+
     def _part(self, name: str) -> Array:
         return self.rows[..., self._slices[name]]
 
