@@ -5,7 +5,7 @@ CORE := $(shell find core -name '*.hpp' -o -name '*.cpp' -o -name 'CMakeLists.tx
 
 .PHONY: demo test check format clean
 
-demo: .venv/ready
+demo: .venv/demo
 	.venv/bin/touchline demo $(ARGS)
 
 test: .venv/ready
@@ -23,6 +23,9 @@ format: .venv/ready
 
 clean:
 	rm -rf .venv build
+
+.venv/demo: pyproject.toml scripts/setup.sh $(CORE)
+	scripts/setup.sh demo
 
 .venv/ready: pyproject.toml scripts/setup.sh $(CORE)
 	scripts/setup.sh

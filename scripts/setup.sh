@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Makes .venv with Touchline and everything its demo, tests and checks need.
+# Makes .venv with Touchline: `setup.sh demo` with what the pages need, `setup.sh` also with what the
+# tests and checks need, which is much more.
 # What is missing is installed where that is allowed (root on Debian), else named in one line.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -36,11 +37,16 @@ need "Python's venv module" python3-venv python3 -c 'import ensurepip, venv'
 need "Python's header files" python3-dev python3 -c \
   'import os, sysconfig; os.stat(os.path.join(sysconfig.get_paths()["include"], "Python.h"))'
 
+[ -x .venv/bin/python ] || python3 -m venv .venv
+pip() { .venv/bin/python -m pip install --quiet --disable-pip-version-check "$@"; }
+pip --upgrade "pip>=25.1"
+if [ "${1:-all}" = demo ]; then
+  pip --editable ".[logs,report,view]"
+  touch .venv/demo
+  exit
+fi
+
 obtain chromium sh -c 'command -v chromium || command -v google-chrome' || echo \
   "touchline: no Chromium, so pages are not tested; on Debian: apt-get install chromium" >&2
-
-[ -x .venv/bin/python ] || python3 -m venv .venv
-.venv/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
-.venv/bin/python -m pip install --quiet --disable-pip-version-check \
-  --editable ".[logs,report,view]" --group test --group check
-touch .venv/ready
+pip --editable ".[logs,report,view]" --group test --group check
+touch .venv/demo .venv/ready
