@@ -37,6 +37,7 @@ need "Python's venv module" python3-venv python3 -c 'import ensurepip, venv'
 need "Python's header files" python3-dev python3 -c \
   'import os, sysconfig; os.stat(os.path.join(sysconfig.get_paths()["include"], "Python.h"))'
 
+echo "touchline: setting up .venv, which takes a minute or two" >&2
 [ -x .venv/bin/python ] || python3 -m venv .venv
 pip() { .venv/bin/python -m pip install --quiet --disable-pip-version-check "$@"; }
 pip --upgrade "pip>=25.1"

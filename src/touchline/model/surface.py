@@ -116,12 +116,22 @@ def _name(shape: Geometry) -> str:
 def _clean(vertices: Array, faces: NDArray[np.int64]) -> Triangles:
     """Merge equal vertices (an STL repeats them in each facet); drop faces without an area."""
     step = max(1e-7 * float(np.ptp(vertices, axis=0).max(initial=0.0)), 1e-12)
-    _, first, merged = np.unique(
-        np.round(vertices / step).astype(np.int64), axis=0, return_index=True, return_inverse=True
-    )
-    faces = merged.reshape(-1)[faces]
+    first, merged = _distinct(np.round(vertices / step).astype(np.int64))
+    faces = merged[faces]
     a, b, c = faces.T
     return vertices[first], faces[(a != b) & (b != c) & (c != a)]
+
+
+def _distinct(rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return where each distinct row (V, 3) first stands, and which of them each row is.
+
+    As `np.unique` along an axis, several times faster.
+    """
+    order = np.lexsort(rows.T[::-1])
+    new = np.append(True, (np.diff(rows[order], axis=0) != 0).any(axis=1))[: len(rows)]
+    merged = np.empty(len(rows), np.int64)
+    merged[order] = np.cumsum(new) - 1
+    return order[new], merged
 
 
 def _doubts(faces: NDArray[np.int64]) -> list[str]:
@@ -130,12 +140,13 @@ def _doubts(faces: NDArray[np.int64]) -> list[str]:
     Closed: each edge belongs to two faces. Consistent: they run along it in opposite directions.
     """
     edges = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    _, used = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+    one = np.array([int(faces.max(initial=0)) + 1, 1])  # makes one number of an edge
+    _, used = np.unique(np.sort(edges, axis=1) @ one, return_counts=True)
     if (used % 2 == 1).any():
         open_edges = int((used % 2 == 1).sum())
         return [f"is not closed ({open_edges} open edges); a line may pass through it unnoticed"]
-    forward, there = np.unique(edges, axis=0, return_counts=True)
-    backward, back = np.unique(edges[:, ::-1], axis=0, return_counts=True)
+    forward, there = np.unique(edges @ one, return_counts=True)
+    backward, back = np.unique(edges[:, ::-1] @ one, return_counts=True)
     if len(forward) != len(backward) or (forward != backward).any() or (there != back).any():
         return ["its faces are not turned the same way; some normals point inwards"]
     return []
