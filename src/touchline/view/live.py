@@ -51,7 +51,7 @@ class LivePage:
         self._sara, self._full = load_robot("sara"), load_robot("sara-full")
         self._skin = Skin(self._sara)
         self.arm = LiveArm(self._full, self._skin, seed)
-        self._todo: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._todo: queue.SimpleQueue[Callable[[], object]] = queue.SimpleQueue()
         self._pulls: dict[int, Hand] = {}
         self._page = server.page
         dress(self._page)
@@ -60,12 +60,12 @@ class LivePage:
         self._contacts = ContactScene(self._page.scene, self._robot)
         self._controls = Controls(
             self._page.gui,
-            lambda: self._todo.put(self._push_anywhere),
-            lambda: self._todo.put(self.arm.hands.release_all),
+            lambda: self.post(lambda: self.arm.push_anywhere(self._controls.force)),
+            lambda: self.post(self.arm.hands.release_all),
         )
         self._history = History(self._sara.segment_names)
         self._plots = _in_panel_of_their_own(self._page, self._history)
-        let_touch(self._robot, self, self._todo.put)
+        let_touch(self._robot, self, self.post)
         self._method = _Chosen(self._sara, self._full, self._skin)
         self._judge = Judge(self._sara)
         self.felt: Felt | None = None
@@ -97,8 +97,9 @@ class LivePage:
         if hand is not None and not self._controls.keep:
             hand.released = True
 
-    def _push_anywhere(self) -> None:
-        self.arm.push_anywhere(self._controls.force)
+    def post(self, call: Callable[[], object]) -> None:
+        """Has something called between two frames; the arm belongs to the thread of `run`."""
+        self._todo.put(call)
 
     def stop(self) -> None:
         """Ends `run`."""
