@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Contacts on the page: point, force, line of action, and how sure the point is."""
 
+from typing import Literal
+
 import numpy as np
 import trimesh
 import viser
@@ -19,9 +21,8 @@ COLOURS: dict[str, Colour] = {
 METRES_PER_NEWTON = 0.008
 WEAK = 0.5  # N; a smaller force has no arrow
 POINT_RADIUS, ARROW_RADIUS, HEAD_RADIUS, HEAD_LENGTH = 0.011, 0.008, 0.019, 0.045  # m
-SLIM = 0.45  # of the true arrow, which is seen within the one that is felt
-CLEAR = 0.55  # opacity of the latter
-LINE = ((0.0, 0.0, -0.9), (0.0, 0.0, 0.9))  # m
+WIDE = 1.75  # of the truth, which is seen as an outline of what is felt
+LINE = ((0.0, 0.0, -0.45), (0.0, 0.0, 0.45))  # m
 SIGMAS = 2.0  # radius of the disc
 SMALLEST_DISC, LARGEST_DISC, DISC_THICKNESS = 0.016, 0.4, 0.004  # m
 
@@ -41,16 +42,17 @@ class ContactMarker:
         colour = COLOURS[kind]
         self._root = scene.add_frame(name, show_axes=False, visible=False)
         self._arrow = scene.add_frame(f"{name}/arrow", show_axes=False)
-        slim, clear = (SLIM, None) if kind == "truth" else (1.0, CLEAR)
-        self._point = scene.add_icosphere(
-            f"{name}/point", (0.8 if kind == "truth" else 1.0) * POINT_RADIUS, color=colour
+        # Of the truth only the far side is drawn, so that it never hides what is felt.
+        wide, side = (WIDE, "back") if kind == "truth" else (1.0, "front")
+        self._point = _add(
+            scene, f"{name}/point", trimesh.creation.icosphere(2, wide * POINT_RADIUS), colour, side
         )
-        head = trimesh.creation.cone(slim * HEAD_RADIUS, HEAD_LENGTH, sections=24)
+        head = trimesh.creation.cone(wide * HEAD_RADIUS, HEAD_LENGTH, sections=24)
         head.apply_transform(np.diag([1.0, -1.0, -1.0, 1.0]))  # its tip at the origin, towards z
-        shaft = trimesh.creation.cylinder(slim * ARROW_RADIUS, 1.0, sections=16)
+        shaft = trimesh.creation.cylinder(wide * ARROW_RADIUS, 1.0, sections=16)
         shaft.apply_translation((0.0, 0.0, -0.5))
-        _add(scene, f"{name}/arrow/head", head, colour, clear)
-        self._shaft = _add(scene, f"{name}/arrow/shaft", shaft, colour, clear)
+        _add(scene, f"{name}/arrow/head", head, colour, side)
+        self._shaft = _add(scene, f"{name}/arrow/shaft", shaft, colour, side)
         self._line = scene.add_line_segments(
             f"{name}/line", np.array([LINE]), colour, thickness=2.0, thickness_units="screen"
         )
@@ -103,11 +105,17 @@ def _add(
     name: str,
     mesh: trimesh.Trimesh,
     colour: Colour,
+    side: Literal["front", "back"] = "front",
     opacity: float | None = None,
 ) -> viser.MeshHandle:
     smooth = trimesh.graph.smooth_shade(mesh, angle=np.deg2rad(35.0))
     return scene.add_mesh_simple(
-        name, np.asarray(smooth.vertices), np.asarray(smooth.faces), color=colour, opacity=opacity
+        name,
+        np.asarray(smooth.vertices),
+        np.asarray(smooth.faces),
+        color=colour,
+        side=side,
+        opacity=opacity,
     )
 
 

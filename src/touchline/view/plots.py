@@ -49,7 +49,7 @@ class WrenchPlots:
             if quantity != self._shown:
                 plot.series, plot.title = _series(quantity), _title(segment, quantity)
             size = np.nanmax(np.abs(np.array(data[1:])), initial=least)
-            limit = float(np.ceil(size / least) * least)
+            limit = 1.1 * float(np.ceil(size / least) * least)  # no number of the axis at its end
             plot.scales = {
                 "x": uplot.Scale(time=False, range=(-SECONDS, 0.0)),
                 "y": uplot.Scale(range=(-limit, limit)),

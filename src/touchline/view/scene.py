@@ -76,7 +76,7 @@ def dress(page: viser.ViserServer) -> None:
     scene.configure_default_lights(True, cast_shadow=False)
     scene.add_light_ambient("/light/ambient", intensity=1.2)
     scene.add_grid(
-        "/ground", GROUND, GROUND, cell_color=(236, 238, 240), section_color=(222, 225, 229)
+        "/ground", GROUND, GROUND, cell_color=(236, 238, 240), section_color=(228, 231, 234)
     )
     page.initial_camera.position = (1.45, 1.05, 1.05)
     page.initial_camera.look_at = (0.2, 0.05, 0.5)
