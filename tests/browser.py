@@ -210,6 +210,12 @@ class Browser:
         """Moves there and clicks [pixels]."""
         self.drag((x, y), (x, y), steps=0)
 
+    def draw(self, pictures: int = 2) -> None:
+        """Waits until the page has been drawn that often."""
+        for _ in range(pictures):
+            self.run("new Promise(drawn => requestAnimationFrame(drawn)).then(() => 0)")
+        self.rest(0.03)
+
     def mouse(self, kind: str, x: float, y: float, buttons: int = 0) -> None:
         """One event of the mouse: "Moved", "Pressed" or "Released"."""
         button = "left" if buttons or kind == "Released" else "none"
@@ -232,12 +238,12 @@ class Browser:
     ) -> None:
         """Presses the left button at one place [pixels] and moves it to another."""
         self.mouse("Moved", *start)
-        self.rest(0.15)  # the page finds out in its next picture what lies below the mouse
+        self.draw()  # the page finds out in its next picture what lies below the mouse
         self.mouse("Pressed", *start, buttons=1)
         for step in range(1, steps + 1):
             x, y = (a + (b - a) * step / steps for a, b in zip(start, end, strict=True))
             self.mouse("Moved", x, y, buttons=1)
-            self.rest(0.06)
+            self.draw()
         if release:
             self.mouse("Released", *end)
 

@@ -7,6 +7,7 @@ import socket
 
 import pytest
 import viser
+from browser import until
 from websockets.sync.client import connect
 
 from touchline.errors import InputError
@@ -112,9 +113,10 @@ def test_the_page_may_load_nothing_from_elsewhere_and_stands_in_no_frame(server)
 
 
 def test_listens_on_this_machine_alone(server):
-    sockets = server.page._websock_server._live_connections
-    assert not sockets and server.page.get_host() == "127.0.0.1" and not server.token
-    assert server.url == f"http://127.0.0.1:{server.page.get_port()}/"
+    port = server.page.get_port()
+    assert server.url == f"http://127.0.0.1:{port}/" and not server.token
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.2", port), 5)
 
 
 def test_another_address_warns_and_needs_the_token(open_server, capsys):
@@ -164,3 +166,12 @@ def test_the_next_port_is_taken_where_one_is_busy(server):
 def test_an_address_that_is_not_ours_is_an_error(host, port):
     with pytest.raises(InputError, match="--host"):
         PageServer("test", host=host, port=port)
+
+
+def test_a_browser_with_the_token_gets_in_and_one_without_does_not(open_server, browser):
+    port = open_server.page.get_port()
+    browser.open(f"http://127.0.0.1:{port}/")
+    browser.wait_for("open the address with the token")
+    assert not open_server.page.get_clients()
+    browser.open(f"http://127.0.0.1:{port}/?token={open_server.token}")
+    until(open_server.page.get_clients, pause=browser.rest, what="the page's connection")
