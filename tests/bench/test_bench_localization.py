@@ -34,6 +34,13 @@ def test_single_touches_are_found():
     assert np.median([trial.touches[0].error for trial in trials]) < 1e-3
 
 
+def test_an_entry_hidden_in_another_link_is_no_explanation():
+    """The line goes on into a finger where the hand's mesh covers it, on the same rigid body."""
+    panda()
+    trial = run_trial(Cell("panda"), 1500)
+    assert trial.found and trial.statuses == ("located",)
+
+
 def test_statics_are_pinocchios():
     """Weight and touches at rest, against rnea and Jacobians of a tree with free joints."""
     robot = panda()

@@ -202,8 +202,12 @@ def _baseline(
 
 
 def make_pipeline(robot: Robot, skin: Skin, rule: str = "likelihood") -> Pipeline:
-    """The pipeline as the benchmark uses it: all errors are those of the noise figures."""
-    return Pipeline(robot, skin=skin, rule=rule, torque_error=0.0)
+    """The pipeline as the benchmark uses it.
+
+    It is told what is true of the benchmark: errors are those of the noise figures alone, and how
+    large the friction cone is.
+    """
+    return Pipeline(robot, skin=skin, rule=rule, torque_error=0.0, friction=FRICTION)
 
 
 def pair_rank(robot: Robot, bodies: list[str]) -> int:

@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 
 RULES = ("likelihood", "paper")
 STATUS = (None, "located", "ambiguous", "not_separable", "wrench_only")
+FRICTION = 0.8  # coefficient of the friction cone: skin and rubber
 TORQUE_ERROR = 0.02  # a joint's torque sensor is no better, and a touch is no point
 CONTACT = 3  # numbers before an answer or an event: sample, segment, number of the contact
 FORCE = slice(7, 10)  # in an answer
@@ -97,7 +98,7 @@ class Localizer:
         thresholds: Thresholds | None = None,
         period: float = 1e-3,
         rule: str = "likelihood",
-        friction: float = 0.8,
+        friction: float = FRICTION,
         wrench_error: float = 0.0,
         torque_error: float = TORQUE_ERROR,
         skin: Skin | None = None,

@@ -11,7 +11,7 @@ from touchline.contact.contact import Contact
 from touchline.contact.detector import Detection, Detector
 from touchline.contact.event import Event, EventRecorder
 from touchline.contact.live_contact import LiveContact, LiveStream
-from touchline.contact.localizer import CONTACT, TORQUE_ERROR, Localizer
+from touchline.contact.localizer import CONTACT, FRICTION, TORQUE_ERROR, Localizer
 from touchline.contact.skin import Skin
 from touchline.contact.table import ContactTable
 from touchline.contact.zones import Zones
@@ -52,6 +52,7 @@ class Pipeline:
         wrench_error: of gains and model, as a part of the load, and `torque_error`, for the
             localizer's weights.
         skin: the robot's surfaces, if already at hand.
+        friction: coefficient of the cone in which pushes are looked for.
     """
 
     def __init__(
@@ -64,6 +65,7 @@ class Pipeline:
         wrench_error: float = 0.0,
         torque_error: float = TORQUE_ERROR,
         skin: Skin | None = None,
+        friction: float = FRICTION,
     ) -> None:
         self.robot = robot
         self.observer = Observer(robot, bandwidth, method)
@@ -73,6 +75,7 @@ class Pipeline:
             self.detector.thresholds,
             period,
             rule=rule,
+            friction=friction,
             wrench_error=wrench_error,
             torque_error=torque_error,
             skin=skin,
