@@ -52,17 +52,19 @@ class Explanations {
         view.allow_for_motion(posture_.twist(body.node), posture_.pose(body.node).p, lag,
                               norm(Vec3{w[0], w[1], w[2]}));
       }
-      view.find_line();
+      view.begin();
     }
     std::sort(views_.begin(), views_.begin() + used_,
-              [](const View& a, const View& b) { return a.floor < b.floor; });
-    for (int i = 0; i < used_ && views_[i].floor < best_ + kWindow; ++i) {
-      if (views_[i].line) enter(views_[i]);
+              [](const View& a, const View& b) { return a.least < b.least; });
+    for (int i = 0; i < used_ && views_[i].least < best_ + kWindow; ++i) {
+      View& view = views_[i];
+      if (view.line) view.find_line();
+      if (view.line && view.floor < best_ + kWindow) enter(view);
     }
     // What must be searched for costs more, so it comes last and only where it may matter.
-    for (int i = 0; i < used_ && views_[i].floor < best_ + kRelevant; ++i) {
+    for (int i = 0; i < used_ && views_[i].least < best_ + kRelevant; ++i) {
       View& view = views_[i];
-      if (view.line && !view.steep) beside(view);
+      if (view.line && view.floor < best_ + kRelevant && !view.steep) beside(view);
       if (!measurement.has_wrench()) search(view);
     }
   }
@@ -95,6 +97,7 @@ class Explanations {
   static constexpr double kRough = 400.0;    // of chi2: where a start may lead to something
   static constexpr double kFar = 0.15;       // from the line: not what it speaks of [m]
   static constexpr double kGrazing = 4.0;  // cost of the cone beyond which a point is moved
+  static constexpr double kCoarse = 6e-3;  // joint torques alone tell no place better [m]
   static constexpr double kSame = 5e-3;    // points nearer than this are one [m]
 
   // All entries of the line into the body.
@@ -188,10 +191,17 @@ class Explanations {
         if (candidates_[count_].fit.cost() < best_ + kRough)
           found = insert(starts, found, candidates_[count_]);
       }
+      const int first = count_;
       for (int i = 0; i < found && count_ < kMost; ++i) {
         candidates_[count_] = starts[i];
-        refinement_.improve(view, candidates_[count_]);
-        if (!known(0, kSame)) keep();
+        refinement_.descend(view, candidates_[count_]);
+        if (!known(first, kSame)) keep();
+      }
+      // Only where it may matter does a point have to be the very best.
+      for (int i = first; i < count_; ++i) {
+        if (candidates_[i].fit.cost() > best_ + kRelevant) continue;
+        refinement_.settle(view, candidates_[i], kCoarse);
+        best_ = std::min(best_, candidates_[i].fit.cost());
       }
     }
   }

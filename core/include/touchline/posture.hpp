@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "touchline/tree.hpp"
@@ -23,21 +24,12 @@ class Posture {
         poses_(tree.nodes().size()),
         subspaces_(tree.nodes().size()),
         twists_(tree.nodes().size()),
-        momenta_(tree.nodes().size() * joints) {}
+        momenta_(tree.nodes().size() * joints),
+        momenta_at_(joints, std::nan("")) {}
 
   // `qd` may be null: at rest.
   void set(const double* q, const double* qd) {
-    const std::size_t joints = unit_.size();
-    for (std::size_t j = 0; j < joints; ++j) {
-      unit_[j] = 1.0;
-      tree_.sweep(q, unit_.data(), state_);
-      unit_[j] = 0.0;
-      for (std::size_t i = 0; i < poses_.size(); ++i) {
-        const NodeState<double>& s = state_.node(static_cast<int>(i));
-        momenta_[i * joints + j] = {s.linear_momentum,
-                                    s.angular_momentum + cross(s.p, s.linear_momentum)};
-      }
-    }
+    if (has_moved(q)) find_momenta(q);
     tree_.sweep(q, qd != nullptr ? qd : unit_.data(), state_);
     for (std::size_t i = 0; i < poses_.size(); ++i) place(i);
   }
@@ -63,6 +55,31 @@ class Posture {
   }
 
  private:
+  static constexpr double kStill = 2e-3;  // rad or m: within it momenta do not change noticeably
+
+  // They only weigh the noise of velocities: a part in a thousand is nothing to that.
+  bool has_moved(const double* q) {
+    for (std::size_t j = 0; j < unit_.size(); ++j) {
+      if (!(std::fabs(q[j] - momenta_at_[j]) < kStill)) return true;
+    }
+    return false;
+  }
+
+  void find_momenta(const double* q) {
+    const std::size_t joints = unit_.size();
+    for (std::size_t j = 0; j < joints; ++j) {
+      unit_[j] = 1.0;
+      tree_.sweep(q, unit_.data(), state_);
+      unit_[j] = 0.0;
+      for (std::size_t i = 0; i < poses_.size(); ++i) {
+        const NodeState<double>& s = state_.node(static_cast<int>(i));
+        momenta_[i * joints + j] = {s.linear_momentum,
+                                    s.angular_momentum + cross(s.p, s.linear_momentum)};
+      }
+    }
+    std::copy(q, q + joints, momenta_at_.begin());
+  }
+
   void place(std::size_t i) {
     const NodeState<double>& s = state_.node(static_cast<int>(i));
     const Node& node = tree_.nodes()[i];
@@ -79,6 +96,7 @@ class Posture {
   std::vector<Pose> poses_;                  // per node
   std::vector<Spatial> subspaces_, twists_;  // per node
   std::vector<Spatial> momenta_;             // per node and joint
+  std::vector<double> momenta_at_;           // joint positions
 };
 
 }  // namespace touchline

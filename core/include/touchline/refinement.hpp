@@ -2,6 +2,7 @@
 // Moves a candidate over its surface to where it explains best. No allocation.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "touchline/dense.hpp"
@@ -16,9 +17,12 @@ class Refinement {
   Refinement(const LinkSurfaces& surfaces, const ForceFitter& fitter)
       : surfaces_(surfaces), fitter_(fitter) {}
 
-  // Goes downhill: Gauss-Newton steps, then, where the friction cone or an edge stands in the way,
-  // smaller and smaller trials around.
   void improve(const View& view, Candidate& k) const {
+    if (!descend(view, k)) settle(view, k);
+  }
+
+  // Goes downhill by Gauss-Newton steps; returns whether that was all there was to do.
+  bool descend(const View& view, Candidate& k) const {
     bool arrived = false;
     for (int i = 0; i < 8 && !arrived; ++i) {
       double H[25], g[5];
@@ -33,8 +37,13 @@ class Refinement {
       arrived = length < kArrived;
       if (!arrived && !try_point(view, k, k.point + step)) break;
     }
-    if (arrived && k.fit.cone < 1.0) return;
-    for (double radius = 0.032; radius > 1e-3; radius *= 0.5) {
+    return arrived && k.fit.cone < 1.0;
+  }
+
+  // Where the friction cone or an edge stands in the way: smaller and smaller trials around, down
+  // to `finest` [m].
+  void settle(const View& view, Candidate& k, double finest = 1e-3) const {
+    for (double radius = 0.032; radius > finest; radius *= 0.5) {
       for (int round = 0; round < 3 && better_around(view, k, radius); ++round) {
       }
     }
@@ -56,7 +65,9 @@ class Refinement {
   }
 
   bool try_point(const View& view, Candidate& k, const Vec3& target) const {
-    const SurfacePoint p = surfaces_.nearest(k.surface, target, 0.06);
+    // The candidate is on the surface itself: nothing farther away than it is of interest.
+    const double limit = std::min(0.06, 1.000001 * norm(target - k.point));
+    const SurfacePoint p = surfaces_.nearest(k.surface, target, limit);
     if (p.face < 0) return false;
     const bool grasped = surfaces_[k.surface].graspable;
     const Fit fit = fitter_.fit(view.q, view.earlier(p.point), p.normal, grasped);

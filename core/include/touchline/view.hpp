@@ -61,26 +61,36 @@ struct View {
     if (moment > 1e-6) width = loosen(q, moment);
   }
 
+  // How well any wrench at all explains; no point of the body does better.
+  void begin() {
+    std::copy(q.information, q.information + 36, factor_);
+    line = cholesky(factor_, 6, 1e-9);
+    if (!line) {  // wrenches of some hundred newtons are all that there are
+      std::copy(q.information, q.information + 36, factor_);
+      for (int i = 0; i < 6; ++i) factor_[7 * i] += kRidge;
+      if (!cholesky(factor_, 6, 1e-15)) return;
+    }
+    std::copy(q.vector, q.vector + 6, best_);
+    solve_cholesky(factor_, 6, best_);
+    floor = least = std::max(0.0, q(best_));
+  }
+
   // The most likely wrench among those of one pure force: f . m = 0.
   void find_line() {
-    double L[36], w[6];
-    std::copy(q.information, q.information + 36, L);
-    line = cholesky(L, 6, 1e-9);
-    if (!line) return;
-    std::copy(q.vector, q.vector + 6, w);
-    solve_cholesky(L, 6, w);
-    least = std::max(0.0, q(w));
+    double w[6];
+    std::copy(best_, best_ + 6, w);
     for (int pass = 0; pass < 3; ++pass) {
       const double g[6] = {w[3], w[4], w[5], w[0], w[1], w[2]};
       double step[6];
       std::copy(g, g + 6, step);
-      solve_cholesky(L, 6, step);
+      solve_cholesky(factor_, 6, step);
       double power = 0.0, variance = 0.0;
       for (int i = 0; i < 3; ++i) power += w[i] * w[3 + i];
       for (int i = 0; i < 6; ++i) variance += g[i] * step[i];
       if (!(variance > 0.0)) break;
       if (pass == 0) pitch = power / std::sqrt(variance);
       for (int i = 0; i < 6; ++i) w[i] -= power / variance * step[i];
+      if (power * power < kExact * kExact * variance) break;
     }
     floor = std::max(0.0, q(w));
     wrench = {{w[0], w[1], w[2]}, {w[3], w[4], w[5]}};
@@ -89,6 +99,10 @@ struct View {
 
  private:
   static constexpr double kUncertainWay = 0.1;  // of the way since then
+  static constexpr double kRidge = 1e-7;        // information on any wrench, where there is none
+  static constexpr double kExact = 1e-6;        // sigmas of the pitch that is left
+
+  double factor_[36] = {}, best_[6] = {};
 };
 
 }  // namespace touchline
