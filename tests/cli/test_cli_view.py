@@ -28,14 +28,14 @@ def seen(monkeypatch):
 
     pytest.importorskip("viser")
     monkeypatch.setattr("touchline.view.replay_page.ReplayPage.run", run)
-    monkeypatch.setattr("webbrowser.open", pages.append)
+    monkeypatch.setattr("touchline.view.server.open_page", pages.append)
     return pages
 
 
 def test_a_log_is_analyzed_first_and_results_are_read(log, seen, tmp_path, capsys):
     out = tmp_path / "results"
     arguments = ["view", str(log), "--robot", "sara", "--out", str(out), "--port", "0"]
-    assert main([*arguments, "--no-open"]) == 0
+    assert main([*arguments, "--no-browser"]) == 0
     assert (out / "estimates.parquet").is_file() and len(seen) == 1
     assert "http://127.0.0.1:" in capsys.readouterr().out
     assert main(["view", str(out), "--port", "0"]) == 0
@@ -46,7 +46,7 @@ def test_a_log_is_analyzed_first_and_results_are_read(log, seen, tmp_path, capsy
 
 def test_without_out_nothing_is_left(log, seen, tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    assert main(["view", str(log), "--robot", "sara", "--port", "0", "--no-open"]) == 0
+    assert main(["view", str(log), "--robot", "sara", "--port", "0", "--no-browser"]) == 0
     assert len(seen) == 1 and list(tmp_path.iterdir()) == []
 
 

@@ -80,6 +80,12 @@ def read_path(path, pieces, least, largest):
     return low, high
 
 
+def gaps(low, join):
+    """How many strokes there are, if so many empty pieces make none."""
+    known = np.flatnonzero(np.isfinite(low))
+    return len(known[:1]) + int((np.diff(known) > join + 1).sum())
+
+
 @settings(max_examples=60, deadline=None)
 @given(st.integers(1, 200), st.integers(0, 99))
 def test_a_path_says_what_the_curve_was(pieces, seed):
@@ -88,7 +94,9 @@ def test_a_path_says_what_the_curve_was(pieces, seed):
     high = low + np.where(rng.random(pieces) < 0.3, 0.0, rng.exponential(size=pieces))
     low[rng.random(pieces) < 0.2] = np.nan
     high[np.isnan(low)] = np.nan
-    path = curve_path(low, high, -9.0, 15.0)
+    join = seed % 3
+    path = curve_path(low, high, -9.0, 15.0, join)
+    assert path.count("M") == gaps(low, join)
     found = read_path(path, pieces, -9.0, 15.0)
     step = 24.0 / STEPS
     np.testing.assert_allclose(found[0], low, atol=0.51 * step)

@@ -246,6 +246,16 @@ def test_labels_stay_inside_and_apart(robot):
     assert not any(a.meets(b) for i, a in enumerate(found) for b in found[:i])
 
 
+def test_labels_at_the_border_are_inside_as_well(robot):
+    scene = Scene(robot, Q)
+    top = scene.surface.corners[..., 2].max()
+    for _ in range(4):
+        scene.add_contact((0.1, 0.1, top), (0.0, 3.0, -30.0))
+    found = labels(scene, camera_of(scene), (300, 225))
+    assert all(5 < label.place[1] < 220 for label in found)
+    assert not any(a.meets(b) for i, a in enumerate(found) for b in found[:i])
+
+
 def test_words_of_an_svg_are_escaped(robot):
     scene = Scene(robot, Q)
     scene.add_contact((0.1, 0.1, 0.9), None, label='<b> & "c"')

@@ -46,6 +46,9 @@ def test_contacts_are_the_rows_of_the_table(replay, touched):
         if row["x"] is not None:
             np.testing.assert_array_equal(contact.position, [row[axis] for axis in "xyz"])
             assert contact.position_std == pytest.approx(row["position_std"])
+            assert contact.wrench is None
+        else:
+            np.testing.assert_array_equal(contact.wrench[3:], [row[f"m{axis}"] for axis in "xyz"])
         np.testing.assert_array_equal(contact.force, [row[f"f{axis}"] for axis in "xyz"])
 
 

@@ -8,8 +8,9 @@ from projection import count_near, pixel
 from touchline.view.markers import COLOURS
 from touchline.view.replay import Replay
 from touchline.view.replay_page import ReplayPage
-from touchline.view.scene import TINT
+from touchline.view.scene import ALARM, TINT
 from touchline.view.server import PageServer
+from touchline.view.signals import JOINTS
 
 
 class Visitor:
@@ -68,9 +69,10 @@ def test_a_replay_is_seen_played_and_jumped_in(browser, touched):
 
         visitor.until(point_is_shown, "the contact's point")
         assert visitor.arm_stands(time)
+        tint = ALARM if event.level == "collision" else TINT
         T = replay.robot.T_world_links(replay.posture(time))[event.link]
         image, tinted = browser.picture(), visitor.pixel(T[:3, 3] + 0.08 * T[:3, 2])
-        assert count_near(image, *tinted, TINT, 12) > 60
+        assert count_near(image, *tinted, tint, 12) > 25
 
         browser.press("Play")
         visitor.until(lambda: page.player.time > event.cleared + 0.05, "time to go on")
@@ -79,7 +81,17 @@ def test_a_replay_is_seen_played_and_jumped_in(browser, touched):
         visitor.until(lambda: f"{replay.end:.3f} s" in browser.text(), "the last time")
         visitor.until(lambda: visitor.arm_stands(replay.end), "the arm at the end")
         assert not point_is_shown()
+        T = replay.robot.T_world_links(replay.posture(replay.end))[event.link]
+        place = visitor.pixel(T[:3, 3] + 0.08 * T[:3, 2])
+        visitor.until(
+            lambda: count_near(browser.picture(), *place, tint, 12) < 10, "the link's own colour"
+        )
         charts = "Object.values(window.__viserTestpoints.uplots).map((u) => u.chart)"
         drawn = browser.run(f"{charts}.map((c) => [c.scales.x.min, c.scales.x.max])")
         assert len(drawn) == 3 and all(low < high for low, high in drawn)
+        series = f"{charts}.map((c) => c.series.map((s) => s.label).join(' '))"
+        assert "s fx fy fz now" in browser.run(series)
+        page.plots[0].choose(JOINTS)
+        curves = " ".join(["s", *replay.robot.joint_names, "now"])
+        visitor.until(lambda: browser.run(series).count(curves) == 2, "other curves")
         assert browser.complaints == []

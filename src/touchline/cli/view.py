@@ -14,7 +14,7 @@ def view(
     out: Annotated[Path | None, arg(metavar="DIR")] = None,
     host: str = "127.0.0.1",
     port: int = 8080,
-    open: bool = True,
+    browser: bool = True,
 ) -> int:
     """Replays a recording with its contacts in the browser: time line, play, events, curves.
 
@@ -29,10 +29,10 @@ def view(
         robot: Its robot.yaml, or the name of a robot that ships with Touchline (sara). Results
             know the robot they were made with; a log needs it.
         out: Where the results of a log are kept; without it they are thrown away at the end.
-        host: Address to listen at. Another than this machine's own prints a warning and asks
-            visitors for a token.
-        port: To listen at; the next free one where it is taken.
-        open: Open the page in the browser (--no-open: only print its address).
+        host: Address at which the page is served. Another than 127.0.0.1 lets other machines see
+            it: it needs the token that is then printed.
+        port: The first port that is tried.
+        browser: Open the page in the browser.
     """
     import tempfile
 
@@ -42,16 +42,16 @@ def view(
     if is_results(recording):
         if out is not None:
             raise InputError(f"--out {out}: {recording} holds results already")
-        return _show(Replay(recording, robot), recording, (host, port), open)
+        return _show(Replay(recording, robot), recording, (host, port), browser)
     if recording.is_dir() and not any(recording.iterdir()):
         raise InputError(f"{recording}: is empty; neither a recording nor results")
     if robot is None:
         raise InputError(f"{recording}: a recording needs --robot; results know their own")
     if out is not None:
-        return _show(_analyzed(recording, robot, out), recording, (host, port), open)
+        return _show(_analyzed(recording, robot, out), recording, (host, port), browser)
     with tempfile.TemporaryDirectory(prefix="touchline-view-") as folder:
         replay = _analyzed(recording, robot, Path(folder) / "results")
-        return _show(replay, recording, (host, port), open)
+        return _show(replay, recording, (host, port), browser)
 
 
 def _analyzed(log: Path, robot: str, out: Path):
@@ -62,20 +62,18 @@ def _analyzed(log: Path, robot: str, out: Path):
     return Replay(out)
 
 
-def _show(replay, name: Path, address: tuple[str, int], open_it: bool) -> int:
-    import webbrowser
-
+def _show(replay, name: Path, address: tuple[str, int], browser: bool) -> int:
     from touchline.view.replay_page import ReplayPage
-    from touchline.view.server import PageServer
+    from touchline.view.server import PageServer, open_page
 
     with PageServer(f"Touchline: {name.name}", *address) as server:
         page = ReplayPage(replay, server)
         print(f"{name.name}: {len(replay.events)} events in {replay.end - replay.start:.2f} s")
-        print(f"open {server.url} in a browser; Ctrl-C ends it", flush=True)
-        if open_it:
-            webbrowser.open(server.url)
+        print(f"the replay is at {server.url}\nCtrl-C ends it.", flush=True)
+        if browser:
+            open_page(server.url)
         try:
             page.run()
         except KeyboardInterrupt:
-            return 0
+            print()
     return 0

@@ -13,7 +13,7 @@ from touchline.report.event_pictures import caption, event_pictures, event_scene
 from touchline.report.event_windows import Window
 from touchline.report.html import note, section
 from touchline.report.picture import SIGMAS
-from touchline.report.plots import plot
+from touchline.report.plots import joined, plot
 from touchline.report.render.skin import robot_skin
 
 MOST_PICTURED = 400  # events; two pictures take a quarter of a second
@@ -107,12 +107,13 @@ def _event_plots(analysis: Analysis, event: Event, window: Window) -> str:
     origin = analysis.origin
     span = (window.start - origin, window.start - origin + window.width * len(window.low))
     end = clock.last if event.cleared is None else event.cleared
+    join = joined(window.width, analysis.period)
     shaded = [(event.detected - origin, end - origin, event.level)]
     parts = []
     for panel in analysis.curves.event_panels(event.segment):
         curves = [window.of(curve.column) for curve in panel.curves]
         data = {"segment": panel.segment or event.segment}
-        parts.append(plot(panel, curves, span, shaded, PLOT, data))
+        parts.append(plot(panel, curves, span, shaded, PLOT, data, "", join))
     where = json.dumps([round(window.start - first, 6), round(window.width, 9), len(window.low)])
     return f'<div class="around" data-window="{where}">{"".join(parts)}</div>'
 

@@ -2,7 +2,7 @@
 """A picture as part of a page: the image, and the words on it as text."""
 
 import base64
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from io import BytesIO
 from typing import Any
@@ -18,6 +18,7 @@ Array = NDArray[np.floating[Any]]
 APART = 13.0  # pixels between an arrow's tail and its label
 LINE = 19.0  # pixels between lines of text
 LETTER = 8.6  # pixels, roughly
+STACKED = 6  # lines that a label may go away from its arrow, for others
 QUALITY = 78  # of 100
 
 
@@ -49,6 +50,10 @@ class Label:
         beside = self.left > other.left + wide or other.left > self.left + width
         return not beside and abs(self.place[1] - other.place[1]) < LINE
 
+    def moved(self, down: float) -> "Label":
+        """The label so many pixels further down."""
+        return replace(self, place=(self.place[0], self.place[1] + down))
+
 
 def labels(scene: Scene, camera: Camera, size: Size = (640, 640)) -> list[Label]:
     """The labels of a scene's contacts, beside the tails of their arrows, none over another.
@@ -64,10 +69,13 @@ def labels(scene: Scene, camera: Camera, size: Size = (640, 640)) -> list[Label]
             continue
         (tail, tip), _ = camera.project(np.array(scene.arrow(mark)), size)
         label = _beside(tail, tail - tip, mark.label, COLOURS[mark.kind], size)
-        step = LINE if label.place[1] >= tail[1] else -LINE
-        while any(label.meets(other) for other in placed) and 0 < label.place[1] < size[1]:
-            place = (label.place[0], label.place[1] + step)
-            label = Label(label.text, place, label.anchor, label.colour)
+        out = 1 if label.place[1] >= tail[1] else -1
+        for step in sorted(range(-STACKED, STACKED + 1), key=lambda i: (abs(i), -i * out)):
+            moved = label.moved(step * LINE)
+            inside = 0.5 * LINE <= moved.place[1] <= size[1] - 0.5 * LINE
+            if inside and not any(moved.meets(other) for other in placed):
+                label = moved
+                break
         placed.append(label)
     return placed
 

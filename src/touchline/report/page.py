@@ -18,7 +18,7 @@ from touchline.report.event_figures import figures
 from touchline.report.facts import event_where, health_facts, joint_facts, segment_facts
 from touchline.report.html import Cell, note, section, table
 from touchline.report.outputs import strict
-from touchline.report.plots import plot
+from touchline.report.plots import joined, plot
 from touchline.report.robot_section import robot_section
 
 MOST_EVENTS, MOST_SHADED = 1000, 5000
@@ -181,7 +181,8 @@ def _panel_plot(analysis: Analysis, panel: Panel, index: int) -> str:
     ]
     begin = traces.start - analysis.origin
     span = (begin, begin + len(starts) * step * traces.width)
-    return plot(panel, curves, span, (), PLOT, None, f' data-panel="{index}"')
+    join = joined(step * traces.width, analysis.period)
+    return plot(panel, curves, span, (), PLOT, None, f' data-panel="{index}"', join)
 
 
 def _residuals(analysis: Analysis) -> str:
@@ -250,6 +251,7 @@ def _data(analysis: Analysis) -> dict[str, Any]:
         "start": start,
         "origin": analysis.origin,
         "width": traces.width,
+        "period": analysis.period,
         "count": used,
         "curves": [_packed(traces.low[:used, i], traces.high[:used, i]) for i in columns],
         "panels": [_panel_data(panel) for panel in analysis.curves.panels],

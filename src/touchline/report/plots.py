@@ -13,38 +13,43 @@ from touchline.report.curves import Panel
 
 Array = NDArray[np.floating[Any]]
 
+GAP = 3.0  # periods without a sample
 STEPS = 2000  # of the vertical range; the paths are in whole steps
 LEFT, RIGHT, TOP, BOTTOM = 58, 10, 8, 20  # pixels around the curves, as in report.js
 
 
-def curve_path(low: Array, high: Array, least: float, largest: float) -> str:
+def curve_path(low: Array, high: Array, least: float, largest: float, join: int = 0) -> str:
     """A curve as an SVG path of whole numbers, which a script can read back.
 
     x counts pieces of time, y steps downwards from the top of the range. Each piece goes from one
-    extreme to the other, by turns up and down: `M x y v dy l1 dy v dy ...`, a new M after a gap.
+    extreme to the other, by turns up and down: `M x y v dy l dx dy v dy ...`, a new M after a gap.
 
     Args:
         low: (P,) smallest values; NaN for pieces without any.
         high: (P,) largest values.
         least: bottom of the range.
         largest: top of the range.
+        join: so many empty pieces in a row make no gap.
     """
     scale = STEPS / (largest - least)
     known = np.isfinite(low) & np.isfinite(high)
     rows = np.where(known, np.stack([low, high]), 0.0)
     ends = np.rint((largest - rows) * scale).clip(0, STEPS).astype(int).T.tolist()
     parts: list[str] = []
-    before = None  # height where the piece before ended
-    for x, (bottom, top) in enumerate(ends):
-        if not known[x]:
-            before = None
-            continue
+    end = at = -join - 2  # height and piece where the last one ended
+    for x in np.flatnonzero(known).tolist():
+        bottom, top = ends[x]
         first, last = (bottom, top) if x % 2 else (top, bottom)
-        parts.append(f"M{x} {first}" if before is None else f"l1 {first - before}")
+        parts.append(f"M{x} {first}" if x - at > join + 1 else f"l{x - at} {first - end}")
         if first != last:
             parts.append(f"v{last - first}")
-        before = last
+        end, at = last, x
     return "".join(parts)
+
+
+def joined(width: float, period: float) -> int:
+    """How many empty pieces of a width [s] in a row are no gap, at a period between samples [s]."""
+    return max(int(np.ceil(GAP * period / width - 1e-6)) - 1, 0)
 
 
 def value_range(
@@ -68,6 +73,7 @@ def plot(
     size: tuple[int, int] = (640, 120),
     data: dict[str, Any] | None = None,
     attributes: str = "",
+    join: int = 0,
 ) -> str:
     """A plot with its axes, its key and its curves.
 
@@ -79,6 +85,7 @@ def plot(
         size: width and height [pixels].
         data: for the script, which adds the range of the paths to it.
         attributes: of the element.
+        join: so many empty pieces in a row make no gap.
     """
     limit = panel.limit if panel.band is None else None
     least, largest = value_range([c[0] for c in curves], [c[1] for c in curves], limit)
@@ -86,7 +93,7 @@ def plot(
     inner = (width - LEFT - RIGHT, height - TOP - BOTTOM)
     pieces = max([len(low) for low, _ in curves] + [1])
     paths = "".join(
-        f'<path class="curve s{i}" d="{curve_path(low, high, least, largest)}"/>'
+        f'<path class="curve s{i}" d="{curve_path(low, high, least, largest, join)}"/>'
         for i, (low, high) in enumerate(curves)
     )
     if data is not None:

@@ -2,6 +2,7 @@
 """All contacts of one instant on the page, felt and true."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import viser
@@ -10,9 +11,11 @@ from numpy.typing import NDArray
 from touchline.contact.contact import Contact
 from touchline.contact.line import line_point
 from touchline.model.robot import Robot
-from touchline.view.judge import Touched, Verdict
 from touchline.view.markers import ContactMarker
 from touchline.view.scene import RobotScene
+
+if TYPE_CHECKING:  # a replay needs no simulation, which takes a while to import
+    from touchline.view.judge import Touched, Verdict
 
 Array = NDArray[np.float64]
 
@@ -42,7 +45,7 @@ class ContactScene:
         if ends:
             self._pulls.points = np.array(ends, np.float32)
 
-    def show(self, verdicts: Sequence[Verdict], true: Sequence[Touched], q: Array) -> None:
+    def show(self, verdicts: "Sequence[Verdict]", true: "Sequence[Touched]", q: Array) -> None:
         """Shows one instant, at joint positions `q` (n,) [rad]."""
         self._used = {}
         links: dict[int, set[str]] = {0: set(), 1: set(), 2: set()}

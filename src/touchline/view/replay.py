@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from touchline.contact.contact import Candidate, Contact
 from touchline.contact.event import Event
 from touchline.errors import InputError
+from touchline.model.description import AXES
 from touchline.model.robot import load_robot
 from touchline.view.tables import TimedTable
 
@@ -175,12 +176,13 @@ class Replay:
             return values if np.isfinite(values).all() else None
 
         probability = float(value("body_probability"))
-        status = str(value("status"))
+        status, placed = str(value("status")), value("x") == value("x")
         return Contact(
             segment=event.segment,
             event=event.id,
             level=event.level,
             status=status,
+            wrench=None if placed else vector(AXES),  # of the segment, where no point is known
             link=value("link"),
             body=value("body"),
             body_probability=probability if np.isfinite(probability) else None,

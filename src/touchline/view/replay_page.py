@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from touchline.contact.contact import Contact
 from touchline.contact.event import Event
+from touchline.view.contacts import stand_in
 from touchline.view.markers import ContactMarker
 from touchline.view.player import Player
 from touchline.view.replay import Replay
 from touchline.view.scene import RobotScene, dress
 from touchline.view.server import PageServer
-from touchline.view.signals import JOINTS, SignalPlot, force_on, signal_groups
+from touchline.view.signals import JOINTS, SignalPlot, force_on, signal_groups, torque_of
 from touchline.view.timeline import Timeline
 
 Array = NDArray[np.float64]
@@ -26,6 +27,7 @@ PLOTTED = 0.1  # s; between plots while it plays
 IDLE = 0.2  # s; between looks for visitors while there are none
 SPEEDS = {"1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "1": 1.0, "2": 2.0, "5": 5.0, "20": 20.0}
 WINDOWS = {"1 s": 1.0, "5 s": 5.0, "20 s": 20.0, "60 s": 60.0, "whole recording": None}
+VIEW = (0.78, 0.58, 0.33)  # from the middle to the camera, in sizes of the space that the arm uses
 CURVES_WIDTH = 440  # pixels
 WORTH_DRAWING, MOST_CANDIDATES = 0.03, 3
 HELP = (
@@ -43,6 +45,7 @@ class ReplayPage:
 
     Attributes:
         player: the time shown; `lock` is held while it changes.
+        plots: of curves.
     """
 
     def __init__(self, replay: Replay, server: PageServer) -> None:
@@ -51,6 +54,7 @@ class ReplayPage:
         self._origin = replay.start if abs(replay.start) > EPOCH else 0.0
         self._page = server.page
         dress(self._page)
+        look_from(self._page.initial_camera, replay)
         self._arm = RobotScene(self._page.scene, replay.robot)
         self._marks: dict[tuple[str, int], ContactMarker] = {}
         self._build(self._page.gui)
@@ -61,9 +65,9 @@ class ReplayPage:
     def _build(self, gui: viser.GuiApi) -> None:
         gui.add_markdown(HELP)
         self._timeline = Timeline(gui, self.replay, self._origin)
-        first, last = self.player.start - self._origin, self.player.end - self._origin
+        first, last = (round(t - self._origin, 3) for t in (self.replay.start, self.replay.end))
         self._slider = gui.add_slider("time [s]", first, max(last, first + 1e-3), 1e-3, first)
-        self._play = gui.add_button("Play", icon=viser.Icon.PLAYER_PLAY)
+        self._play = gui.add_button("Play")  # an icon takes 0.1 s to read
         self._step = gui.add_button_group("event", ("previous", "next"))
         self._titles = {self._title(event): event for event in self.replay.events}
         names = tuple(self._titles) or ("none",)
@@ -71,15 +75,16 @@ class ReplayPage:
         self._speed = gui.add_dropdown("speed", tuple(SPEEDS), initial_value="1")
         self._felt = gui.add_markdown("")
         panel = gui.add_panel()
-        with panel.add_tab("Curves", viser.Icon.CHART_LINE):
+        with panel.add_tab("Curves"):
             self._window = gui.add_dropdown("time", tuple(WINDOWS), initial_value="5 s")
             groups = signal_groups(self.replay.robot, self.replay.signals)
-            first_two = (next(iter(groups)), JOINTS)
-            self._plots = [
+            first_two = (next(name for name in groups if name != JOINTS), JOINTS)
+            self.plots = [
                 SignalPlot(gui, self.replay, self._origin, groups, name) for name in first_two
             ]
         panel.dock_left()
         panel.set_width(CURVES_WIDTH)
+        gui.main_panel.dock_right()  # beside the arm instead of before it
         self._slider.on_update(self._on_slider)
         self._play.on_click(lambda _: self._toggle())
         self._step.on_click(lambda e: self._jump(-1 if e.target.value == "previous" else 1))
@@ -123,7 +128,7 @@ class ReplayPage:
         """Stops at an event, and shows the wrench on its segment."""
         with self.lock:
             self.player.show(event)
-            self._plots[0].choose(force_on(event.segment))
+            self.plots[0].choose(force_on(event.segment), torque_of(event.joint or ""))
 
     def run(self) -> None:
         """Draws for as long as the program lasts; costs little while nobody looks."""
@@ -147,51 +152,56 @@ class ReplayPage:
         """Brings the page up to date with the player and the choices."""
         with self.lock:
             time, playing = self.player.time, self.player.playing
-        state = (time, playing, self._window.value, *(plot.chosen for plot in self._plots))
+        state = (time, playing, self._window.value, *(plot.chosen for plot in self.plots))
         if state == self._drawn:
             return
         self._drawn = state
         with self._page.atomic():
             contacts = self.replay.contacts(time)
-            self._arm.place(self.replay.posture(time))
-            self._draw_contacts(contacts)
+            q = self.replay.posture(time)
+            self._arm.place(q)
+            self._draw_contacts(contacts, q)
             self._slider.value = round(time - self._origin, 3)
             label = "Pause" if playing else "Play"
             if self._play.label != label:
                 self._play.label = label
-                self._play.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
             words = self._words(contacts, time)
             if self._felt.content != words:
                 self._felt.content = words
         if not playing or clock.monotonic() - self._plotted > PLOTTED:
             self._plotted = clock.monotonic()
-            self._timeline.update(time)
             length = WINDOWS[str(self._window.value)]
-            for plot in self._plots:
-                plot.update(time, length)
+            with self._page.atomic():
+                self._timeline.update(time)
+                for plot in self.plots:
+                    plot.update(time, length)
 
-    def _draw_contacts(self, contacts: list[Contact]) -> None:
-        used, tinted = set(), set()
+    def _draw_contacts(self, contacts: list[Contact], q: Array) -> None:
+        used: set[tuple[str, int]] = set()
+        tinted: dict[str, set[str]] = {"contact": set(), "collision": set()}
         for contact in contacts:
             if contact.position is not None and contact.link is not None:
-                tinted.add(contact.link)
+                tinted[contact.level].add(contact.link)
                 self._mark(used, contact.segment, 0, "estimate").show(
                     contact.position, contact.force, contact.covariance, line=True
                 )
             else:
-                tinted |= self._show_doubt(contact, used)
+                tinted[contact.level] |= self._show_doubt(contact, q, used)
         for key, mark in self._marks.items():
             if key not in used:
                 mark.hide()
-        self._arm.tint(frozenset(tinted))
+        self._arm.tint(frozenset(tinted["contact"]), frozenset(tinted["collision"]))
 
-    def _show_doubt(self, contact: Contact, used: set[tuple[str, int]]) -> set[str]:
+    def _show_doubt(self, contact: Contact, q: Array, used: set[tuple[str, int]]) -> set[str]:
         """Candidates where there are some, else all that could have been touched; its links."""
         likely = [c for c in contact.candidates if c.probability >= WORTH_DRAWING]
         likely = likely[:MOST_CANDIDATES]
         for i, candidate in enumerate(likely, start=1):
-            force = contact.force if i == 1 else None
-            self._mark(used, contact.segment, i, "candidate").show(candidate.position, force)
+            self._mark(used, contact.segment, i, "candidate").show(candidate.position)
+        if contact.wrench is not None and np.linalg.norm(contact.wrench[:3]) > 0:
+            at = stand_in(self.replay.robot, contact, q)
+            mark = self._mark(used, contact.segment, 0, "estimate")
+            mark.show(at, contact.wrench[:3], is_point=False, line=True)
         if likely:
             return {candidate.link for candidate in likely}
         bodies = [b for b in self.replay.robot.bodies if b.segment == contact.segment]
@@ -212,6 +222,18 @@ class ReplayPage:
         if not contacts:
             lines.append("* nothing touches")
         return "\n".join(lines)
+
+
+def look_from(camera: viser.InitialCameraConfig, replay: Replay) -> None:
+    """Sets the camera so that it has the arm in view wherever it goes."""
+    times = np.linspace(replay.start, replay.end, 24)
+    poses = [replay.robot.T_world_links(replay.posture(t)) for t in times]
+    points = np.array([T[:3, 3] for pose in poses for T in pose.values()])
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = (low + high) / 2
+    size = max(float(np.linalg.norm(high - low)), 0.3)
+    camera.look_at = tuple(middle)
+    camera.position = tuple(middle + size * np.array(VIEW))
 
 
 def _sentence(contact: Contact) -> str:

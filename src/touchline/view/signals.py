@@ -40,7 +40,7 @@ def signal_groups(robot: Robot, signals: tuple[str, ...]) -> dict[str, SignalGro
     columns = tuple(f"tau_ext.{name}" for name in joints)
     groups[JOINTS] = SignalGroup("Nm", tuple(joints), columns)
     for name in joints:
-        groups[f"external torque of {name}"] = SignalGroup("Nm", (name,), (f"tau_ext.{name}",))
+        groups[torque_of(name)] = SignalGroup("Nm", (name,), (f"tau_ext.{name}",))
     for sensor in robot.sensor_names:
         _add_wrench(groups, f"{sensor}: wrench on all outboard", f"{sensor}.ext", signals)
     return groups
@@ -49,6 +49,11 @@ def signal_groups(robot: Robot, signals: tuple[str, ...]) -> dict[str, SignalGro
 def force_on(segment: str) -> str:
     """The words for the force on a segment."""
     return f"{ON_SEGMENT.format(segment)}, force"
+
+
+def torque_of(joint: str) -> str:
+    """The words for the external torque of one joint."""
+    return f"external torque of {joint}"
 
 
 def _add_wrench(
@@ -83,9 +88,10 @@ def window_around(replay: Replay, time: float, length: float | None) -> tuple[fl
 
 
 def with_now(times: Array, values: Array, now: float, box: Box) -> tuple[Array, ...]:
-    """Data of a plot: times, rows of values, and an area that is an upright line at `now`.
+    """Data of a plot: times, rows of values, and an upright line at `now`.
 
-    uPlot has no gaps for NaN: it draws on to the next number. Areas have none to begin with.
+    uPlot has no gaps for NaN, it draws on to the next number: the line runs along the lower border
+    and up at `now`.
 
     Args:
         times: (N,) that increase.
@@ -93,20 +99,18 @@ def with_now(times: Array, values: Array, now: float, box: Box) -> tuple[Array, 
         now: where the line is, in the unit of `times`.
         box: what the plot shows.
     """
-    half = 0.0015 * (box.right - box.left)
     at = int(np.searchsorted(times, now))
-    x = np.insert(times, at, [now - half, now - half, now + half, now + half])
-    order = np.argsort(x, kind="stable")
-    rows = np.insert(values, at, np.full((4, 1), np.nan), axis=1)
+    x = np.insert(times, at, [now, now, now])
+    rows = np.insert(values, at, np.full((3, 1), np.nan), axis=1)
     line = np.full(len(x), box.low)
-    line[at + 1 : at + 3] = box.high
-    return (x[order], *rows[:, order], line[order])
+    line[at + 1] = box.high
+    return (x, *rows, line)
 
 
-def now_series(box: Box) -> uplot.Series:
+def now_series() -> uplot.Series:
     """The upright line of `with_now`."""
     points = uplot.Series_Points(show=False)
-    return uplot.Series(label="now", width=0, fill=NOW, fillTo=box.low, points=points)
+    return uplot.Series(label="now", stroke=NOW, width=1.5, points=points)
 
 
 def nice_range(values: Array, before: tuple[float, float] | None) -> tuple[float, float]:
@@ -152,7 +156,7 @@ class SignalPlot:
         self._place = gui.add_folder("")
         self._handle: viser.GuiUplotHandle | None = None
         self._group: SignalGroup | None = None
-        self._range: tuple[float, float] | None = None
+        self._heights: tuple[float, float] | None = None
         self._shown: tuple = ()
 
     @property
@@ -160,10 +164,12 @@ class SignalPlot:
         """What is shown."""
         return str(self._choice.value)
 
-    def choose(self, name: str) -> None:
-        """Shows another group, if there is one of this name."""
-        if name in self._groups:
-            self._choice.value = name
+    def choose(self, *names: str) -> None:
+        """Shows another group: the first of the names that there is."""
+        for name in names:
+            if name in self._groups:
+                self._choice.value = name
+                return
 
     def update(self, now: float, length: float | None) -> None:
         """Shows what is chosen around a time.
@@ -188,27 +194,42 @@ class SignalPlot:
         low, high = nice_range(values, self._range if same else None)
         box = Box(times[0], times[-1], low, high)
         data = with_now(times, values, now - self._origin, box)
-        if self._handle is not None and same and (low, high) == self._range:
-            self._handle.data = data
+        if self._handle is None:
+            self._handle = self._make(group, data, (low, high))
         else:
-            self._make(group, box, data)
+            if not same:
+                self._handle.series, self._handle.axes = _series(group), _axes(group)
+            if (low, high) != self._range:
+                self._handle.scales = _scales((low, high))
+            self._handle.data = data
+        self._group, self._range = group, (low, high)
 
-    def _make(self, group: SignalGroup, box: Box, data: tuple[Array, ...]) -> None:
-        if self._handle is not None:
-            self._handle.remove()
-        self._group, self._range = group, (box.low, box.high)
-        points = uplot.Series_Points(show=False)
-        series = [uplot.Series(label="s")]
-        for i, name in enumerate(group.names):
-            colour = COLOURS[i % len(COLOURS)]
-            series.append(uplot.Series(label=name, stroke=colour, width=1.5, points=points))
-        scales = {
-            "x": uplot.Scale(time=False),
-            "y": uplot.Scale(range=self._range),
-        }
-        axes = (uplot.Axis(), uplot.Axis(label=group.unit, labelSize=18, size=52))
-        shown = (*series, now_series(box))
+    def _make(
+        self, group: SignalGroup, data: tuple[Array, ...], heights: tuple[float, float]
+    ) -> viser.GuiUplotHandle:
         with self._place:
-            self._handle = self._gui.add_uplot(
-                data, shown, scales=scales, axes=axes, height=self.HEIGHT, padding=PADDING
+            return self._gui.add_uplot(
+                data,
+                _series(group),
+                scales=_scales(heights),
+                axes=_axes(group),
+                height=self.HEIGHT,
+                padding=PADDING,
             )
+
+
+def _series(group: SignalGroup) -> tuple[uplot.Series, ...]:
+    points = uplot.Series_Points(show=False)
+    curves = [
+        uplot.Series(label=name, stroke=COLOURS[i % len(COLOURS)], width=1.5, points=points)
+        for i, name in enumerate(group.names)
+    ]
+    return (uplot.Series(label="s"), *curves, now_series())
+
+
+def _scales(heights: tuple[float, float]) -> dict[str, uplot.Scale]:
+    return {"x": uplot.Scale(time=False), "y": uplot.Scale(range=heights)}
+
+
+def _axes(group: SignalGroup) -> tuple[uplot.Axis, ...]:
+    return uplot.Axis(), uplot.Axis(label=group.unit, labelSize=18, size=52)

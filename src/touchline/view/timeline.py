@@ -37,7 +37,7 @@ class Timeline:
             for row, segment in enumerate(self._rows)
             for level in ("contact", "collision")
         ]
-        self._times, self._heights = areas(bars)
+        self._times, self._heights = areas(bars, (self._box.left, self._box.right))
         none = uplot.Series_Points(show=False)
         series = [uplot.Series(label="s")]
         for i, (row, _) in enumerate(bars):
@@ -46,7 +46,7 @@ class Timeline:
             series.append(area)
         self._plot = gui.add_uplot(
             self._data(replay.start),
-            (*series, now_series(self._box)),
+            (*series, now_series()),
             title=", ".join(self._rows) + (" (from below)" if rows[1:] else ""),
             scales={
                 "x": uplot.Scale(time=False, range=(self._box.left, self._box.right)),
@@ -77,9 +77,17 @@ class Timeline:
         self._plot.data = self._data(now)
 
 
-def areas(bars: list[tuple[int, list[tuple[float, float]]]]) -> tuple[Array, Array]:
-    """Times (N,) that increase, and the upper border (R, N) of areas that are bars."""
-    times = np.array(sorted({t for _, edges in bars for edge in edges for t in edge}), float)
+def areas(
+    bars: list[tuple[int, list[tuple[float, float]]]], ends: tuple[float, float]
+) -> tuple[Array, Array]:
+    """Times (N,) that increase from one end to the other, and upper borders (R, N) of areas.
+
+    Args:
+        bars: of each area, its row and where its bars begin and end.
+        ends: of the time line.
+    """
+    edges_of_all = {t for _, edges in bars for edge in edges for t in edge}
+    times = np.array(sorted(edges_of_all | set(ends)), float)
     x = np.repeat(times, 2)  # before and after each edge
     heights = []
     for row, edges in bars:

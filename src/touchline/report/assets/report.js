@@ -5,6 +5,7 @@
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const LEFT = 58, RIGHT = 10, TOP = 8, BOTTOM = 20, TURN = 1.25, STEP = 0.2;
+  const GAP = 3;  // periods without a sample
   const clock = (t) => data.start - data.origin + t;  // of seconds since the first sample
 
   const unpack = (curve) => {
@@ -16,7 +17,7 @@
     };
     return { low: decode(curve.low), high: decode(curve.high) };
   };
-  // A path as the report writes it: "Mx yv dy l1 dy v dy ..."; x counts pieces, y the steps from
+  // A path as the report writes it: "Mx y v dy l dx dy v dy ..."; x counts pieces, y the steps from
   // the top of the range downwards.
   const readPath = (path, plot) => {
     const low = new Float64Array(plot.count).fill(NaN), high = new Float64Array(plot.count).fill(NaN);
@@ -107,11 +108,18 @@
 
   const outline = (source, column, frame) => {
     const at = (piece) => frame.x(source.start + piece * source.width).toFixed(1);
-    const wide = (source.width / (frame.to - frame.from)) * frame.inner > 3;
-    let path = "", up = true, broken = true;
-    for (const [from, to] of groups(source, frame)) {
-      const [low, high] = extremes(source, column, from, to);
-      if (low > high) { broken = true; continue; }
+    const values = groups(source, frame).map(([from, to]) =>
+      [from, to, ...extremes(source, column, from, to)]);
+    // Boxes where most pieces are wide and hold several samples, not for one here and there.
+    const several = values.filter(([, , low, high]) => low < high).length;
+    const wide = (source.width / (frame.to - frame.from)) * frame.inner > 3 &&
+      several > values.length / 2;
+    const join = Math.max(Math.ceil((GAP * data.period) / source.width - 1e-6), 1);
+    let path = "", up = true, broken = true, last = -Infinity;
+    for (const [from, to, low, high] of values) {
+      if (low > high) continue;
+      if (from - last >= join) broken = true;  // a gap, not a piece between two samples
+      last = to;
       if (wide && low !== high) {  // a box: where in it the values lie is not known
         path += `M${at(from)} ${frame.y(low).toFixed(1)}H${at(to)}V${frame.y(high).toFixed(1)}` +
           `H${at(from)}Z`;
@@ -366,7 +374,7 @@
     const room = 0.5 * (event.to - event.from) + 0.2;
     recording.show(event.from - room, event.to + room);
     const place = document.getElementById(`event-${event.id}`) || document.getElementById("plots");
-    place.scrollIntoView({ behavior: "smooth" });
+    place.scrollIntoView();
   };
   document.querySelectorAll("[data-event]").forEach((row) =>
     row.addEventListener("click", () => goTo(row)));
