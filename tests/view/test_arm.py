@@ -191,3 +191,45 @@ def test_a_hand_with_a_target_pulls_like_a_spring_up_to_its_limit():
     assert np.allclose(hand.wanted(T), [0, 0, 30.0])
     hand.released = True
     assert np.allclose(hand.wanted(T), 0)
+
+
+@pytest.mark.parametrize("reaction", ["stop", "float", "retract"])
+def test_the_arm_reacts_and_goes_back_to_its_motion_when_it_is_left_alone(robots, reaction):
+    room = Room(robots, stiffness=0.5, moving=True)
+    room.arm.set(Conditions(moving=True, stiffness=0.5, reaction=reaction))
+
+    def go(seconds):
+        speeds = []
+        for _ in range(round(seconds * 1000 / 5)):
+            samples, truth = room.arm.advance(5)
+            room.arm.feel(room.method.take(samples).contacts)
+            speeds.append(np.abs(samples.qd).max())
+        return np.array(speeds), truth
+
+    go(2.5)
+    assert room.arm.reacting is None
+    room.arm.press(*room.surface("link4")[:2], 20.0)
+    speeds, _ = go(0.6)
+    assert room.arm.reacting == reaction
+    if reaction == "stop":
+        assert speeds[-20:].max() < 0.08 < speeds[0]
+    room.arm.hands.release_all()
+    speeds, _ = go(4.0)
+    assert room.arm.reacting is None
+    assert speeds[-200:].max() > 0.05 and speeds.max() < 3.0
+    goal = room.arm._trajectory(room.arm.time)
+    assert np.abs(goal.q - room.arm.q).max() < 0.05
+
+
+def test_resuming_is_smooth_and_ends_on_the_trajectory():
+    moving = sinusoids([0.1, 0.2], [0.3, 0.5], [1.0, 0.7], [0.0, 1.0])
+    at = Switched(np.array([0.1, 0.2]), moving)
+    at(0.0)
+    q = np.array([-0.4, 0.9])
+    at.resume(q, 1.0)
+    assert np.allclose(at(1.0).q, q) and np.allclose(at(1.0).qd, 0.0)
+    times = np.arange(1.0, 1.0 + 1.5 * EASE, 1e-3)
+    positions = np.array([at(t).q for t in times])
+    rates = np.array([at(t).qd for t in times])
+    assert np.allclose(np.gradient(positions, times, axis=0)[2:-2], rates[2:-2], atol=3e-3)
+    assert np.allclose(positions[-1], [0.1, 0.2])

@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 
 RISE = 0.03  # s; no hand's force jumps
 GONE = 0.05  # N; a released hand that weak has left
+EASY, FASTEST = 0.7, 1.2  # m/s: a hand follows so fast with its full force, and with none
 FELT = 1.0  # N; a contact begins with that much
 
 
@@ -45,7 +46,8 @@ class Hand:
     behind: float = 0.0
     began: float | None = field(default=None, init=False)
     released: bool = field(default=False, init=False)
-    acting: Array = field(default_factory=lambda: np.zeros(3), init=False)  # world [N]
+    acting: Array = field(default_factory=lambda: np.zeros(3), init=False)
+    _last: Array | None = field(default=None, init=False)
 
     def wanted(self, T_world_link: Array) -> Array:
         """Force (3,) in world [N] at which it aims."""
@@ -55,6 +57,13 @@ class Hand:
             return T_world_link[:3, :3] @ self.force
         force = self.stiffness * (self.target - place(T_world_link, self.grip))
         return force * min(1.0, self.limit / max(float(np.linalg.norm(force)), 1e-9))
+
+    def follows(self, grip: Array, rate: float) -> float:
+        """Share of its force that is left when the grip (3,) in world is there one step later."""
+        way = np.zeros(3) if self._last is None else grip - self._last
+        self._last = grip
+        speed = float(way @ self.acting) * rate / max(float(np.linalg.norm(self.acting)), 1e-9)
+        return min(max((FASTEST - speed) / (FASTEST - EASY), 0.0), 1.0)
 
 
 class Hands(Forces):
@@ -91,7 +100,8 @@ class Hands(Forces):
         if hand is None:
             return None
         T = plant.link_pose(hand.link)
-        hand.acting += (hand.wanted(T) - hand.acting) * (1.0 - np.exp(-1.0 / (plant.rate * RISE)))
+        wanted = hand.wanted(T) * hand.follows(place(T, hand.grip), plant.rate)
+        hand.acting += (wanted - hand.acting) * (1.0 - np.exp(-1.0 / (plant.rate * RISE)))
         size = float(np.linalg.norm(hand.acting))
         if hand.began is None and size > FELT:
             hand.began = plant.time

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.contact.contact import Contact
 from touchline.contact.skin import Skin
 from touchline.estimation.samples import Samples
 from touchline.model.robot import Robot
@@ -21,6 +22,7 @@ from touchline.simulation.touchable import TouchableSurface, structure_links, to
 from touchline.simulation.truth import Truth
 from touchline.view.faults import SensorFault
 from touchline.view.motion import Switched
+from touchline.view.reacting import ReactingImpedance
 
 Array = NDArray[np.float64]
 
@@ -41,6 +43,7 @@ class Conditions:
         noise: whether the sensors are noisy.
         fault: of the sensors, one of `faults.FAULTS`.
         payload: mass at the tool that the model does not know [kg].
+        reaction: to contacts, one of `contact.reaction.REACTIONS`.
     """
 
     moving: bool = False
@@ -48,6 +51,7 @@ class Conditions:
     noise: bool = True
     fault: str = "none"
     payload: float = 0.0
+    reaction: str = "ignore"
 
 
 class LiveArm:
@@ -69,8 +73,9 @@ class LiveArm:
         self._plant = Plant(robot, PHYSICS)
         self._plant.reset(self._setup.home)
         self._plant.evaluate()
+        self._controller = ReactingImpedance(robot, self._impedance(1.0), self._trajectory)
         self._simulation = Simulation(
-            self._plant, self._impedance(1.0), [self.hands], Rates(RATE, RATE)
+            self._plant, self._controller, [self.hands], Rates(RATE, RATE)
         )
         self._surface = TouchableSurface(robot)
         self._conditions: Conditions | None = None
@@ -92,11 +97,21 @@ class LiveArm:
         """Joint positions (n,) [rad]."""
         return self._plant.q
 
+    @property
+    def reacting(self) -> str | None:
+        """The reaction that has taken over from the arm's own controller."""
+        return self._controller.active
+
+    def feel(self, contacts: list[Contact]) -> None:
+        """Tells the arm what it feels, for it to react."""
+        self._controller.contacts = contacts
+
     def set(self, conditions: Conditions) -> None:
         """Takes on what a visitor has set."""
         before, self._conditions = self._conditions, conditions
         self._trajectory.wanted = conditions.moving
-        self._simulation.controller = self._impedance(conditions.stiffness)
+        self._controller.impedance = self._impedance(conditions.stiffness)
+        self._controller.reaction = conditions.reaction
         self._noise = SensorNoise() if conditions.noise else None
         if before is None or before.payload != conditions.payload:
             self._plant.load("tool", conditions.payload)

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import viser
 
+from touchline.contact.reaction import REACTIONS
 from touchline.view.arm import Conditions
 from touchline.view.faults import FAULTS
 from touchline.view.methods import METHODS
@@ -42,6 +43,7 @@ class Controls:
         gui.add_button("Random push").on_click(lambda _: push())
         gui.add_button("Remove all pushes", color="gray").on_click(lambda _: release())
         self._motion = gui.add_dropdown("Arm", tuple(MOTIONS))
+        self._reaction = gui.add_dropdown("When touched", tuple(REACTIONS))
         self._stiffness = gui.add_slider("Stiffness [%]", 5, 100, 5, 20)
         self._method = gui.add_dropdown("Method", tuple(METHODS))
         self._noise = gui.add_checkbox("Sensor noise", True)
@@ -73,4 +75,5 @@ class Controls:
             bool(self._noise.value),
             self._fault.value,
             float(self._payload.value),
+            self._reaction.value,
         )

@@ -18,7 +18,7 @@ from touchline.view.contacts import ContactScene
 from touchline.view.controls import Controls
 from touchline.view.grasp import let_touch
 from touchline.view.history import History
-from touchline.view.judge import Judge, Verdict, touched
+from touchline.view.judge import Judge, Touched, Verdict, touched
 from touchline.view.methods import METHODS, Felt, Method
 from touchline.view.plots import WrenchPlots
 from touchline.view.readout import Speed, readout
@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 FRAME = 1.0 / 30.0  # s between two pictures
 READOUT, PLOTS = 0.2, 0.25  # s between two of them
 LATEST = 0.2  # s by which the simulation may be late before it gives up catching up
+REACTION_ROWS = 4  # samples after which the arm may react
 SMOOTHING = 0.05  # weight of a frame in the mean speed
 
 
@@ -131,7 +132,17 @@ class LivePage:
         """Simulates `rows` samples and shows what came of them."""
         while not self._todo.empty():
             self._todo.get()()
-        self.arm.set(self._controls.conditions())
+        conditions = self._controls.conditions()
+        self.arm.set(conditions)
+        part = rows if conditions.reaction == "ignore" else REACTION_ROWS
+        while rows >= 2:
+            part = part if rows - part >= 2 else rows
+            last, true = self._feel(part)
+            rows -= part
+        self._show(last, true)
+
+    def _feel(self, rows: int) -> tuple[Array, list[Touched]]:
+        """Simulates and feels; returns the last joint positions and true contacts."""
         method = self._method.get(self._controls.method)
         samples, truth = self.arm.advance(rows)
         began = time.perf_counter()
@@ -139,11 +150,12 @@ class LivePage:
         step = (time.perf_counter() - began) / rows
         smooth = self._speed.step + SMOOTHING * (step - self._speed.step)
         self._speed = Speed(smooth, self._speed.real_time)
+        self.arm.feel(felt.contacts)
         self.verdicts = self._judge.judge(felt, truth, self.arm.hands.active())
         self._history.add(felt.time, felt.segments, felt.wrench)
-        self._show(samples.q[-1], touched(truth))
+        return samples.q[-1], touched(truth)
 
-    def _show(self, q: Array, true) -> None:
+    def _show(self, q: Array, true: list[Touched]) -> None:
         with self._page.atomic():
             self._robot.place(q)
             self._contacts.show(self.verdicts, true, q)

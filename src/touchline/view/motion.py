@@ -23,26 +23,35 @@ class Switched:
         self._pose, self._moving = pose, moving
         self.wanted = False
         self._from, self._to, self._began = 0.0, 0.0, -np.inf
+        self._away, self._resumed = np.zeros_like(pose), -np.inf
+
+    def resume(self, q: Array, time: float) -> None:
+        """Eases back to the trajectory from where the arm stands, `q` (n,) at `time` [s]."""
+        self._away = np.zeros_like(q)
+        self._away, self._resumed = q - self(time).q, time
 
     def __call__(self, time: float) -> Setpoint:
         """The setpoint at a time [s]; times do not go back."""
         if time >= self._began + EASE and self._to != float(self.wanted):
             self._from, self._to, self._began = self._to, float(self.wanted), time
-        s, ds, dds = self._share(time)
+        way = self._to - self._from
+        s, ds, dds = (way * part for part in eased(time - self._began))
+        s += self._from
+        back, dback, ddback = eased(time - self._resumed)
         goal = self._moving(time)
         away = goal.q - self._pose
         return Setpoint(
-            self._pose + s * away,
-            s * goal.qd + ds * away,
-            s * goal.qdd + 2 * ds * goal.qd + dds * away,
+            self._pose + s * away + (1.0 - back) * self._away,
+            s * goal.qd + ds * away - dback * self._away,
+            s * goal.qdd + 2 * ds * goal.qd + dds * away - ddback * self._away,
         )
 
-    def _share(self, time: float) -> tuple[float, float, float]:
-        """The share and its derivatives, a polynomial of degree five."""
-        x = min((time - self._began) / EASE, 1.0)
-        way = self._to - self._from
-        return (
-            self._from + way * x**3 * (10 - 15 * x + 6 * x**2),
-            way * 30 * x**2 * (1 - x) ** 2 / EASE,
-            way * 60 * x * (1 - x) * (1 - 2 * x) / EASE**2,
-        )
+
+def eased(time: float) -> tuple[float, float, float]:
+    """From 0 to 1 within EASE, and the derivatives: a polynomial of degree five."""
+    x = min(time / EASE, 1.0)
+    return (
+        x**3 * (10 - 15 * x + 6 * x**2),
+        30 * x**2 * (1 - x) ** 2 / EASE,
+        60 * x * (1 - x) * (1 - 2 * x) / EASE**2,
+    )
