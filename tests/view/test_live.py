@@ -36,12 +36,22 @@ class Window:
         browser.wait_for("Random push")
         clients = until(server.page.get_clients, pause=browser.rest)
         self.camera = next(iter(clients.values())).camera
-        script = "(b => [b.x, b.y])(document.querySelector('canvas').getBoundingClientRect())"
-        self.corner = browser.run(script)
+        self.until(self._arm_is_drawn, "the arm in the picture")
 
     def pixel(self, point) -> tuple[float, float]:
         x, y = pixel(self.camera, point)
-        return x + self.corner[0], y + self.corner[1]
+        canvas = "document.querySelector('canvas').getBoundingClientRect()"
+        left, top = self.browser.run(f"(b => [b.x, b.y])({canvas})")
+        return x + left, y + top
+
+    def link(self, name) -> tuple[float, float]:
+        """Where the origin of a link, which is within it, is in the window."""
+        return self.pixel(self.page.arm.robot.T_world_links(self.page.arm.q)[name][:3, 3])
+
+    def _arm_is_drawn(self) -> bool:
+        column, row = (round(x) for x in self.link("link4"))
+        patch = self.browser.picture()[row - 5 : row + 6, column - 5 : column + 6]
+        return bool((patch.min(axis=-1) < 250).all())
 
     def until(self, done, what):
         return until(done, pause=self.browser.rest, what=what)
@@ -63,7 +73,7 @@ def test_the_mouse_pushes_the_arm_and_the_page_shows_what_it_feels(browser, live
     window = Window(browser, page, server)
     window.until(lambda: page.arm.time > 0.3, "the simulation")
 
-    start = window.pixel(page.arm.robot.T_world_links(page.arm.q)["link4"][:3, 3])
+    start = window.link("link4")
     browser.drag(start, (start[0] + 90, start[1] + 30), release=False)
     verdict = window.until(lambda: window.feels("link4"), "a contact on link4")
     assert verdict.level > 0 and verdict.segment == "base"
@@ -85,7 +95,7 @@ def test_the_mouse_pushes_the_arm_and_the_page_shows_what_it_feels(browser, live
     browser.mouse("Released", start[0] + 90, start[1] + 30)
     window.until(lambda: not page.arm.hands.active() and window.feels("link4") is None, "calm")
 
-    browser.click(*window.pixel(page.arm.robot.T_world_links(page.arm.q)["link4"][:3, 3]))
+    browser.click(*window.link("link4"))
     verdict = window.until(lambda: window.feels("link4"), "a push by a click")
     (hand,) = page.arm.hands.active()
     assert hand.target is None and np.linalg.norm(hand.force) == pytest.approx(25.0)
