@@ -99,14 +99,15 @@ nb::tuple detect(tl::Observer& o, tl::Detector& d, double time, nb::handle q, nb
   return nb::make_tuple(out.release(), levels.release(), tests.release(), quiet.release());
 }
 
-// Runs N samples through observer and detector; calls `each()` after every one.
+// Runs samples `from` to `to` through observer and detector; calls `each(i)` after every one.
 template <class Each>
-void detect_all(tl::Observer& o, tl::Detector& d, const Recording& in, double* rows, Each each) {
+void detect_all(tl::Observer& o, tl::Detector& d, const Recording& in, std::size_t from,
+                std::size_t to, double* rows, Each each) {
   nb::gil_scoped_release release;
-  const std::size_t n = o.row_layout().joints;
-  std::size_t i = 0;
-  o.run(in.rows, in.time, in.first.q, in.first.qd, in.first.tau, in.first.wrench, rows,
-        [&](const double* row) {
+  const std::size_t n = o.row_layout().joints, w = 6 * o.row_layout().sensors;
+  std::size_t i = from;
+  o.run(to - from, in.time + from, in.first.q + from * n, in.first.qd + from * n,
+        in.first.tau + from * n, in.first.wrench + from * w, rows, [&](const double* row) {
           d.step(row, in.first.q + i * n, in.first.qd + i * n);
           each(i++);
         });
@@ -119,7 +120,7 @@ nb::tuple detect_run(tl::Observer& o, tl::Detector& d, nb::handle time, nb::hand
   arrays::Out out({in.rows, o.output().size()}), levels({in.rows, d.levels().size()}),
       tests({in.rows, d.rows().size()}), quiet({in.rows, d.quiet().size()});
   double *level = levels.data(), *x = tests.data(), *since = quiet.data();
-  detect_all(o, d, in, out.data(), [&](std::size_t) {
+  detect_all(o, d, in, 0, in.rows, out.data(), [&](std::size_t) {
     level = std::copy(d.levels().begin(), d.levels().end(), level);
     x = std::copy(d.normalized().begin(), d.normalized().end(), x);
     since = std::copy(d.quiet().begin(), d.quiet().end(), since);
@@ -128,7 +129,8 @@ nb::tuple detect_run(tl::Observer& o, tl::Detector& d, nb::handle time, nb::hand
 }
 
 // N samples, for those who set thresholds: levels (N, m), statistics (N, m, tests), and of every
-// `every`-th sample the residuals (r) less baseline, less reference, and the activity (2).
+// `every`-th sample the residuals (r) less baseline, less reference, their variance (r) by noise, and the
+// activity (2).
 nb::tuple detect_details(tl::Observer& o, tl::Detector& d, nb::handle time, nb::handle q,
                          nb::handle qd, nb::handle tau, nb::handle wrench, std::size_t every) {
   const Recording in = recording(o, time, q, qd, tau, wrench);
@@ -137,23 +139,27 @@ nb::tuple detect_details(tl::Observer& o, tl::Detector& d, nb::handle time, nb::
   const std::size_t kept = (in.rows + every - 1) / every;
   arrays::Out levels({in.rows, segments}),
       statistics({in.rows, segments, d.statistics().size() / std::max<std::size_t>(segments, 1)}),
-      slow({kept, rows}), quick({kept, rows}), activity({kept, 2});
-  std::vector<double> scratch(in.rows * o.output().size());
+      slow({kept, rows}), quick({kept, rows}), noise({kept, rows}), activity({kept, 2});
+  constexpr std::size_t kBlock = 256;  // samples whose rows are held at a time
+  std::vector<double> scratch(kBlock * o.output().size());
   double *level = levels.data(), *value = statistics.data(), *a = slow.data(), *b = quick.data(),
-         *c = activity.data();
-  detect_all(o, d, in, scratch.data(), [&](std::size_t i) {
+         *v = noise.data(), *c = activity.data();
+  const auto each = [&](std::size_t i) {
     level = std::copy(d.levels().begin(), d.levels().end(), level);
     value = std::copy(d.statistics().begin(), d.statistics().end(), value);
     if (i % every != 0) return;
     for (std::size_t r = 0; r < rows; ++r) {
       *a++ = d.sample(r).known ? d.sample(r).residual - d.sample(r).offset : tl::kNaN;
       *b++ = d.sample(r).known ? d.sample(r).residual - d.sample(r).reference : tl::kNaN;
+      *v++ = d.noise_variance(r);
     }
     *c++ = d.activity().speed2;
     *c++ = d.activity().acceleration;
-  });
+  };
+  for (std::size_t from = 0; from < in.rows; from += kBlock)
+    detect_all(o, d, in, from, std::min(from + kBlock, in.rows), scratch.data(), each);
   return nb::make_tuple(levels.release(), statistics.release(), slow.release(), quick.release(),
-                        activity.release());
+                        noise.release(), activity.release());
 }
 
 // Momentum and n-bar: joint rows, then six rows per sensor in its own frame.

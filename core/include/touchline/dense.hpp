@@ -34,6 +34,26 @@ inline void solve_lower(const double* l, int n, double* x, int stride = 1) {
   }
 }
 
+// The inverse of a lower factor, in `out`, with zeros above; its product with a vector takes no
+// division.
+inline void invert_lower(const double* l, int n, double* out) {
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) out[i * n + j] = i == j ? 1.0 : 0.0;
+    solve_lower(l, n, out + j, n);
+  }
+}
+
+// |L x|^2 of a lower (n, n) matrix.
+inline double squared_norm(const double* l, const double* x, int n) {
+  double total = 0.0;
+  for (int i = 0; i < n; ++i) {
+    double s = 0.0;
+    for (int k = 0; k <= i; ++k) s += l[i * n + k] * x[k];
+    total += s * s;
+  }
+  return total;
+}
+
 // x = (L L^T)^-1 x.
 inline void solve_cholesky(const double* l, int n, double* x) {
   solve_lower(l, n, x);

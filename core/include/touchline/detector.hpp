@@ -73,6 +73,11 @@ class Detector {
   // Per segment, for each test: what is compared with its limit.
   const std::vector<double>& statistics() const { return statistics_; }
   const RowSample& sample(std::size_t row) const { return samples_[row]; }
+  // Variance of a row's residual by the noise of the signals; 0 as long as no test needs it.
+  double noise_variance(std::size_t row) const {
+    const int g = rows_[row].segment;
+    return tests_[g].noise_variance(row - first_[g]);
+  }
   const Activity& activity() const { return activity_.activity(); }
   double baseline(int row) const { return states_[row].baseline; }
   double reference(int row) const { return states_[row].reference; }

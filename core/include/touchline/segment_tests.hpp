@@ -41,13 +41,15 @@ class SegmentTests {
       uses_scaled_ |= setting.test == Test::scaled;
     }
     for (const DetectionRow& row : rows_) add_gains(observer, row, settings.noise.period);
-    for (auto* m : {&momentum_, &reading_, &factor_}) m->assign(n * n, 0.0);
+    for (auto* m : {&momentum_, &reading_, &factor_, &whitener_}) m->assign(n * n, 0.0);
     for (auto* v : {&slow_, &quick_, &load_, &offset_, &difference_}) v->assign(n, 0.0);
     expected_.assign(n, 0.0);
     active_.reserve(n);
   }
 
   bool used() const { return uses_chi2_ || uses_glrt_ || uses_cusum_ || uses_scaled_; }
+
+  double noise_variance(std::size_t row) const { return filtered(row, row); }
 
   // Follows the posture and the robot's activity.
   void weigh(const Posture& posture, const Activity& activity) {
@@ -138,6 +140,7 @@ class SegmentTests {
       }
     }
     chi2_usable_ = uses_chi2_ && cholesky(factor_.data(), static_cast<int>(size), 1e-15);
+    if (chi2_usable_) invert_lower(factor_.data(), static_cast<int>(size), whitener_.data());
     if (uses_glrt_) windows_.weigh(momentum_.data(), reading_.data(), quick_.data());
     if (uses_cusum_) innovations_.weigh(momentum_.data(), reading_.data(), quick_.data());
   }
@@ -149,12 +152,10 @@ class SegmentTests {
     return std::sqrt(most);
   }
 
-  double chi2() {
+  double chi2() const {
     if (!chi2_usable_) return 0.0;
-    solve_lower(factor_.data(), static_cast<int>(active_.size()), difference_.data());
-    double sum = 0.0;
-    for (std::size_t k = 0; k < active_.size(); ++k) sum += difference_[k] * difference_[k];
-    return std::sqrt(sum);
+    return std::sqrt(
+        squared_norm(whitener_.data(), difference_.data(), static_cast<int>(active_.size())));
   }
 
   std::vector<DetectionRow> rows_;
@@ -166,7 +167,7 @@ class SegmentTests {
   std::vector<double> reading_gain_, momentum_gain_;
   std::vector<std::size_t> active_;  // rows that are known
   std::vector<double> expected_;     // variance of each row
-  std::vector<double> momentum_, reading_, factor_, slow_, quick_;  // of the active rows
+  std::vector<double> momentum_, reading_, factor_, whitener_, slow_, quick_;
   std::vector<double> load_, offset_, difference_;
 };
 

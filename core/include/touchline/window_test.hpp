@@ -17,7 +17,7 @@ namespace touchline {
 class WindowTest {
  public:
   WindowTest(std::size_t rows, const std::vector<double>& windows, double period)
-      : rows_(rows), period_(period), scratch_(rows) {
+      : rows_(rows), period_(period), scratch_(rows * rows) {
     for (const double window : windows) {
       const auto count = static_cast<std::size_t>(std::max(1.0, std::round(window / period)));
       if (std::find(counts_.begin(), counts_.end(), count) == counts_.end())
@@ -43,11 +43,12 @@ class WindowTest {
   void weigh(const double* momentum, const double* reading, const double* model) {
     for (std::size_t w = 0; w < counts_.size(); ++w) {
       const double T = static_cast<double>(counts_[w]) * period_;
-      double* f = factors_.data() + w * rows_ * rows_;
+      double* f = scratch_.data();
       for (std::size_t i = 0; i < size_ * size_; ++i)
         f[i] = 2.0 * momentum[i] + T * period_ * reading[i];
       for (std::size_t i = 0; i < size_; ++i) f[i * size_ + i] += T * T * model[i];
       usable_[w] = cholesky(f, static_cast<int>(size_), 1e-15);
+      if (usable_[w]) invert_lower(f, static_cast<int>(size_), factors_.data() + w * rows_ * rows_);
     }
   }
 
@@ -72,10 +73,8 @@ class WindowTest {
       const double* then = impulses_.data() + from * rows_;
       const double T = times_[at_] - times_[from];
       for (std::size_t i = 0; i < size_; ++i) scratch_[i] = now[i] - then[i] - T * offset[i];
-      solve_lower(factors_.data() + w * rows_ * rows_, static_cast<int>(size_), scratch_.data());
-      double sum = 0.0;
-      for (std::size_t i = 0; i < size_; ++i) sum += scratch_[i] * scratch_[i];
-      most = std::max(most, sum);
+      most = std::max(most, squared_norm(factors_.data() + w * rows_ * rows_, scratch_.data(),
+                                         static_cast<int>(size_)));
     }
     return std::sqrt(most);
   }
@@ -84,7 +83,8 @@ class WindowTest {
   std::size_t rows_, size_ = 0, room_ = 0, at_ = 0, filled_ = 0;
   double period_;
   std::vector<std::size_t> counts_;  // samples of each window
-  std::vector<double> impulses_, times_, factors_, scratch_;
+  std::vector<double> impulses_, times_, scratch_;
+  std::vector<double> factors_;  // inverse, by window
   std::vector<char> usable_;
 };
 

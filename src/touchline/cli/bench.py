@@ -6,12 +6,14 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
-NAMES = ("observer", "localization", "reaction", "wrench")
+NAMES = ("observer", "localization", "reaction", "wrench", "detection")
 
 
 def bench(
     names: Annotated[
-        Positional[tuple[Literal["observer", "localization", "reaction", "wrench"], ...]],
+        Positional[
+            tuple[Literal["observer", "localization", "reaction", "wrench", "detection"], ...]
+        ],
         arg(metavar="[NAME ...]"),
     ] = (),
     /,
@@ -37,7 +39,8 @@ def bench(
     Example: touchline bench localization --robots panda sara --runs 10000 --out figures
 
     Args:
-        names: What to measure (observer, localization, reaction, wrench); default: everything.
+        names: What to measure (observer, localization, reaction, wrench, detection);
+            default: everything.
         output: observer: writes the figures here as well (.json or .csv).
         rounds: observer: how often each candidate is timed.
         robots: localization: the arms; panda and ur10 need the package example-robot-data.
@@ -48,7 +51,9 @@ def bench(
         runs: localization: random poses and places per line of the tables.
         seed: localization, wrench: of all that is random.
         encounters: reaction: collisions for each link and speed.
-        out: localization, reaction, wrench: folder for the tables, every run, and figures.
+        hours: detection: simulated at 1 kHz for calibration, and as many for false alarms.
+        pushes: detection: of each force.
+        out: localization, reaction, wrench, detection: folder for tables, runs and figures.
         baselines: localization: what runs along: the first entry of the line of force action, the
             surface nearest to the line, a contact particle filter (on 100 runs a line).
     """
@@ -71,4 +76,8 @@ def bench(
         from touchline.bench.wrench import main as measure_wrench
 
         measure_wrench(out, seed)
+    if "detection" in wanted:
+        from touchline.bench.detection import main as measure_detection
+
+        measure_detection(hours, pushes, out)
     return 0

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from touchline import __version__
 from touchline.cli.analyze import analyze
 from touchline.cli.bench import bench
+from touchline.cli.calibrate import calibrate
 from touchline.cli.check import check
 from touchline.cli.demo import demo
 from touchline.cli.reproduce import reproduce
@@ -32,6 +33,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "analyze": analyze,
     "view": view,
     "check": check,
+    "calibrate": calibrate,
     "reproduce": reproduce,
     "bench": bench,
 }

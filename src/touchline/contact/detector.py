@@ -57,6 +57,7 @@ class Details:
         statistics: (N, m, t) each test's statistic, in the order of `Thresholds.limits`.
         slow: (N / every, r) residuals less their baseline [N or Nm]; NaN where not known.
         quick: (N / every, r) the same less the mean of the last 0.2 s.
+        noise: (N / every, r) their variances by the noise of the signals.
         activity: (N / every, 2) squared speed [rad2/s2], acceleration [rad/s2].
     """
 
@@ -64,6 +65,7 @@ class Details:
     statistics: Array
     slow: Array
     quick: Array
+    noise: Array
     activity: Array
 
 
@@ -129,7 +131,7 @@ class Detector:
         stamps = np.ascontiguousarray(time, dtype=float)
         signals = self.observer.arrays(stamps.shape, q, qd, tau, wrench)
         q, qd, tau, wrench = signals
-        levels, statistics, slow, quick, activity = core.detect_details(
+        levels, statistics, slow, quick, noise, activity = core.detect_details(
             self.observer.kernel, self._core, stamps, q, qd, tau, wrench, every
         )
-        return Details(levels, statistics, slow, quick, activity)
+        return Details(levels, statistics, slow, quick, noise, activity)

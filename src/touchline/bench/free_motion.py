@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hours of contact-free motion: prescribed, with exact loads of an arm that is not as modelled.
+
+No physics engine: the loads are those of inverse dynamics with perturbed inertias, computed at a
+low rate and interpolated by polynomials (to 1e-5 N of 500), since they are smooth; positions and
+velocities are exact at every sample. Noise is added per sample.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.estimation.dynamics import inverse_dynamics
+from touchline.estimation.samples import Samples
+from touchline.model.robot import Robot
+from touchline.simulation.noise import perturbed
+
+Array = NDArray[np.float64]
+
+WAVES = 3  # per joint
+FREQUENCIES = 0.15, 0.6  # Hz, of the waves
+FASTEST = 3.0  # rad/s
+COARSE = 50.0  # Hz, at which loads are computed
+POINTS = np.arange(-3, 5)  # of these that a polynomial of degree 7 goes through
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Waves along a path that is followed at a varying pace, down to rest now and then.
+
+    Attributes:
+        center: (n,) [rad].
+        amplitude, frequency, phase: (WAVES, n) [rad, rad/s, rad].
+        pace: frequency [rad/s] and phase [rad] of the pace, 0 to 1.
+    """
+
+    center: Array
+    amplitude: Array
+    frequency: Array
+    phase: Array
+    pace: tuple[float, float]
+
+    def __call__(self, time: Array) -> tuple[Array, Array, Array]:
+        """Positions, velocities, accelerations (N, n) at times (N,) [s]."""
+        w, phase = self.pace
+        s = 0.5 * (time + (np.sin(w * time + phase) - np.sin(phase)) / w)
+        s1, s2 = 0.5 * (1.0 + np.cos(w * time + phase)), -0.5 * w * np.sin(w * time + phase)
+        q = np.tile(self.center, (len(time), 1))
+        slope, curvature = np.zeros_like(q), np.zeros_like(q)
+        for a, f, p in zip(self.amplitude, self.frequency, self.phase, strict=True):
+            angle = np.multiply.outer(s, f) + p
+            sine = np.sin(angle)
+            q += a * sine
+            slope += a * f * np.cos(angle)
+            curvature -= a * f**2 * sine
+        return q, slope * s1[:, None], curvature * s1[:, None] ** 2 + slope * s2[:, None]
+
+
+def random_trajectory(robot: Robot, rng: np.random.Generator) -> Trajectory:
+    """A motion within the joints' limits whose fastest joint reaches 0.5 to 3 rad/s."""
+    n = len(robot.joint_names)
+    joints = [robot.mechanism.joints[name] for name in robot.joint_names]
+    lower = np.array([max(joint.lower, -np.pi) for joint in joints])
+    upper = np.array([min(joint.upper, np.pi) for joint in joints])
+    frequency = 2 * np.pi * rng.uniform(*FREQUENCIES, (WAVES, n))
+    amplitude = rng.uniform(0.2, 1.0, (WAVES, n)) / frequency
+    speed = (amplitude * frequency).sum(axis=0)
+    amplitude *= rng.uniform(0.5, FASTEST) / speed.max()
+    reach = amplitude.sum(axis=0)
+    amplitude *= np.minimum(1.0, 0.45 * (upper - lower) / reach)
+    reach = amplitude.sum(axis=0)
+    center = rng.uniform(lower + reach, upper - reach)
+    pace = 2 * np.pi * rng.uniform(0.08, 0.25), rng.uniform(0, 2 * np.pi)
+    return Trajectory(center, amplitude, frequency, rng.uniform(0, 2 * np.pi, (WAVES, n)), pace)
+
+
+def imperfect(robot: Robot, error: float, seed: int) -> Robot:
+    """The arm that moves: inertias that are off by `error` (1 sigma) from what `robot` says."""
+    rng = np.random.default_rng(seed)
+    return Robot(robot.description, perturbed(robot.mechanism, error, rng))
+
+
+def with_noise(robot: Robot, velocity: float) -> Robot:
+    """The robot with another velocity noise [rad/s], 1 sigma per sample."""
+    noise = replace(robot.description.noise, qd=(velocity,) * len(robot.joint_names))
+    return Robot(replace(robot.description, noise=noise), robot.mechanism)
+
+
+class MotionMaker:
+    """Makes recordings of an arm, as its sensors report them.
+
+    Args:
+        robot: the description, whose noise figures the sensors have.
+        arm: the arm that moves (see `imperfect`).
+        rate: samples per second [Hz], a multiple of COARSE.
+        seconds: length of a recording.
+    """
+
+    def __init__(self, robot: Robot, arm: Robot, rate: float, seconds: float = 60.0) -> None:
+        self.robot, self.arm, self.rate = robot, arm, rate
+        self.factor = round(rate / COARSE)
+        self.time = np.arange(round(seconds * rate)) / rate
+        self._weights = _lagrange(np.arange(self.factor) / self.factor)
+
+    def loads(self, trajectory: Trajectory) -> tuple[Array, Array, Array]:
+        """Positions, velocities and what ideal sensors read (N, n + 6 k): torques, wrenches."""
+        half, count = len(POINTS) // 2, -(-len(self.time) // self.factor)
+        coarse = (np.arange(count + 2 * half) - (half - 1)) / COARSE
+        needed = inverse_dynamics(self.arm, *trajectory(coarse))
+        values = np.hstack([needed.torque, needed.wrench.reshape(len(coarse), -1)])
+        near = np.stack([values[k : k + count] for k in range(len(POINTS))])
+        fine = np.tensordot(self._weights, near, axes=(1, 0)).transpose(1, 0, 2)
+        q, qd, _ = trajectory(self.time)
+        return q, qd, fine.reshape(-1, values.shape[1])[: len(self.time)]
+
+    def samples(self, trajectory: Trajectory, rng: np.random.Generator) -> Samples:
+        """A recording without contact."""
+        return self.sensed(*self.loads(trajectory), rng)
+
+    def sensed(self, q: Array, qd: Array, loads: Array, rng: np.random.Generator) -> Samples:
+        """Readings with the description's noise; of plain sensors (sign 1, no bias, outboard)."""
+        noise, n = self.robot.description.noise, len(self.robot.joint_names)
+        sigma = [*noise.tau, *(x for s in self.robot.sensor_names for x in noise.sensors[s])]
+        loads = loads + rng.standard_normal(loads.shape) * np.array(sigma)
+        qd = qd + rng.standard_normal(qd.shape) * np.array(noise.qd)
+        measured = [j.torque in ("sensor", "motor") for j in self.robot.description.joints]
+        tau = np.where(measured, loads[:, :n], np.nan)
+        wrench = np.ascontiguousarray(loads[:, n:]).reshape(len(q), -1, 6)
+        return Samples(self.time[: len(q)], q, qd, tau, wrench)
+
+
+def generator(*seed: int) -> np.random.Generator:
+    """A quick source of chance."""
+    return np.random.Generator(np.random.SFC64(np.random.SeedSequence(seed)))
+
+
+def _lagrange(at: Array) -> Array:
+    """Weights (len(at), len(POINTS)) of the values at POINTS for positions `at`, 0 to 1."""
+    others = [np.delete(POINTS, k) for k in range(len(POINTS))]
+    return np.stack(
+        [np.prod((at[:, None] - o) / (POINTS[k] - o), axis=1) for k, o in enumerate(others)], axis=1
+    )

@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`touchline calibrate`: from contact-free recordings to a description, and what it refuses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import touchline as tl
+from touchline.bench.free_motion import MotionMaker, generator, imperfect, random_trajectory
+from touchline.calibrate.noise import NoiseMeter
+from touchline.calibrate.robot_file import write_description
+from touchline.calibrate.run import calibrate
+from touchline.cli.main import main
+from touchline.contact.calibration import fit_growth
+from touchline.contact.detector import Detector
+from touchline.contact.thresholds import make_thresholds
+from touchline.errors import InputError
+from touchline.logs import write_table
+from touchline.model.values import METHODS
+from touchline.model.yaml_file import read_yaml
+
+RATE = 500.0
+TEXT = """\
+# An arm.
+name: arm      # with a comment
+model: robot:sara
+observer: {bandwidth: 80.0}
+
+# What its sensors do.
+noise: {qd: 1.0e-3, tau: 0.2}
+detection:
+  # found by hand
+  hold: 0.2          # quiet for so long
+  contact: {force: 5.0}
+# The end.
+"""
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return tl.load_robot("sara")
+
+
+@pytest.fixture(scope="module")
+def maker(robot):
+    return MotionMaker(robot, imperfect(robot, 0.02, 1), RATE, 20.0)
+
+
+@pytest.fixture(scope="module")
+def logs(robot, maker, tmp_path_factory):
+    folder, paths = tmp_path_factory.mktemp("free"), []
+    for i in range(3):
+        rng = generator(i)
+        path = folder / f"free{i}.parquet"
+        write_table(path, maker.samples(random_trajectory(robot, rng), rng), robot.description)
+        paths.append(path)
+    return paths
+
+
+@pytest.fixture(scope="module")
+def result(logs, tmp_path_factory):
+    out = tmp_path_factory.mktemp("out") / "sara.yaml"
+    return calibrate(logs, "sara", out, ("glrt", "rows"), 10.0)
+
+
+def test_noise_figures_are_those_of_the_sensors(robot, result):
+    given = robot.description.noise
+    np.testing.assert_allclose(result.noise.qd, given.qd, rtol=0.03)
+    for joint in (1, 2, 3, 4):
+        assert result.noise.tau[joint] == pytest.approx(given.tau[joint], rel=0.03)
+    for name, six in given.sensors.items():
+        np.testing.assert_allclose(result.noise.sensors[name], six, rtol=0.03)
+
+
+def test_the_written_description_is_calibrated(result):
+    again = tl.load_robot(result.out)
+    assert again.description.detection.method == ("glrt", "rows")
+    thresholds = make_thresholds(again, 1 / RATE)
+    assert thresholds.calibrated and thresholds.note is None
+    assert set(thresholds.limits) == {"glrt", "rows"}
+    assert np.isfinite(thresholds.limits["glrt"]).all()
+    strict = replace(again.description.detection, false_alarms=0.1)
+    robot = tl.model.robot.Robot(replace(again.description, detection=strict), again.mechanism)
+    stricter = make_thresholds(robot, 1 / RATE)
+    assert (stricter.limits["glrt"] > thresholds.limits["glrt"]).all()
+    assert stricter.rows[0].contact > thresholds.rows[0].contact
+
+
+def test_a_calibration_holds_for_its_rate_alone(result):
+    thresholds = make_thresholds(tl.load_robot(result.out), 1e-4)
+    assert not thresholds.calibrated
+    assert "calibrated at 500 Hz, not at 10000 Hz" in str(thresholds.note)
+
+
+def test_alarms_of_the_detector_at_work_are_as_many_as_foreseen(robot, maker, result):
+    again = tl.load_robot(result.out)
+    rate = 360.0  # an hour
+    loose = replace(again.description.detection, false_alarms=rate)
+    for method in ("glrt", "cusum"):
+        detection = replace(loose, method=(method,))
+        tested = tl.model.robot.Robot(
+            replace(again.description, detection=detection), again.mechanism
+        )
+        alarms, seconds = 0, 0.0
+        for i in range(10, 16):
+            rng = generator(i)
+            s = maker.samples(random_trajectory(robot, rng), rng)
+            levels = (
+                Detector(tl.Observer(tested), period=1 / RATE)
+                .details(s.time, s.q, s.qd, s.tau, s.wrench)
+                .levels
+                > 0
+            )
+            alarms += int((levels[1:] & ~levels[:-1]).sum())
+            seconds += 20.0
+        expected = rate * seconds / 3600  # 12
+        assert expected / 3 < alarms < 3 * expected
+
+
+def test_the_report_tells_what_was_extrapolated(result):
+    from touchline.calibrate.summary import summary_text
+
+    text = summary_text(result)
+    assert "extrapolated" in text
+    assert "held-out data (every 3rd recording held out, 0.3 min)" in text
+    assert {h.method for h in result.held_out} == set(METHODS)
+
+
+def test_comments_and_other_keys_stay(tmp_path):
+    source = tmp_path / "robot.yaml"
+    source.write_text(TEXT)
+    write_description(
+        source,
+        source,
+        {"noise": {"qd": [1e-4, 2e-4]}, "detection": {"calibration": {"hours": 2.0}, "hold": 0.3}},
+    )
+    text = source.read_text()
+    for kept in (
+        "# An arm.",
+        "# with a comment",
+        "# What its sensors do.",
+        "# found by hand",
+        "# The end.",
+        "observer: {bandwidth: 80.0}",
+        "  contact: {force: 5.0}",
+    ):
+        assert kept in text
+    data = read_yaml(source)
+    assert data["noise"] == {"qd": [1e-4, 2e-4], "tau": 0.2}
+    assert data["detection"]["hold"] == 0.3
+    assert data["detection"]["calibration"] == {"hours": 2.0}
+    once = text
+    write_description(source, source, {"detection": {"hold": 0.3}})
+    assert source.read_text() == once
+
+
+def test_relative_paths_hold_from_the_new_place(tmp_path):
+    (tmp_path / "a").mkdir()
+    source, out = tmp_path / "a" / "robot.yaml", tmp_path / "b" / "new.yaml"
+    source.write_text("name: x\nmodel: ../m/arm.urdf\npackage_dirs: [.]\n")
+    write_description(source, out, {"noise": {"qd": 1e-4}})
+    data = read_yaml(out)
+    assert (out.parent / data["model"]).resolve() == (tmp_path / "m" / "arm.urdf").resolve()
+    assert (out.parent / data["package_dirs"][0]).resolve() == source.parent.resolve()
+
+
+def test_noise_is_measured_beneath_motion_and_jumps():
+    rng = np.random.default_rng(0)
+    t = np.arange(20_000) / 1000.0
+    x = np.sin(5 * t) + 0.01 * rng.normal(size=len(t))
+    x[5000:] += 3.0
+    x[100] = np.nan
+    meter = NoiseMeter(2)
+    for part in np.array_split(np.column_stack([x, np.full(len(t), np.nan)]), 7):
+        meter.add(part)
+    assert meter.sigma()[0] == pytest.approx(0.01, rel=0.03)
+    assert np.isnan(meter.sigma()[1])
+
+
+def test_growth_is_found_again():
+    rng = np.random.default_rng(1)
+    activity = rng.uniform(0, 4, (200_000, 2))
+    noise = np.full(len(activity), 0.2**2)
+    sigma = np.sqrt(noise + 0.3**2 + (0.1 * activity[:, 0]) ** 2 + (0.05 * activity[:, 1]) ** 2)
+    found = fit_growth(sigma * rng.normal(size=len(sigma)), noise, activity)
+    assert found == pytest.approx((0.3, 0.1, 0.05), rel=0.1)
+
+
+def test_recordings_with_contacts_are_refused(robot, maker, tmp_path, capsys):
+    rng = generator(0)
+    s = maker.samples(random_trajectory(robot, rng), rng)
+    push = (s.time > 8.0) & (s.time < 8.5)
+    s.wrench[push, 0, 1] -= 15.0  # the base sensor holds against it
+    path = tmp_path / "touched.parquet"
+    write_table(path, s, robot.description)
+    more = tmp_path / "more.parquet"
+    rng = generator(1)
+    write_table(more, maker.samples(random_trajectory(robot, rng), rng), robot.description)
+    out = tmp_path / "out.yaml"
+    status = main(["calibrate", str(more), str(path), "--robot", "sara", "--out", str(out)])
+    message = capsys.readouterr().err
+    assert status == 2
+    assert f"{path}: from 8.0" in message and "segment base" in message
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda p: {"logs": []}, "at least one recording"),
+        (lambda p: {"logs": [p[0], p[0]]}, "named twice"),
+        (lambda p: {"logs": [p[0]]}, "at least 30 s are needed"),
+        (lambda p: {"logs": [p[0].with_name("none.csv")]}, "no such file"),
+        (lambda p: {"out": p[0].with_suffix(".txt")}, "ends in .yaml"),
+        (lambda p: {"false_alarms": 0.0}, "--false-alarms 0"),
+        (lambda p: {"robot": "sarah"}, "no robot of this name"),
+    ],
+)
+def test_bad_input(logs, tmp_path, change, words):
+    options = {"logs": logs, "robot": "sara", "out": tmp_path / "out.yaml"} | change(logs)
+    with pytest.raises(InputError, match=words):
+        calibrate(**options)
+    assert not (tmp_path / "out.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ("method: bayes", "detection.method: 'bayes' is not allowed"),
+        ("method: [rows, rows]", "each once"),
+        ("method: []", "at least one method"),
+        ("false_alarms: 0", "detection.false_alarms: 0"),
+        ("windows: [0.9]", "at most 0.5 s"),
+        ("calibration: {hours: 1}", "detection.calibration"),
+        (
+            "calibration: {hours: 1, period: 0.001, rows: {base.fq: {typical: 1}}, tails: {}}",
+            "base.fq",
+        ),
+        (
+            "calibration: {hours: 1, period: 0.001, rows: {}, tails: {bas: {}}}",
+            "detection.calibration.tails.bas",
+        ),
+    ],
+)
+def test_keys_are_checked(tmp_path, keys, words):
+    path = tmp_path / "robot.yaml"
+    sensors = "force_torque_sensors: [{name: base, link: link0}]\n"
+    path.write_text(f"name: x\nmodel: robot:sara\n{sensors}detection:\n  {keys}\n")
+    with pytest.raises(InputError, match=words.replace("[", r"\[")):
+        tl.load_robot(path)
