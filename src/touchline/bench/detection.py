@@ -126,7 +126,7 @@ def alarm_table(outcomes: list[Outcome]) -> str:
         *(f"at {rate:g}/h" for rate in ALARMS),
         "ratio at 10/h",
     )
-    rows = [head]
+    rows: list[Row] = [head]
     for o in outcomes:
         for method in o.methods:
             cells = []

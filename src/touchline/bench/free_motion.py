@@ -6,6 +6,7 @@ low rate and interpolated by polynomials (to 1e-5 N of 500), since they are smoo
 velocities are exact at every sample. Noise is added per sample.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +18,9 @@ from touchline.model.robot import Robot
 from touchline.simulation.noise import perturbed
 
 Array = NDArray[np.float64]
+
+# Positions, velocities, accelerations (N, n) at times (N,).
+Path = Callable[[Array], tuple[Array, Array, Array]]
 
 WAVES = 3  # per joint
 FREQUENCIES = 0.15, 0.6  # Hz, of the waves
@@ -103,7 +107,7 @@ class MotionMaker:
         self.time = np.arange(round(seconds * rate)) / rate
         self._weights = _lagrange(np.arange(self.factor) / self.factor)
 
-    def loads(self, trajectory: Trajectory) -> tuple[Array, Array, Array]:
+    def loads(self, trajectory: Path) -> tuple[Array, Array, Array]:
         """Positions, velocities and what ideal sensors read (N, n + 6 k): torques, wrenches."""
         half, count = len(POINTS) // 2, -(-len(self.time) // self.factor)
         coarse = (np.arange(count + 2 * half) - (half - 1)) / COARSE

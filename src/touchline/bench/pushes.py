@@ -76,9 +76,9 @@ class PushMaker:
         T = robot.poses(q[0])[node]
         local = T[:3, :3].T @ (touch.position - T[:3, 3])
         poses = np.array([robot.poses(x)[node] for x in q])
-        point = np.einsum("nij,j->ni", poses[:, :3, :3], local) + poses[:, :3, 3]
+        point = poses[:, :3, :3] @ local + poses[:, :3, 3]
         force = np.tile(touch.force, (len(q), 1))
-        return np.hstack([force, np.cross(point, force)])
+        return np.asarray(np.hstack([force, np.cross(point, force)]), dtype=np.float64)
 
 
 @dataclass(frozen=True)

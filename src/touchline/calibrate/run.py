@@ -4,6 +4,7 @@
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ from touchline.contact.thresholds import PERIOD_RATIO
 from touchline.errors import InputError
 from touchline.estimation.samples import Samples
 from touchline.logs import open_log
-from touchline.model.description import CalibrationDescription, Noise
+from touchline.model.description import CalibrationDescription, Noise, RowCalibration
 from touchline.model.robot import Robot, load_robot
 from touchline.model.values import METHODS
 from touchline.model.yaml_file import read_yaml
@@ -119,36 +120,26 @@ def calibrate(
     source = model.description.path
     if source is None:
         raise InputError(f"{robot}: has no file to start from")
+    rate = false_alarms or model.description.detection.false_alarms
+    chosen = methods or model.description.detection.method
     given = read_yaml(source).get("detection") or {}
-    changes = {"false_alarms": false_alarms or model.description.detection.false_alarms}
-    changes["method"] = list(methods or model.description.detection.method)
     hold = model.description.detection.min_duration if "min_duration" in given else 0.0
-    model = with_methods(
-        model,
-        *changes["method"],
-        min_duration=hold,
-        calibration=None,
-        false_alarms=changes["false_alarms"],
-    )
+    model = with_methods(model, *chosen, min_duration=hold, calibration=None, false_alarms=rate)
     recordings = _Recordings(model, logs)
     noise = measure_noise(model, recordings.all("noise"))
     quiet = Robot(replace(model.description, noise=noise), model.mechanism)
-    period = recordings.period
-    rows = fit_rows(quiet, period, collect_residuals(quiet, period, recordings.all("residuals")))
-    if not rows:
-        raise InputError(f"{logs[0]}: no residual settles: is a signal missing? (touchline check)")
-    found = collect_statistics(quiet, period, rows, recordings.all("statistics"))
+    found, rows = _watch(quiet, recordings)
     _refuse_contacts(model, logs, find_contacts(found, METHODS))
     train, test, split = _parts(found, len(logs))
-    held_out = _judge(quiet, fit_tails(quiet, train), test, changes["false_alarms"])
+    held_out = _judge(quiet, fit_tails(quiet, train), test, rate)
     tails = fit_tails(quiet, found)
     if not tails:
         raise InputError(f"{', '.join(map(str, logs))}: too short: too few peaks for a tail")
-    description = describe(found.hours, period, rows, tails)
-    changes |= {"min_duration": hold, "calibration": _plain(description)}
-    noise_changes = {k: _plain(v) for k, v in noise_keys(model, noise).items()}
-    write_description(source, out, {"noise": noise_changes, "detection": changes})
-    rate = changes["false_alarms"]
+    description = describe(found.hours, recordings.period, rows, tails)
+    detection: dict[str, Any] = {"method": list(chosen), "false_alarms": rate, "min_duration": hold}
+    detection["calibration"] = _plain(description)
+    figures = {key: _plain(value) for key, value in noise_keys(model, noise).items()}
+    write_description(source, out, {"noise": figures, "detection": detection})
     return Calibration(model, out, logs, noise, description, tails, held_out, split, rate)
 
 
@@ -212,6 +203,16 @@ class _Recordings:
     def _parts(self, log: Path) -> Iterator[Samples]:
         with open_log(log, self._robot.description) as recording:
             yield from recording.chunks(CHUNK)
+
+
+def _watch(robot: Robot, recordings: _Recordings) -> tuple[Statistics, dict[str, RowCalibration]]:
+    """Both passes over the recordings."""
+    period = recordings.period
+    residuals = collect_residuals(robot, period, recordings.all("residuals"))
+    rows = fit_rows(robot, period, residuals)
+    if not rows:
+        raise InputError("no residual settles: is a signal missing? (touchline check)")
+    return collect_statistics(robot, period, rows, recordings.all("statistics")), rows
 
 
 def _refuse_contacts(robot: Robot, logs: list[Path], found: list[Suspicion]) -> None:

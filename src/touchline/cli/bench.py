@@ -27,6 +27,8 @@ def bench(
     runs: int = 1000,
     seed: int = 0,
     encounters: int = 2,
+    hours: float = 0.5,
+    pushes: int = 100,
     out: Annotated[Path | None, arg(metavar="DIR")] = None,
     baselines: tuple[Literal["first", "nearest", "particles"], ...] = (
         "first",

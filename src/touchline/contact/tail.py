@@ -77,7 +77,8 @@ class Tail:
     def description(self) -> TailDescription:
         """As it stands in `robot.yaml`."""
         return TailDescription(
-            *(float(f"{x:.5g}") for x in (self.level, self.per_hour)),
+            float(f"{self.level:.5g}"),
+            float(f"{self.per_hour:.5g}"),
             float(f"{self.scale:.5g}"),
             float(f"{self.shape:.4g}"),
         )

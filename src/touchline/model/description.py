@@ -140,8 +140,8 @@ class CalibrationDescription:
 
     hours: float
     period: float
-    rows: dict[str, RowCalibration]
-    tails: dict[str, dict[str, TailDescription]]
+    rows: dict[str, RowCalibration] = field(default_factory=dict)
+    tails: dict[str, dict[str, TailDescription]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
