@@ -54,17 +54,21 @@ class Explanations {
       }
       view.begin();
     }
-    std::sort(views_.begin(), views_.begin() + used_,
-              [](const View& a, const View& b) { return a.least < b.least; });
-    for (int i = 0; i < used_ && views_[i].least < best_ + kWindow; ++i) {
+    if (measurement.has_wrench()) {
+      std::sort(views_.begin(), views_.begin() + used_,
+                [](const View& a, const View& b) { return a.least < b.least; });
+    }
+    for (int i = 0; i < used_; ++i) {
       View& view = views_[i];
+      if (!(view.least < best_ + kWindow)) continue;
       if (view.line) view.find_line();
       if (view.line && view.floor < best_ + kWindow) enter(view);
     }
     // What must be searched for costs more, so it comes last and only where it may matter.
-    for (int i = 0; i < used_ && views_[i].least < best_ + kRelevant; ++i) {
+    for (int i = 0; i < used_; ++i) {
       View& view = views_[i];
-      if (view.line && view.floor < best_ + kRelevant && !view.steep) beside(view);
+      if (!(view.floor < best_ + kRelevant)) continue;
+      if (view.line && !view.steep) beside(view);
       if (!measurement.has_wrench()) search(view);
     }
   }
@@ -191,17 +195,10 @@ class Explanations {
         if (candidates_[count_].fit.cost() < best_ + kRough)
           found = insert(starts, found, candidates_[count_]);
       }
-      const int first = count_;
       for (int i = 0; i < found && count_ < kMost; ++i) {
         candidates_[count_] = starts[i];
-        refinement_.descend(view, candidates_[count_]);
-        if (!known(first, kSame)) keep();
-      }
-      // Only where it may matter does a point have to be the very best.
-      for (int i = first; i < count_; ++i) {
-        if (candidates_[i].fit.cost() > best_ + kRelevant) continue;
-        refinement_.settle(view, candidates_[i], kCoarse);
-        best_ = std::min(best_, candidates_[i].fit.cost());
+        refinement_.improve(view, candidates_[count_], kCoarse);
+        if (!known(0, kSame)) keep();
       }
     }
   }

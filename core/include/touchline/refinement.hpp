@@ -17,9 +17,13 @@ class Refinement {
   Refinement(const LinkSurfaces& surfaces, const ForceFitter& fitter)
       : surfaces_(surfaces), fitter_(fitter) {}
 
-  void improve(const View& view, Candidate& k) const {
-    if (!descend(view, k)) settle(view, k);
+  // To the best place nearby, as exactly as `finest` [m].
+  void improve(const View& view, Candidate& k, double finest = 1e-3) const {
+    if (!descend(view, k)) settle(view, k, finest);
   }
+
+ private:
+  static constexpr double kArrived = 2e-4;  // length of a step [m]
 
   // Goes downhill by Gauss-Newton steps; returns whether that was all there was to do.
   bool descend(const View& view, Candidate& k) const {
@@ -42,15 +46,12 @@ class Refinement {
 
   // Where the friction cone or an edge stands in the way: smaller and smaller trials around, down
   // to `finest` [m].
-  void settle(const View& view, Candidate& k, double finest = 1e-3) const {
+  void settle(const View& view, Candidate& k, double finest) const {
     for (double radius = 0.032; radius > finest; radius *= 0.5) {
       for (int round = 0; round < 3 && better_around(view, k, radius); ++round) {
       }
     }
   }
-
- private:
-  static constexpr double kArrived = 2e-4;  // length of a step [m]
 
   bool better_around(const View& view, Candidate& k, double radius) const {
     Vec3 s, t;
