@@ -2,20 +2,16 @@
 """`touchline bench`."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from tyro.conf import Positional, arg
 
-NAMES = ("observer", "localization", "reaction", "wrench", "detection")
+Name = Literal["observer", "localization", "classification", "reaction", "wrench", "detection"]
+NAMES: tuple[Name, ...] = get_args(Name)
 
 
 def bench(
-    names: Annotated[
-        Positional[
-            tuple[Literal["observer", "localization", "reaction", "wrench", "detection"], ...]
-        ],
-        arg(metavar="[NAME ...]"),
-    ] = (),
+    names: Annotated[Positional[tuple[Name, ...]], arg(metavar="[NAME ...]")] = (),
     /,
     output: Annotated[Path | None, arg(metavar="FILE")] = None,
     rounds: int = 40,
@@ -26,7 +22,9 @@ def bench(
     speeds: tuple[float, ...] = (0.0,),
     runs: int = 1000,
     seed: int = 0,
+    interactions: int = 2000,
     encounters: int = 2,
+    guiding: float = 1.0,
     hours: float = 0.5,
     pushes: int = 100,
     out: Annotated[Path | None, arg(metavar="DIR")] = None,
@@ -41,8 +39,8 @@ def bench(
     Example: touchline bench localization --robots panda sara --runs 10000 --out figures
 
     Args:
-        names: What to measure (observer, localization, reaction, wrench, detection);
-            default: everything.
+        names: What to measure (observer, localization, classification, reaction, wrench,
+            detection); default: everything.
         output: observer: writes the figures here as well (.json or .csv).
         rounds: observer: how often each candidate is timed.
         robots: localization: the arms; panda and ur10 need the package example-robot-data.
@@ -51,11 +49,14 @@ def bench(
         begin: localization: several contacts begin 0.1 s apart, or at the same instant.
         speeds: localization: of every joint [rad/s]; 0 is an arm at rest.
         runs: localization: random poses and places per line of the tables.
-        seed: localization, wrench: of all that is random.
+        seed: localization, classification, wrench: of all that is random.
+        interactions: classification: how many are simulated.
         encounters: reaction: collisions for each link and speed.
+        guiding: reaction: hours in which the arm is led by its handle.
         hours: detection: simulated at 1 kHz for calibration, and as many for false alarms.
         pushes: detection: of each force.
-        out: localization, reaction, wrench, detection: folder for tables, runs and figures.
+        out: localization, classification, reaction, wrench, detection: folder for tables, runs
+            and figures.
         baselines: localization: what runs along: the first entry of the line of force action, the
             surface nearest to the line, a contact particle filter (on 100 runs a line).
     """
@@ -70,10 +71,14 @@ def bench(
 
         plan = Plan(robots, contacts, noise, begin, speeds, runs, seed, baselines)
         measure_localization(plan, out)
+    if "classification" in wanted:
+        from touchline.bench.classification import main as measure_classification
+
+        measure_classification(interactions, seed, out)
     if "reaction" in wanted:
         from touchline.bench.reaction import main as measure_reaction
 
-        measure_reaction(encounters, out)
+        measure_reaction(encounters, guiding, out)
     if "wrench" in wanted:
         from touchline.bench.wrench import main as measure_wrench
 

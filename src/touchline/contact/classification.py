@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 WINDOW = 0.01  # s over which the rate of the force is taken
 PATIENCE = 0.05  # s after detection in which a collision would have shown
 LEVER = 0.5  # m: where joint torques alone are known, they count as forces at this distance
+LEADING = 0.5  # share of a segment's load from which on a blow is that contact's
 NOISE_RATIO = 2.0  # contact thresholds per WINDOW that noise may make
 
 
@@ -43,7 +44,7 @@ class Classes:
 
     Attributes:
         kinds: (m,) the `Kind` of each segment's touch.
-        clamped: (m,) whether its forces are opposed.
+        clamped: (m,) whether another segment's force opposes its own.
         rates: (m,) of the segment's force over the last WINDOW [N/s]; NaN where not touched.
     """
 
@@ -67,6 +68,14 @@ class _Touch:
 
     begin: float
     kind: int = Kind.UNDECIDED
+
+
+def of_contact(kinds: NDArray[np.int64], share: Array) -> NDArray[np.int64]:
+    """Kinds (M,) of single contacts, from those of their segment and their shares of its load.
+
+    A blow on a segment that is touched at several places belongs to the one that carries most.
+    """
+    return np.where(share >= LEADING, kinds, np.minimum(kinds, Kind.CONTACT))
 
 
 class Classifier:
@@ -97,7 +106,7 @@ class Classifier:
         joints = float(np.max(description.bandwidth_joints, initial=1.0))
         known = description.bandwidth_sensors
         self._bandwidth = np.array([known.get(name, joints) for name in robot.segment_names])
-        self._clamping = Clamping(robot, thresholds)
+        self._clamping = Clamping()
         self._time, self._size = np.empty(0), np.empty((0, m))
         self._waiting: deque[tuple[float, Array]] = deque()
         self._touches: dict[int, _Touch] = {}

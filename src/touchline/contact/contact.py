@@ -41,7 +41,7 @@ class Contact:
         candidates: other explanations, best first.
         decided: whether the level is more than a default.
         zone: "structure", "end_effector" or "handle"; None while that is open.
-        clamped: whether forces on two sides oppose each other.
+        clamped: whether forces on two sides oppose each other; None where that is not known.
         rate: at which the force grows [N/s].
     """
 
@@ -59,7 +59,7 @@ class Contact:
     candidates: tuple[Candidate, ...] = field(default=())
     decided: bool = False
     zone: str | None = None
-    clamped: bool = False
+    clamped: bool | None = False
     rate: float | None = None
 
     @property

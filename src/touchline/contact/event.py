@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.classification import Classes, Kind
+from touchline.contact.classification import Classes, Kind, of_contact
 from touchline.contact.contact import Candidate
 from touchline.contact.detector import Detection, Detector
 from touchline.contact.localizer import CONTACT, FORCE, EventAnswer, Localizer
@@ -43,7 +43,7 @@ class Event:
         candidates: all explanations, best first, at `time_of_position`.
         decided: when the level was decided [s]; None while it is a default.
         zone: "structure", "end_effector" or "handle"; None while that is open.
-        clamped: whether forces on two sides opposed each other.
+        clamped: whether forces on two sides opposed each other; None where that is not known.
         rate: largest rate of the segment's force [N/s].
     """
 
@@ -67,7 +67,7 @@ class Event:
     candidates: tuple[Candidate, ...] = ()
     decided: float | None = None
     zone: str | None = None
-    clamped: bool = False
+    clamped: bool | None = False
     rate: float | None = None
 
     def as_json(self) -> dict[str, Any]:
@@ -110,9 +110,10 @@ def _numbers(values: Array | None) -> list[float] | None:
     return None if values is None else [float(x) for x in values]
 
 
-def _classify(event: Event, time: Array, classes: Classes, samples: Any, g: int) -> None:
+def _classify(event: Event, time: Array, classes: Classes, part: "_Part", g: int) -> None:
     """Brings the class of an event up to date with samples of its segment."""
-    kinds, rates = classes.kinds[samples, g], classes.rates[samples, g]
+    samples = part.sample
+    kinds, rates = of_contact(classes.kinds[samples, g], part.share), classes.rates[samples, g]
     known = np.flatnonzero(kinds >= Kind.CONTACT)
     blows = np.flatnonzero(kinds == Kind.COLLISION)
     if len(known) and event.decided is None:
@@ -171,7 +172,7 @@ class _Part:
     answers: Array
 
 
-def _shares(sample: NDArray[np.int64], segment: NDArray[np.int64], answers: Array) -> Array:
+def load_shares(sample: NDArray[np.int64], segment: NDArray[np.int64], answers: Array) -> Array:
     """The share (M,) that each contact has of the forces on its segment; 1 for the only one."""
     size = np.linalg.norm(np.nan_to_num(answers[:, FORCE]), axis=1)
     key = sample * (segment.max(initial=0) + 1) + segment
@@ -198,13 +199,9 @@ class EventRecorder:
         self._zones = Zones(self._robot)
         self._open: dict[float, tuple[Event, _Gathered]] = {}
 
-    def knows(self, numbers: list[float]) -> bool:
-        """Has an event begun for each of these numbers of contacts?"""
-        return all(number in self._open for number in numbers)
-
-    def event(self, number: float) -> Event:
-        """The event that lasts, by number of its contact."""
-        return self._open[number][0]
+    def open_events(self, numbers: list[float]) -> dict[float, Event]:
+        """The events that last, of those with these numbers of contacts."""
+        return {number: self._open[number][0] for number in numbers if number in self._open}
 
     def add(
         self,
@@ -232,7 +229,7 @@ class EventRecorder:
         """
         sample, segment, number = (answers[:, i].astype(int) for i in range(CONTACT))
         ids = np.full(len(answers), -1)
-        shares = _shares(sample, segment, answers[:, CONTACT:])
+        shares = load_shares(sample, segment, answers[:, CONTACT:])
         _, first = np.unique(number, return_index=True)
         for row in np.sort(first).tolist():
             contact = int(number[row])
@@ -242,7 +239,7 @@ class EventRecorder:
             ids[own] = event.id
             part = _Part(sample[own], shares[own], answers[own, CONTACT:])
             self._extend(event, gathered, g, part, q, estimate, detection)
-            _classify(event, time, classes, part.sample, g)
+            _classify(event, time, classes, part, g)
         for row in ended:
             self._close(int(row[2]), float(time[int(row[0])]), row[CONTACT:])
         return ids
@@ -257,6 +254,8 @@ class EventRecorder:
         for name, value in vars(answer).items():
             setattr(event, name, value)
         event.zone = self._zones.of(event.segment, event.link)
+        if not event.clamped:
+            event.clamped = None if event.status == "not_separable" else False
 
     def _opened(self, number: int, g: int, time: float) -> tuple[Event, "_Gathered"]:
         if number not in self._open:

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.classification import Classes, Classifier, Kind
+from touchline.contact.classification import Classes, Classifier, Kind, of_contact
 from touchline.contact.contact import Contact
 from touchline.contact.detector import Detection
-from touchline.contact.event import Event
+from touchline.contact.event import Event, load_shares
 from touchline.contact.localizer import CONTACT, Answer, Localizer
 from touchline.contact.zones import Zones
 from touchline.estimation.observer import Estimate
@@ -131,7 +131,17 @@ class LiveContact(Contact):
     def _class(self) -> tuple[int, bool, float]:
         classes, i = self._sample.classes
         at = i, int(self._row[1])
-        return int(classes.kinds[at]), bool(classes.clamped[at]), float(classes.rates[at])
+        kind = of_contact(classes.kinds[at], self._share())
+        return int(kind), bool(classes.clamped[at]), float(classes.rates[at])
+
+    def _share(self) -> Array:
+        """Of the load on the segment; 1 for its only contact."""
+        rows = self._sample.answers
+        if np.count_nonzero(rows[:, 1] == self._row[1]) < 2:
+            return np.ones(())
+        sample, segment, _ = rows[:, :CONTACT].astype(int).T
+        shares = load_shares(sample, segment, rows[:, CONTACT:])
+        return shares[int(np.argmax(rows[:, 2] == self._row[2]))]
 
     status = _lazy(lambda self: self._answer.status or "wrench_only")
     link = _lazy(lambda self: self._answer.link)
@@ -144,9 +154,12 @@ class LiveContact(Contact):
     zone = _lazy(lambda self: self._zones.of(self.segment, self.link))
     level = _lazy(lambda self: "collision" if self._class[0] == Kind.COLLISION else "contact")
     decided = _lazy(lambda self: self._class[0] >= Kind.CONTACT)
-    clamped = _lazy(lambda self: self._class[1])
+    clamped = _lazy(lambda self: self._clamped())
     rate = _lazy(lambda self: self._class[2])
     wrench = _lazy(lambda self: self._wrench())
+
+    def _clamped(self) -> bool | None:
+        return True if self._class[1] else None if self.status == "not_separable" else False
 
     def _wrench(self) -> Array | None:
         if self.segment == "root":

@@ -144,13 +144,15 @@ class Pipeline:
         answers, ended = self.localizer.follow_sample(time, q, qd, estimate, detection)
         sample = self._stream.add(float(time), q, estimate, detection, answers, ended)
         numbers = answers[:, 2].tolist()
-        known = self.recorder.knows(numbers)
+        events = self.recorder.open_events(numbers)
         changed = touched != self._touched or len(ended)
-        if changed or not known or len(self._stream.samples) >= PENDING:
+        if changed or len(events) < len(numbers) or len(self._stream.samples) >= PENDING:
             self._record()
+            events |= self.recorder.open_events(numbers)  # one may have ended with this sample
         return [
-            LiveContact(sample, row, self.recorder.event(number), self.localizer, self.zones)
+            LiveContact(sample, row, events[number], self.localizer, self.zones)
             for row, number in zip(answers, numbers, strict=True)
+            if number in events
         ]
 
     def _record(self) -> None:

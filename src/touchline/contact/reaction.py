@@ -8,7 +8,8 @@ velocity (weight, Coriolis, centrifugal) and a wanted joint velocity v, the stra
 
 with the largest s that keeps every torque within its limit. For v = 0 the added power is
 `-s qd^T M qd / T <= 0`: braking takes energy out whatever the model's scale, and as all velocities
-shrink in proportion the robot stops on its own path.
+shrink in proportion the robot stops on its own path. Sparing a motion d of least kinetic energy,
+`d = M^-1 l / (l^T M^-1 l)`, keeps that sign, by Cauchy and Schwarz.
 """
 
 from collections.abc import Callable, Mapping
@@ -27,7 +28,9 @@ SERVO_TIME = 5e-3  # s in which a velocity is taken on, torque limits permitting
 HOLD_FREQUENCY = 30.0  # rad/s of the critically damped spring that holds a stopped robot
 FLOAT_TIME = 0.5  # s in which a floating robot loses its velocity to friction
 RETRACT_EASE = 0.05  # s over which the retraction slows down at its end
-LEAST_LEVER = 1e-3  # m: below it no joint moves the point along the force
+PRESSING = 5.0  # N: with less a contact does not press any more
+LEAST_LEVER = 0.02  # m: below it no joint moves the point along the force to speak of
+STRAIGHT = 0.5  # cosine between force and motion below which the point would slide, not leave
 
 
 def ignore(contact: Contact, state: State) -> Array:
@@ -36,13 +39,36 @@ def ignore(contact: Contact, state: State) -> Array:
 
 
 def stop(contact: Contact, state: State) -> Array:
-    """Brakes along the path as hard as the torque limits allow, then holds the pose."""
-    push = -state.inertia @ state.qd / SERVO_TIME
-    if state.since is not None and state.since.rest is not None:
+    """Brakes along the path as hard as the torque limits allow, then holds the pose.
+
+    As long as the contact presses, what moves the robot away from it is not braked: else a robot
+    that stops would be harder to push away than one that does not react.
+    """
+    escape = escape_motion(contact, state)
+    if escape is not None and pressing(escape[1], state) > PRESSING:
+        lever, direction = escape
+        resisted = state.qd - max(0.0, float(lever @ state.qd)) * direction
+        push = -state.inertia @ resisted / SERVO_TIME
+    elif state.since is not None and state.since.rest is not None:
         w = HOLD_FREQUENCY
         wanted = w**2 * (state.since.rest - state.q) - 2 * w * state.qd
         push = state.inertia @ wanted
+    else:
+        push = -state.inertia @ state.qd / SERVO_TIME
     return state.bias_torque + within_effort(state, push)
+
+
+def pressing(direction: Array, state: State) -> float:
+    """Force [N] that presses along a joint motion (n,) per metre, by the external joint torques."""
+    if state.tau_ext is None:
+        return 0.0
+    return float(direction @ np.nan_to_num(state.tau_ext))
+
+
+def is_pressed(contact: Contact, state: State) -> bool:
+    """Whether the contact still presses the robot in a direction in which it could yield."""
+    escape = escape_motion(contact, state)
+    return escape is not None and pressing(escape[1], state) > PRESSING
 
 
 def float_(contact: Contact, state: State) -> Array:
@@ -55,7 +81,8 @@ class Retract:
     """Moves the touched point along the force, then stops.
 
     Of all joint motions that move the point so, it is the one of least kinetic energy. Where the
-    point is not known the joints yield to the torques they feel; where no joint can move it, stop.
+    point is not known the best candidate stands in, or else the joints yield to the torques they
+    feel; where no joint can move the point away, the robot stops.
 
     Attributes:
         way: that the point moves away [m].
@@ -67,11 +94,10 @@ class Retract:
 
     def __call__(self, contact: Contact, state: State) -> Array:
         """Joint torques (n,) [Nm or N]."""
-        lever = escape_lever(contact, state)
-        if lever is None:
+        escape = escape_motion(contact, state)
+        if escape is None:
             return stop(contact, state)
-        direction = np.linalg.solve(state.inertia, lever)
-        direction = direction / (lever @ direction)
+        lever, direction = escape
         left = self.way - state.advance(lever)
         goal = direction * np.clip(left / RETRACT_EASE, 0.0, self.speed)
         goal = goal / max(1.0, float(np.max(np.abs(goal) / state.speed_limit)))
@@ -79,23 +105,53 @@ class Retract:
         return state.bias_torque + within_effort(state, push)
 
 
-def escape_lever(contact: Contact, state: State) -> Array | None:
-    """How fast each joint (n,) moves the touched point along the force; None: none can, or unknown.
+def escape_motion(contact: Contact, state: State) -> tuple[Array, Array] | None:
+    """The joint motion of least kinetic energy that moves the touched point along the force.
 
-    Without a place, the direction of the external joint torques, which are J^T f themselves,
-    stands in, per newton of the segment's force (1 N where that is not known).
+    Returns:
+        How far each joint (n,) moves the point along the force, and the joint motion (n,) that
+        moves it by one metre; None where no joint can, where the point would rather slide along
+        the surface, or where nothing is known.
     """
-    if contact.link is not None and contact.position is not None and contact.force is not None:
-        size = float(np.linalg.norm(contact.force))
-        if size == 0.0:
-            return None
-        lever = state.lever(contact.link, contact.position, contact.force / size)
-    elif state.tau_ext is not None:
-        size = 1.0 if contact.wrench is None else float(np.linalg.norm(contact.wrench[:3]))
-        lever = np.nan_to_num(state.tau_ext) / max(size, 1.0)
-    else:
+    place = _place(contact)
+    if place is None:
+        return _yielding(contact, state)
+    link, point, force = place
+    jacobian = np.array([state.lever(link, point, axis) for axis in np.eye(3)])
+    lever = force @ jacobian / np.linalg.norm(force)
+    if np.linalg.norm(lever) < LEAST_LEVER:
         return None
-    return lever if np.linalg.norm(lever) > LEAST_LEVER else None
+    direction = _least_energy(state, lever)
+    straight = 1.0 / float(np.linalg.norm(jacobian @ direction))  # cosine with the force
+    return (lever, direction) if straight > STRAIGHT else None
+
+
+def _place(contact: Contact) -> tuple[str, Array, Array] | None:
+    """Link, point and force, if need be those of the best candidate and of the segment."""
+    force = contact.force
+    if force is None and contact.wrench is not None:
+        force = contact.wrench[:3]
+    if force is None or not np.any(force):
+        return None
+    if contact.link is not None and contact.position is not None:
+        return contact.link, contact.position, force
+    best = next(iter(contact.candidates), None)
+    return None if best is None else (best.link, best.position, force)
+
+
+def _yielding(contact: Contact, state: State) -> tuple[Array, Array] | None:
+    """Without a place: along the external joint torques, which are J^T f themselves."""
+    if state.tau_ext is None:
+        return None
+    lever = np.nan_to_num(state.tau_ext) / max(contact.size, 1.0)
+    if np.linalg.norm(lever) < LEAST_LEVER:
+        return None
+    return lever, _least_energy(state, lever)
+
+
+def _least_energy(state: State, lever: Array) -> Array:
+    motion = np.linalg.solve(state.inertia, lever)
+    return motion / (lever @ motion)
 
 
 def within_effort(state: State, push: Array) -> Array:

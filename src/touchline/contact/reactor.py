@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from touchline.contact.contact import Contact
 from touchline.contact.policy import Choice, Policy
-from touchline.contact.reaction import REACTIONS, SERVO_TIME, Reaction, Retract
+from touchline.contact.reaction import REACTIONS, SERVO_TIME, Reaction, Retract, is_pressed
 from touchline.contact.state import Since, State
 from touchline.errors import InputError
 from touchline.model.description import PolicyDescription
@@ -140,7 +140,7 @@ class Reactor:
             if active is None or _before(choice, active.choice):
                 if choice.reaction != "ignore":
                     active = _Active(choice, contact, Since(state.time, state.q.copy()))
-            elif contact.event == active.contact.event:
+            elif choice.rank == active.choice.rank or contact.event == active.contact.event:
                 active = replace(active, contact=_clearer(active.contact, contact))
         self._active = active
         return self._ignore(state) if active is None else self._react(active, state)
@@ -151,7 +151,8 @@ class Reactor:
 
     def _react(self, active: _Active, state: State) -> Command:
         since = active.since
-        if since.rest is None and np.max(np.abs(state.qd)) < REST:
+        still = since.rest is None and np.max(np.abs(state.qd)) < REST
+        if still and not is_pressed(active.contact, state):
             since = replace(since, rest=state.q.copy())
             self._active = replace(active, since=since)
         state = replace(state, since=since)
@@ -166,7 +167,6 @@ def _before(choice: Choice, other: Choice) -> bool:
 
 
 def _clearer(known: Contact, now: Contact) -> Contact:
-    """Of two views of one contact the one with the place, or else with more force."""
-    if (known.position is None) != (now.position is None):
-        return known if now.position is None else now
-    return now if now.size > known.size else known
+    """Of two contacts that call for the same, the stronger; one without a place counts half."""
+    weights = [c.size * (1.0 if c.position is not None else 0.5) for c in (known, now)]
+    return now if weights[1] > weights[0] else known

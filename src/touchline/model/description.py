@@ -198,9 +198,9 @@ class ForceLimit:
 class Onset:
     """Rates of force [N/s] above which a touch begins like a collision, by zone."""
 
-    structure: float = 400.0
-    end_effector: float = 600.0
-    handle: float = 1500.0
+    structure: float = 800.0
+    end_effector: float = 800.0
+    handle: float = 1700.0
 
 
 @dataclass(frozen=True)

@@ -14,14 +14,15 @@ from touchline.contact.state import State
 from touchline.errors import InputError
 from touchline.model.robot import Robot
 from touchline.simulation.closed_loop import LiveSensors, ReactingController, Step
-from touchline.simulation.control import Setpoint, Trajectory
+from touchline.simulation.control import Controller, Setpoint, Trajectory
+from touchline.simulation.guiding import GuidingHand, HandMotion, led
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.obstacle import PAD_RADIUS, Body, Obstacle
 from touchline.simulation.readings import Readings
 from touchline.simulation.scene import Run, impedance, make_plant
 from touchline.simulation.setup import Setup, read_setup
 from touchline.simulation.shapes import CollisionShapes
-from touchline.simulation.simulator import Rates, run
+from touchline.simulation.simulator import Contacts, Rates, run
 from touchline.simulation.touchable import TouchableSurface
 from touchline.simulation.truth import Truth
 
@@ -70,7 +71,7 @@ class Outcome:
     Attributes:
         encounter: that was simulated.
         readings: of ideal sensors.
-        truth: one slot, the obstacle's force.
+        truth: the obstacle's force in the first slot, that of a hand in the second.
         steps: of the loop.
         torque: (N, n) motor torques commanded [Nm or N].
     """
@@ -174,7 +175,12 @@ class EncounterScene:
         return all(bool(np.all((self.setup.lower < e) & (e < self.setup.upper))) for e in ends)
 
     def play(
-        self, encounter: Encounter, reactor: Reactor, seconds: float = 1.0, seed: int = 0
+        self,
+        encounter: Encounter,
+        reactor: Reactor,
+        seconds: float = 1.0,
+        seed: int = 0,
+        hand: tuple[str, Array] | None = None,
     ) -> Outcome:
         """Simulates an encounter from rest or in motion, with the reactor in the loop.
 
@@ -183,6 +189,8 @@ class EncounterScene:
             reactor: fresh or reset.
             seconds: duration.
             seed: of the sensors' noise.
+            hand: the link that a person holds and where (3,), in its frame [m], to lead the arm,
+                which then has no motion of its own; None: nobody does.
         """
         settings, plant = self.settings, self.plant
         trajectory = encounter.trajectory()
@@ -194,11 +202,15 @@ class EncounterScene:
         rng = np.random.default_rng([settings.seed, 6, seed])
         sensors = LiveSensors(plant, count, settings.rate, settings.noise, rng)
         pipeline = Pipeline(self.robot, period=1.0 / settings.rate, skin=self.skin)
-        own = impedance(self.setup, trajectory)
+        own: Controller = impedance(self.setup, trajectory)
+        contacts: list[Contacts] = [self.obstacle]
+        if hand is not None:
+            own = led(self.setup, encounter.q)
+            times = np.arange(round(seconds * settings.physics) + 1) / settings.physics
+            motion = HandMotion.draw(rng, seconds)
+            contacts.append(GuidingHand(*hand, motion, times, rng))
         controller = ReactingController(self.robot, own, pipeline, reactor, sensors)
         rates = Rates(settings.rate, settings.control or settings.rate)
-        readings, truth = run(
-            plant, controller, [self.obstacle], seconds, rates, controller.sampled
-        )
+        readings, truth = run(plant, controller, contacts, seconds, rates, controller.sampled)
         torque = np.array([step.command.torque for step in controller.steps])
         return Outcome(encounter, readings, truth, controller.steps, torque)

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Contact or collision, zones, clamping; the same sample by sample as all at once."""
+
+import numpy as np
+import pytest
+
+import touchline as tl
+from touchline.bench.interactions import BEGIN, InteractionSampler
+from touchline.bench.touches import TouchSampler
+from touchline.contact.skin import Skin
+
+
+@pytest.fixture(scope="module")
+def sara():
+    return tl.load_robot("sara")
+
+
+@pytest.fixture(scope="module")
+def skin(sara):
+    return Skin(sara)
+
+
+def interaction(sara, skin, seed, kind, zone="structure", clamped=False):
+    rng = np.random.default_rng(seed)
+    return InteractionSampler(sara, TouchSampler(skin, rng), rng).draw(kind, zone, clamped)
+
+
+def events_of(sara, skin, signals):
+    pipeline = tl.Pipeline(sara, skin=skin)
+    s = signals
+    pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+    return [event for event in pipeline.events if event.cleared is None or event.cleared > BEGIN]
+
+
+@pytest.mark.parametrize("kind", ["contact", "collision"])
+@pytest.mark.parametrize("zone", ["structure", "end_effector", "handle"])
+def test_kinds_and_zones_are_told_apart(sara, skin, kind, zone):
+    drawn = interaction(sara, skin, 3, kind, zone)
+    events = events_of(sara, skin, drawn.signals)
+    event = next(e for e in events if e.segment == drawn.touches[0].patch.segment)
+    assert (event.level, event.zone) == (kind, zone) and not event.clamped
+    assert all(other.level == "contact" for other in events if other.segment != event.segment)
+    late = event.decided - BEGIN
+    assert late < (0.03 if kind == "collision" else 0.35)
+
+
+def test_forces_on_two_segments_that_oppose_each_other_clamp(sara, skin):
+    drawn = interaction(sara, skin, 1, "contact", "handle", clamped=True)
+    events = events_of(sara, skin, drawn.signals)
+    assert len({event.segment for event in events}) == 2
+    assert all(event.clamped for event in events)
+
+
+def test_a_blow_makes_a_contact_a_collision(sara, skin):
+    drawn = interaction(sara, skin, 3, "contact", "handle")
+    sampler = InteractionSampler(sara, TouchSampler(skin, None), np.random.default_rng(0))
+    blow = 80.0 * (sampler.time > BEGIN + 0.45)
+    events = events_of(sara, skin, sampler.signals(drawn.touches, drawn.force + blow))
+    struck = [event for event in events if event.level == "collision"]
+    assert struck[0].segment == "handle"
+    assert struck[0].decided == pytest.approx(BEGIN + 0.45, abs=0.02)
+
+
+def test_live_contacts_have_the_classes_of_the_events(sara, skin):
+    drawn = interaction(sara, skin, 5, "collision", "handle", clamped=True)
+    s, live = drawn.signals, tl.Pipeline(sara, skin=skin)
+    first: dict[int, float] = {}
+    for sample in zip(s.time, s.q, s.qd, s.tau, s.wrench, strict=True):
+        for contact in live.update(*sample).contacts:
+            if contact.decided:
+                first.setdefault(contact.event, sample[0])
+    events = events_of(sara, skin, s)
+    known = {event.id: event for event in live.events}
+    assert len(first) >= 2 and len(known) == len(events)
+    for event in events:
+        twin = known[event.id]
+        for key in ("segment", "level", "decided", "zone", "clamped"):
+            assert getattr(twin, key) == getattr(event, key)
+        assert event.id not in first or first[event.id] <= event.decided
+
+
+def test_joint_torques_alone_tell_blows_from_holds():
+    pytest.importorskip("example_robot_data")
+    robot = tl.load_robot("examples/robots/panda_hand.yaml")
+    skin, rng = Skin(robot), np.random.default_rng(2)
+    sampler = InteractionSampler(robot, TouchSampler(skin, rng), rng)
+    levels = {}
+    for kind in ("contact", "collision"):
+        for _ in range(20):
+            drawn = sampler.draw(kind, "structure", False)
+            if drawn.force.max() > 40:
+                break
+        events = events_of(robot, skin, drawn.signals)
+        levels[kind] = {event.level for event in events}
+    assert levels["contact"] == {"contact"} and "collision" in levels["collision"]
