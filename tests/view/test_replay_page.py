@@ -87,6 +87,15 @@ def test_a_replay_is_seen_played_and_jumped_in(browser, touched):
             lambda: visitor.tinted(event.link, tint, time, contact) > 0.5, "the link's colour"
         )
 
+        charts = "Object.values(window.__viserTestpoints.uplots).map((u) => u.chart)"
+        spans = f"{charts}.map((c) => [c.scales.x.min, c.scales.x.max, c.data[0][0]])"
+        visitor.until(
+            lambda: all(
+                low <= time <= high and low == first for low, high, first in browser.run(spans)[1:]
+            ),
+            "curves around the event",
+        )
+
         browser.press("Play")
         visitor.until(lambda: page.player.time > event.cleared + 0.05, "time to go on")
         visitor.until(lambda: "nothing touches" in browser.text(), "the end of the event")

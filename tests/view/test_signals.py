@@ -54,8 +54,15 @@ def test_the_line_of_now_stands_at_now(count, now, seed):
     x, a, b, line = with_now(times, values, now, Box(0.0, 10.0, -3.0, 3.0))
     assert (np.diff(x) >= 0).all() and set(line) == {-3.0, 3.0}
     assert x[line == 3.0].tolist() == [now]
+    at = int(np.searchsorted(times, now))
     for row, own in ((a, values[0]), (b, values[1])):
-        np.testing.assert_array_equal(row[np.isfinite(row)], own)
+        np.testing.assert_array_equal(np.delete(row, range(at, at + 3)), own)
+
+
+def test_a_missing_value_is_the_one_before():
+    values = np.array([[np.nan, 1.0, np.nan, np.nan, 2.0]])
+    _, row, _ = with_now(np.arange(5.0), values, 9.0, Box(0.0, 5.0, 0.0, 2.0))
+    assert row.tolist() == [0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0]
 
 
 @settings(max_examples=60, deadline=None)

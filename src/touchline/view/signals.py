@@ -90,8 +90,8 @@ def window_around(replay: Replay, time: float, length: float | None) -> tuple[fl
 def with_now(times: Array, values: Array, now: float, box: Box) -> tuple[Array, ...]:
     """Data of a plot: times, rows of values, and an upright line at `now`.
 
-    uPlot has no gaps for NaN, it draws on to the next number: the line runs along the lower border
-    and up at `now`.
+    uPlot has no gaps and finds no range where there is a NaN: a value that is missing is the one
+    before it, and the line runs along the lower border and up at `now`.
 
     Args:
         times: (N,) that increase.
@@ -101,10 +101,19 @@ def with_now(times: Array, values: Array, now: float, box: Box) -> tuple[Array, 
     """
     at = int(np.searchsorted(times, now))
     x = np.insert(times, at, [now, now, now])
-    rows = np.insert(values, at, np.full((3, 1), np.nan), axis=1)
+    known = _held(values)
+    here = known[:, [min(at, known.shape[1] - 1)]]
+    rows = np.insert(known, [at], np.repeat(here, 3, axis=1), axis=1)
     line = np.full(len(x), box.low)
     line[at + 1] = box.high
     return (x, *rows, line)
+
+
+def _held(values: Array) -> Array:
+    """Rows (R, N) in which NaN is the number before it, or 0 where there is none."""
+    known = np.isfinite(values)
+    last = np.maximum.accumulate(np.where(known, np.arange(values.shape[1]), 0), axis=1)
+    return np.nan_to_num(np.take_along_axis(values, last, axis=1), nan=0.0)
 
 
 def now_series() -> uplot.Series:
@@ -194,25 +203,23 @@ class SignalPlot:
         low, high = nice_range(values, self._range if same else None)
         box = Box(times[0], times[-1], low, high)
         data = with_now(times, values, now - self._origin, box)
-        if self._handle is None:
-            self._handle = self._make(group, data, (low, high))
-        else:
-            if not same:
-                self._handle.series, self._handle.axes = _series(group), _axes(group)
-            if (low, high) != self._range:
-                self._handle.scales = _scales((low, high))
+        if self._handle is not None and same:
             self._handle.data = data
+        else:
+            self._make(group, data)
         self._group, self._range = group, (low, high)
 
-    def _make(
-        self, group: SignalGroup, data: tuple[Array, ...], heights: tuple[float, float]
-    ) -> viser.GuiUplotHandle:
+    def _make(self, group: SignalGroup, data: tuple[Array, ...]) -> None:
+        """A new plot: one that changed its curves would keep the time that it showed."""
+        if self._handle is not None:
+            self._handle.remove()
+        axes = (uplot.Axis(), uplot.Axis(label=group.unit, labelSize=18, size=52))
         with self._place:
-            return self._gui.add_uplot(
+            self._handle = self._gui.add_uplot(
                 data,
                 _series(group),
-                scales=_scales(heights),
-                axes=_axes(group),
+                scales={"x": uplot.Scale(time=False)},
+                axes=axes,
                 height=self.HEIGHT,
                 padding=PADDING,
             )
@@ -225,11 +232,3 @@ def _series(group: SignalGroup) -> tuple[uplot.Series, ...]:
         for i, name in enumerate(group.names)
     ]
     return (uplot.Series(label="s"), *curves, now_series())
-
-
-def _scales(heights: tuple[float, float]) -> dict[str, uplot.Scale]:
-    return {"x": uplot.Scale(time=False), "y": uplot.Scale(range=heights)}
-
-
-def _axes(group: SignalGroup) -> tuple[uplot.Axis, ...]:
-    return uplot.Axis(), uplot.Axis(label=group.unit, labelSize=18, size=52)
