@@ -94,42 +94,44 @@ def _colour_bar(figure: Any, axes: Any, ends: tuple[float, float]) -> None:
         x for ten in (0.01, 0.1, 1, 10, 100) for x in (ten, 2 * ten, 5 * ten) if low < x < high
     ]
     bar.set_ticks(ticks, labels=[f"{tick:g}" for tick in ticks])
+    bar.ax.minorticks_off()
     bar.outline.set_visible(False)
 
 
 def distributions(trials: Sequence[Trial]) -> Any:
     """How many touches are farther off than what: ours by tier and number, and the baselines."""
+    still = [cell for cell in dict.fromkeys(trial.cell for trial in trials) if not cell.speed]
+    cells = still or list(dict.fromkeys(trial.cell for trial in trials))
+    singles = [cell for cell in cells if cell.contacts == 1]
+    noisy = [cell.tier for cell in cells if cell.tier] or [0]  # noise-free, there is little to see
+    several = [cell for cell in cells if cell.tier == min(noisy)]
+    compared = [cell for cell in singles if cell.tier == min(noisy)]
     figure = new_figure(PAGE, 2.5)
-    cells = list(dict.fromkeys(trial.cell for trial in trials))
-    singles = [cell for cell in cells if cell.contacts == 1 and not cell.speed]
-    several = [cell for cell in cells if cell.tier == min(c.tier for c in cells) and not cell.speed]
     with styled():
         left, middle, right = figure.subplots(1, 3, sharey=True)
         panel_label(left, "one contact")
         for cell in singles:
-            _curve(left, _errors(trials, cell), str(TIERS[cell.tier]), SHADES[cell.tier])
-        panel_label(middle, f"several, {TIERS[several[0].tier]}" if several else "several")
+            noise = f"{TIERS[cell.tier].force:g} N" if cell.tier else "noise-free"
+            _curve(left, _errors(trials, cell), noise, SHADES[cell.tier])
+        panel_label(middle, f"number, {TIERS[min(noisy)]}")
         for i, cell in enumerate(several):
             begin = "" if cell.contacts == 1 else "together" if cell.together else "0.1 s apart"
-            _curve(
-                middle, _errors(trials, cell), f"{cell.contacts}, {begin}".strip(", "), SHADES[i]
-            )
-        _baselines(right, trials, singles)
+            label = f"{cell.contacts}, {begin}".strip(", ")
+            _curve(middle, _errors(trials, cell), label, SHADES[i])
+        panel_label(right, f"rules, {TIERS[min(noisy)]}")
+        if compared:
+            _baselines(right, trials, compared[0])
         left.set_ylabel("touches farther off [%]")
         for axes in (left, middle, right):
             axes.axvline(1e3 * NEAR, color=FAINT, lw=0.6, ls=":")
             axes.set(xscale="log", yscale="log", xlabel="distance [mm]", xlim=(1e-2, 2e3))
             axes.set_ylim(0.05, 110.0)
-            axes.legend(loc="lower left", fontsize=6.5)
+            if axes.get_legend_handles_labels()[0]:
+                axes.legend(loc="upper right", fontsize=6.5)
     return figure
 
 
-def _baselines(axes: Any, trials: Sequence[Trial], singles: list[Cell]) -> None:
-    noisy = [cell for cell in singles if cell.tier] or singles
-    if not noisy:
-        return
-    cell = noisy[0]
-    panel_label(axes, f"one contact, {TIERS[cell.tier]}")
+def _baselines(axes: Any, trials: Sequence[Trial], cell: Cell) -> None:
     _curve(axes, _errors(trials, cell), "ours", SHADES[0])
     short = {"first": "first entry", "nearest": "nearest to the line", "particles": "particles"}
     for i, name in enumerate(BASELINES):
