@@ -43,14 +43,22 @@ def _general(analysis: Analysis) -> list[list[Any]]:
         ["observer", f"method {analysis.method}"],
         [
             "detection",
-            f"fires after {1e3 * detection.min_duration:g} ms, ends below {detection.release:g} "
-            f"of the thresholds for {1e3 * detection.hold:g} ms; baseline over "
+            f"{', '.join(detection.method)}; "
+            f"{_alarms(analysis)}; fires after {1e3 * detection.min_duration:g} ms, "
+            f"ends below {detection.release:g} of the thresholds for {1e3 * detection.hold:g} ms; baseline over "
             f"{detection.baseline.time:g} s, at most {detection.baseline.limit:g} thresholds",
         ],
     ]
     if analysis.bandwidth:
         rows.append(["bandwidth given", f"{analysis.bandwidth:g} rad/s for all rows"])
     return [row for row in rows if row[1] != ""]
+
+
+def _alarms(analysis: Analysis) -> str:
+    if analysis.thresholds.note:
+        return analysis.thresholds.note
+    rate = analysis.robot.description.detection.false_alarms
+    return f"calibrated for {rate:g} false alarms an hour"
 
 
 def _joints(analysis: Analysis) -> str:

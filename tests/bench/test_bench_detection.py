@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The detection benchmark: its motion is exact, its delays are counted from the onset."""
+
+import numpy as np
+import pytest
+
+import touchline as tl
+from touchline.bench.detection import Outcome, alarm_table, delay_table
+from touchline.bench.detection_work import Setting
+from touchline.bench.free_motion import MotionMaker, generator, imperfect, random_trajectory
+from touchline.bench.pushes import AFTER, BEFORE, PushMaker, random_pushes
+from touchline.contact.calibration import Statistics
+from touchline.contact.tail import Tail
+from touchline.estimation.dynamics import inverse_dynamics
+
+
+@pytest.fixture(scope="module")
+def sara():
+    return tl.load_robot("sara")
+
+
+def test_interpolated_loads_are_those_of_inverse_dynamics(sara):
+    arm = imperfect(sara, 0.02, 1)
+    maker = MotionMaker(sara, arm, 1000.0, 1.0)
+    trajectory = random_trajectory(sara, generator(3))
+    q, qd, loads = maker.loads(trajectory)
+    some = slice(0, None, 37)
+    exact = inverse_dynamics(arm, *(x[some] for x in trajectory(maker.time)))
+    wanted = np.hstack([exact.torque, exact.wrench.reshape(len(exact.torque), -1)])
+    np.testing.assert_allclose(loads[some], wanted, atol=1e-5)
+    step = 1e-6
+    ahead, behind = (trajectory(maker.time[some] + x)[0] for x in (step, -step))
+    np.testing.assert_allclose((ahead - behind) / (2 * step), qd[some], atol=1e-6)
+    assert np.abs(qd).max() <= 3.0
+
+
+def test_a_push_is_felt_by_the_base_from_its_onset_on(sara):
+    maker = PushMaker(MotionMaker(sara, sara, 1000.0, BEFORE + AFTER))
+    (push,) = random_pushes(sara, 1, 5)
+    with_it, without = (maker.samples(push, f, generator(1)) for f in (20.0, 0.0))
+    off = with_it.wrench[:, 0, :3] - without.wrench[:, 0, :3]
+    assert not off[: maker.first].any()
+    np.testing.assert_allclose(np.linalg.norm(off[maker.first :], axis=1), 20.0, rtol=1e-9)
+
+
+def test_delays_and_alarms_are_counted_against_the_tails():
+    tail = Tail(2.0, 60.0, 1.0, 0.0, 600, 10.0)
+    names = ("base", "wrist", "handle")
+    limit = tail.threshold(1.0 / 3)
+    pushes = np.zeros((3, 50, 1))
+    pushes[0, 4:] = pushes[1, 9:] = 2 * limit
+    blocks = np.zeros((20 * 180_000 // 20, 3, 1))  # an hour of 20 ms
+    blocks[[100, 500, 501, 900], 0] = 2 * limit
+    tested = Statistics(blocks, np.arange(len(blocks)) * 0.02, np.zeros(len(blocks), int), 1.0)
+    forces = dict.fromkeys((2.0, 5.0, 10.0, 20.0, 50.0), pushes)
+    o = Outcome(
+        Setting("sara", 1000.0, 1e-3),
+        ("glrt",),
+        {n: {"glrt": tail} for n in names},
+        tested,
+        forces,
+        10.0,
+    )
+    assert o.delays("glrt", 20.0, 1.0).tolist() == [3.5e-3, 8.5e-3, np.inf]
+    assert o.alarms("glrt", 1.0) == 3  # two blocks side by side are one alarm
+    assert "3 [0.62, 8.8]" in alarm_table([o])
+    assert "33.3 %" in delay_table([o])
