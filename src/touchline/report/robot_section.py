@@ -45,7 +45,8 @@ def _general(analysis: Analysis) -> list[list[Any]]:
             "detection",
             f"{', '.join(detection.method)}; "
             f"{_alarms(analysis)}; fires after {1e3 * detection.min_duration:g} ms, "
-            f"ends below {detection.release:g} of the thresholds for {1e3 * detection.hold:g} ms; baseline over "
+            f"ends below {detection.release:g} of the thresholds for {1e3 * detection.hold:g} ms; "
+            "baseline over "
             f"{detection.baseline.time:g} s, at most {detection.baseline.limit:g} thresholds",
         ],
     ]
