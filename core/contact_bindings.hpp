@@ -86,15 +86,18 @@ inline Out surface_point(const tl::SurfacePoint& p) {
 }
 
 // An answer as numbers: status, surface, node, body probability, point, force, covariance, pitch,
-// chi2, degrees of freedom, number of candidates, then per candidate surface, node, probability,
-// point.
-constexpr int kHead = 23, kPerCandidate = 6;
-constexpr int kWidth = kHead + kPerCandidate * tl::Answer::kCandidates;
+// chi2, degrees of freedom, rank, unknowns, number of candidates, then per candidate surface, node,
+// probability, point, radius.
+constexpr int kHead = 25, kOfCandidate = 7;
+constexpr int kWidth = kHead + kOfCandidate * tl::Answer::kCandidates;
+constexpr int kPerCandidate = 6;  // of an event: without the radius
 
 inline void write(const tl::Localizer& l, const tl::Answer& a, double* out) {
   std::fill(out, out + kWidth, std::nan(""));
   out[0] = static_cast<double>(a.status);
-  out[22] = a.count;
+  out[22] = a.rank;
+  out[23] = a.unknowns;
+  out[24] = a.count;
   out[1] = out[2] = -1.0;
   const double force[3] = {a.force.x, a.force.y, a.force.z};
   std::copy(force, force + 3, out + 7);
@@ -111,11 +114,11 @@ inline void write(const tl::Localizer& l, const tl::Answer& a, double* out) {
   out[21] = a.degrees;
   for (int i = 0; i < a.count; ++i) {
     const tl::Candidate& c = a.candidates[i];
-    double* to = out + kHead + kPerCandidate * i;
-    const double values[6] = {static_cast<double>(c.surface),
-                              static_cast<double>(l.surfaces()[c.surface].node),
-                              c.weight, c.point.x, c.point.y, c.point.z};
-    std::copy(values, values + 6, to);
+    double* to = out + kHead + kOfCandidate * i;
+    const double values[kOfCandidate] = {static_cast<double>(c.surface),
+                                         static_cast<double>(l.surfaces()[c.surface].node),
+                                         c.weight, c.point.x, c.point.y, c.point.z, c.radius};
+    std::copy(values, values + kOfCandidate, to);
   }
 }
 

@@ -9,7 +9,7 @@ namespace touchline {
 enum class Status { none = 0, located = 1, ambiguous = 2, not_separable = 3, wrench_only = 4 };
 
 struct Answer {
-  static constexpr int kCandidates = 8;
+  static constexpr int kCandidates = 12;
   Status status = Status::none;
   int count = 0;                      // of candidates
   Candidate candidates[kCandidates];  // the most probable body's best first
@@ -20,6 +20,8 @@ struct Answer {
   double pitch = 0.0;         // in standard deviations
   double chi2 = 0.0;
   int degrees = 0;  // of freedom of chi2
+  // Of several contacts that cannot be told apart: equations at hand, and unknowns.
+  int rank = 0, unknowns = 0;
 };
 
 }  // namespace touchline

@@ -114,6 +114,22 @@ class JointFit {
     }
   }
 
+  // Forces known to `sigma`, places as they are, all independent.
+  static void independent(const KnownContact* known, int count, double sigma,
+                    Uncertainty& out) {
+    const int n = out.size = kEach * count;
+    std::fill(out.root, out.root + n * n, 0.0);
+    for (int c = 0; c < count; ++c) {
+      double* to = out.root + kEach * c * (n + 1);
+      for (int i = 0; i < 3; ++i) to[i * (n + 1)] = sigma;
+      const Spread& p = known[c].place;
+      const double a = std::sqrt(p.a), b = p.b / a;
+      to[3 * (n + 1)] = a;
+      to[3 * n + 4] = b;
+      to[4 * (n + 1)] = std::sqrt(std::max(0.0, p.c - b * b));
+    }
+  }
+
   // Takes contacts out of a measurement, with their uncertainty; false if nothing can be weighed.
   bool take_out(const KnownContact* known, int count, const Uncertainty& uncertainty,
                 Measurement& measurement) {

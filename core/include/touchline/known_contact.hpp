@@ -138,4 +138,32 @@ inline void report(const KnownContact& known, const LinkSurfaces& surfaces, Answ
   answer.spread = std::sqrt(known.place.trace());
 }
 
+inline bool placed(const Answer& a) {
+  return a.status == Status::located || a.status == Status::ambiguous;
+}
+
+// Do the places of a contact that is known and of the answer at hand agree within their spread, or
+// within `least` [m]?
+inline bool agrees(const KnownContact& known, const Answer& a, const LinkSurfaces& surfaces,
+                   double least) {
+  if (!placed(a)) return false;
+  const Vec3 p = surfaces.to_world(known.point, known.node);
+  for (int i = 0; i < a.count; ++i) {
+    const Candidate& c = a.candidates[i];
+    const double sigma = std::sqrt(c.along[0] + c.along[2] + known.place.trace());
+    if (c.surface == known.surface && norm(c.point - p) < std::max(least, 3.0 * sigma)) return true;
+  }
+  return false;
+}
+
+// Can a contact that is known have slid `way` [m] at most to where it is found?
+inline bool within_reach(const KnownContact& known, const Answer& a, const LinkSurfaces& surfaces,
+                         double way) {
+  if (!placed(a)) return false;
+  const Candidate& best = a.candidates[0];
+  const double sigma = std::sqrt(best.along[0] + best.along[2] + known.place.trace());
+  return surfaces[best.surface].node == known.node &&
+         norm(best.point - surfaces.to_world(known.point, known.node)) < way + 3.0 * sigma;
+}
+
 }  // namespace touchline

@@ -23,7 +23,8 @@ class Localizer {
         period_(noise.period),
         measurement_(observer, std::move(tests), std::move(noise)),
         single_(observer, measurement_.posture(), settings_, std::move(surfaces)),
-        tracks_(single_, measurement_, settings_, measurement_.most_rows(), period_),
+        tracks_(single_, measurement_, settings_, measurement_.most_rows(),
+                observer.row_layout().segments, period_),
         states_(observer.row_layout().segments),
         memories_(observer.row_layout().segments, std::vector<Memory>(Tracks::kReports + 1)) {
     for (std::vector<Memory>& of_segment : memories_) {
@@ -83,11 +84,11 @@ class Localizer {
   // and the events that have ended in `ended()`.
   void follow(int g, bool touched, const double* row, const double* normalized, double time,
               const double* q) {
-    Segmented& s = states_[g];
+    SegmentContacts& s = states_[g];
     ended_.clear();
     if (touched && !s.touched) {
       const int first = tracks_.next();
-      s = Segmented{};
+      s = SegmentContacts{};
       s.first = first;
       s.age.restart(time);
     }
@@ -205,7 +206,7 @@ class Localizer {
   Measurement measurement_;
   SingleContact single_;
   Tracks tracks_;
-  std::vector<Segmented> states_;              // per segment
+  std::vector<SegmentContacts> states_;              // per segment
   std::vector<std::vector<Memory>> memories_;  // per segment: of events
   std::vector<Memory*> ended_;
 };

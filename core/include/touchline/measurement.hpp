@@ -109,6 +109,21 @@ class Measurement {
       out[(first + i) * stride] = load(*used_[i], node, w, lag, loaded);
   }
 
+  // Does row i feel contacts on the body of `node`?
+  bool feels(int i, int node) const {
+    const int first = has_wrench_ ? 6 : 0;
+    if (i < first) return true;
+    const Row& r = *used_[i - first];
+    if (r.joint < 0) return observer_.layout().is_outboard(node, observer_.sensors()[r.sensor].node);
+    for (int own : observer_.joints()[r.joint].nodes) {
+      if (observer_.layout().is_outboard(node, own)) return true;
+    }
+    return false;
+  }
+
+  // The lower triangle of the covariance of all rows.
+  void covariance(double* out) const { std::copy_n(covariance_.data(), size_ * size_, out); }
+
   // To the scale of the noise: independent rows of variance one.
   void whiten(double* rows, int stride) const { solve_lower(factor_.data(), size_, rows, stride); }
 

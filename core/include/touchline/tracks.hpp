@@ -8,7 +8,9 @@
 #include <cmath>
 #include <limits>
 
-#include "touchline/joint_fit.hpp"
+#include "touchline/known_fit.hpp"
+#include "touchline/pair_answer.hpp"
+#include "touchline/segment_contacts.hpp"
 #include "touchline/single_contact.hpp"
 
 namespace touchline {
@@ -19,49 +21,24 @@ struct Report {
   Answer answer;
 };
 
-// What is remembered of a segment.
-struct Segmented {
-  static constexpr int kMost = JointFit::kMost;
-
-  // Contacts at a time before anything new could have been felt.
-  struct Reference {
-    int count = 0;
-    KnownContact known[kMost];
-    JointFit::Uncertainty uncertainty;
-  };
-
-  bool touched = false;
-  int first = -1;  // number of the contact that stands for the segment while none is known
-  int count = 0;
-  KnownContact known[kMost];
-  Age age;               // of the segment's wrench
-  double explained = 0;  // since when one contact has explained all [s]
-  bool explains = false;
-  double fitted = 0.0;   // time of the last fit [s]
-  Reference now, before;
-
-  bool arriving = false;  // is there something that the known contacts do not explain?
-  int newcomer = -1;      // its number, once it is reported
-  double since = 0.0, calm = 0.0, placed = 0.0;
-  bool is_calm = false, is_placed = false;
-  Age new_age;
-};
-
 class Tracks {
  public:
-  static constexpr int kMost = Segmented::kMost, kReports = kMost + 1;
+  static constexpr int kMost = SegmentContacts::kMost, kReports = kMost + 1;
 
   Tracks(SingleContact& single, Measurement& measurement, const LocalizerSettings& settings,
-         std::size_t rows, double period)
+         std::size_t rows, int segments, double period)
       : single_(single),
         measurement_(measurement),
         settings_(settings),
         period_(period),
-        fit_(measurement.posture(), single.surfaces(), rows) {}
+        fit_(measurement.posture(), single.surfaces(), rows),
+        known_(measurement, fit_, settings.force_scale),
+        pairs_(measurement.posture(), single.surfaces(), settings, rows, segments),
+        said_(settings) {}
 
   // One sample of segment g: fills the reports. `read()` takes the measurement anew.
   template <class Read>
-  void follow(Segmented& s, int g, double bandwidth, double time, Read&& read) {
+  void follow(SegmentContacts& s, int g, double bandwidth, double time, Read&& read) {
     count_ = ended_ = 0;
     g_ = g;
     bandwidth_ = bandwidth;
@@ -98,20 +75,12 @@ class Tracks {
   int next() { return serial_++; }
 
  private:
-  // Squared distances beyond which known contacts do not explain a sample: this many sigmas of a
-  // normal variable. Independent looks come every 2 / K: with ideal noise and K = 100 rad/s one
-  // false arrival in 19 h of contact.
-  static constexpr double kArrival = 5.0;
   static constexpr double kYoung = 3.0;        // times 1 / K, until a contact counts as known
   static constexpr double kRefit = 0.5;        // times 1 / K, between fits of a sole contact
-  static constexpr double kSteady = 0.3;       // change of a force that is held, in a sample [N]
   static constexpr double kNear = 2e-3;        // places that differ by less are the same [m]
   static constexpr double kSlide = 0.5;        // contacts slide no faster [m/s]
   static constexpr double kDrift = 1e-5;       // of a place's variance [m2/s]
 
-  static bool placed(const Answer& a) {
-    return a.status == Status::located || a.status == Status::ambiguous;
-  }
   double young() const { return kYoung / bandwidth_; }
   double brief() const { return 1.0 / bandwidth_; }
 
@@ -136,10 +105,16 @@ class Tracks {
 
   // --- one contact, as far as is known ---
   template <class Read>
-  void sole(Segmented& s, Read&& read) {
+  void sole(SegmentContacts& s, Read&& read) {
     const Answer& a = single_.locate(g_, lag_, measurement_);
     if (s.count == 0) {
+      if (a.status == Status::not_separable) {
+        s.explains = false;
+        together(s, a);
+        return;
+      }
       report(s.first, a);
+      if (placed(a)) forget_pair(s);
       if (!placed(a)) {
         s.explains = false;
       } else if (!s.explains) {
@@ -150,14 +125,13 @@ class Tracks {
       }
       return;
     }
-    if (consistent(s.known[0], a)) {
+    if (agrees(s.known[0], a, single_.surfaces(), kNear)) {
       report(s.known[0].serial, a);
-      if (time_ - s.fitted >= kRefit / bandwidth_) remember(s);
+      const bool due = time_ - s.updated >= kRefit / bandwidth_;
+      if (due && known_.explain_freely(s.known, 1)) accept(s);
       return;
     }
-    double free[kMost];
-    std::fill(free, free + kMost, settings_.force_scale);
-    if (explain(s.known, 1, free) < limit(3)) {
+    if (known_.explain_freely(s.known, 1)) {
       report(s.known[0].serial, a);
       return;
     }
@@ -166,92 +140,94 @@ class Tracks {
     arrive(s, read);
   }
 
+  // --- two at the same instant ---
+  // One contact explains nothing, from the beginning: looks for two, again and again while their
+  // forces rise, then ever more rarely.
+  void together(SegmentContacts& s, const Answer& one) {
+    if (s.apart < 0.0) {
+      s.apart = time_;
+      s.next_search = time_;
+    }
+    if (time_ >= s.next_search) {
+      pairs_.search(g_, lag_, measurement_);
+      take(s, one);
+      s.searched = time_;
+      s.next_search = time_ + std::max(kRefit / bandwidth_, 0.5 * (time_ - s.apart));
+    } else if (s.paired) {
+      known_.explain_freely(s.pair, 2);
+      fit_.apply(s.pair, 0.0, 0.0);
+    }
+    if (!s.paired) {
+      end(s.twin);
+      s.twin = -1;
+      s.inseparable.force = one.force;
+      report(s.first, s.inseparable);
+      return;
+    }
+    if (s.twin < 0) s.twin = next();
+    s.pair[0].serial = s.first;
+    s.pair[1].serial = s.twin;
+    for (const KnownContact& k : s.pair) report(k);
+    if (s.searched - s.apart < young()) return;
+    std::copy(s.pair, s.pair + 2, s.known);
+    s.count = 2;
+    s.twin = -1;
+    s.paired = false;
+    s.apart = -1.0;
+    s.forget_references();
+  }
+
+  void forget_pair(SegmentContacts& s) {
+    end(s.twin);
+    s.twin = -1;
+    s.paired = false;
+    s.apart = -1.0;
+  }
+
+  // Takes the outcome of a search over.
+  void take(SegmentContacts& s, const Answer& one) {
+    s.inseparable = one;
+    s.paired = said_.separable(pairs_, measurement_.size());
+    if (!s.paired) return said_.name_all(pairs_, s.inseparable);
+    for (int k = 0; k < 2; ++k) {
+      said_.name(pairs_, k, measurement_.size(), answer_);
+      keep(answer_, single_.surfaces(), s.pair[k]);
+      s.pair[k].lag = lag_;
+      s.pair[k].age = s.age;
+    }
+  }
+
   // A contact has become known.
-  void settle(Segmented& s, int serial, const Answer& a) {
+  void settle(SegmentContacts& s, int serial, const Answer& a) {
     KnownContact& k = s.known[s.count++];
     k = KnownContact{};
     k.serial = serial;
     keep(a, single_.surfaces(), k);
     k.lag = brief();
     k.age = s.count == 1 ? s.age : s.new_age;
-    s.now.count = s.before.count = 0;
+    s.forget_references();
   }
 
-  bool consistent(const KnownContact& k, const Answer& a) const {
-    if (!placed(a)) return false;
-    const Vec3 p = single_.surfaces().to_world(k.point, k.node);
-    for (int i = 0; i < a.count; ++i) {
-      const Candidate& c = a.candidates[i];
-      const double sigma = std::sqrt(c.along[0] + c.along[2] + k.place.trace());
-      if (c.surface == k.surface && norm(c.point - p) < std::max(kNear, 3.0 * sigma)) return true;
-    }
-    return false;
-  }
-
-  // Fits the known contacts to the measurement at hand; returns the squared distance.
-  double explain(const KnownContact* known, int count, const double* sigma) {
-    return fit_.fit(measurement_, known, count, sigma);
-  }
-
-  // What chi2 does not exceed, with so many unknowns.
-  double limit(int unknowns) const {
-    return chi2_limit(std::max(1, measurement_.size() - unknowns), kArrival);
-  }
-
-  // Brings the known contacts up to date, and keeps what may be needed when something arrives.
-  void remember(Segmented& s) {
-    double sigma[kMost];
-    std::fill(sigma, sigma + kMost, s.count == 1 ? settings_.force_scale : kSteady);
-    if (explain(s.known, s.count, sigma) < limit(s.count == 1 ? 3 : 0)) accept(s);
-  }
-
-  void accept(Segmented& s) {
-    const double passed = std::clamp(time_ - s.fitted, period_, brief());
+  // Takes the last fit over, and keeps it for when something arrives.
+  void accept(SegmentContacts& s) {
+    const double passed = std::clamp(time_ - s.updated, period_, brief());
+    s.updated = time_;
     fit_.apply(s.known, std::min(1.0, 0.5 * bandwidth_ * passed), kDrift * passed);
-    if (time_ - s.fitted < kRefit / bandwidth_ && s.now.count == s.count) return;
-    s.fitted = time_;
-    if (s.now.count == s.count) s.before = s.now;
-    s.now.count = s.count;
-    std::copy(s.known, s.known + s.count, s.now.known);
-    fit_.uncertainty(s.now.uncertainty);
-    if (s.before.count != s.count) s.before = s.now;
+    s.refer(fit_, time_, kRefit / bandwidth_);
   }
 
   // --- something new ---
-  void begin_arrival(Segmented& s) {
+  void begin_arrival(SegmentContacts& s) {
     s.arriving = true;
     s.since = time_;
     s.is_calm = s.is_placed = false;
     s.newcomer = -1;
     s.new_age.restart(time_ - period_);
-    if (s.before.count != s.count) refer(s);
-  }
-
-  // Without a fit to go back to, what is known now must do.
-  void refer(Segmented& s) {
-    s.before.count = s.count;
-    std::copy(s.known, s.known + s.count, s.before.known);
-    loose(s.known, s.count, kSteady, s.before.uncertainty);
-  }
-
-  // Forces known to `sigma`, places as they are, all independent.
-  static void loose(const KnownContact* known, int count, double sigma,
-                    JointFit::Uncertainty& out) {
-    const int n = out.size = JointFit::kEach * count;
-    std::fill(out.root, out.root + n * n, 0.0);
-    for (int c = 0; c < count; ++c) {
-      double* to = out.root + JointFit::kEach * c * (n + 1);
-      for (int i = 0; i < 3; ++i) to[i * (n + 1)] = sigma;
-      const Spread& p = known[c].place;
-      const double a = std::sqrt(p.a), b = p.b / a;
-      to[3 * (n + 1)] = a;
-      to[3 * n + 4] = b;
-      to[4 * (n + 1)] = std::sqrt(std::max(0.0, p.c - b * b));
-    }
+    s.refer(KnownFit::kSteady);
   }
 
   template <class Read>
-  void arrive(Segmented& s, Read&& read) {
+  void arrive(SegmentContacts& s, Read&& read) {
     for (int c = 0; c < s.count; ++c)
       s.before.known[c].lag =
           s.before.known[c].age.follow(s.before.known[c].force, bandwidth_, time_) / bandwidth_;
@@ -278,10 +254,10 @@ class Tracks {
   }
 
   // Do the known contacts explain all again?
-  bool subsided(Segmented& s) {
+  bool subsided(SegmentContacts& s) {
     fit_.allow_for_motion(s.before.known, s.count, measurement_);
     measurement_.spread(nullptr, 0);
-    if (!explained_by(s.before.known, s.count)) {
+    if (!known_.explain(s.before.known, s.count)) {
       s.is_calm = false;
       return false;
     }
@@ -291,20 +267,18 @@ class Tracks {
 
   // Or do they with all their forces changed, where no single contact explains what is left?
   template <class Read>
-  bool changed(Segmented& s, Read&& read) {
+  bool changed(SegmentContacts& s, Read&& read) {
     if (s.count == 1) return false;
     read();
     fit_.allow_for_motion(s.before.known, s.count, measurement_);
     measurement_.spread(nullptr, 0);
-    double sigma[kMost];
-    std::fill(sigma, sigma + kMost, settings_.force_scale);
-    if (explain(s.before.known, s.count, sigma) > limit(3 * s.count)) return false;
+    if (!known_.explain_freely(s.before.known, s.count)) return false;
     resume(s);
     return true;
   }
 
   // The known contacts explain all, with the forces of the last fit.
-  void resume(Segmented& s) {
+  void resume(SegmentContacts& s) {
     if (!s.is_calm) s.calm = time_;
     s.is_calm = true;
     std::copy(s.before.known, s.before.known + s.count, s.known);
@@ -312,48 +286,27 @@ class Tracks {
     for (int c = 0; c < s.count; ++c) report(s.known[c]);
     if (time_ - s.calm >= brief()) {
       s.arriving = false;
-      s.now.count = s.before.count = 0;
+      s.forget_references();
       end(s.newcomer);
     }
   }
 
-  // Do known contacts explain the measurement with their forces held, or with one of them changed?
-  bool explained_by(const KnownContact* known, int count) {
-    double sigma[kMost];
-    std::fill(sigma, sigma + kMost, kSteady);
-    if (explain(known, count, sigma) < limit(0)) return true;
-    int best = -1;
-    double least = limit(3);
-    for (int c = 0; c < count; ++c) {
-      sigma[c] = settings_.force_scale;
-      const double cost = explain(known, count, sigma);
-      sigma[c] = kSteady;
-      if (cost < least) {
-        least = cost;
-        best = c;
-      }
-    }
-    if (best < 0) return false;
-    sigma[best] = settings_.force_scale;
-    explain(known, count, sigma);
-    return true;
-  }
-
   // Has one contact moved along its body, no faster than contacts slide?
   template <class Read>
-  bool slid(Segmented& s, Read&& read) {
+  bool slid(SegmentContacts& s, Read&& read) {
     for (int c = 0; c < s.count; ++c) {
       read();
       KnownContact others[kMost];
       std::copy(s.before.known, s.before.known + c, others);
       std::copy(s.before.known + c + 1, s.before.known + s.count, others + c);
       if (s.count > 1) {
-        loose(others, s.count - 1, kSteady, loosened_);
+        JointFit::independent(others, s.count - 1, KnownFit::kSteady, loosened_);
         fit_.take_out(others, s.count - 1, loosened_, measurement_);
       }
       const KnownContact& k = s.before.known[c];
       const Answer& a = single_.locate(g_, s.count > 1 ? k.lag : lag_, measurement_);
-      if (placed(a) && within_reach(k, a, time_ - s.since)) {
+      const double way = kSlide * (time_ - s.since + brief());
+      if (within_reach(k, a, single_.surfaces(), way)) {
         slide(s, c, a);
         return true;
       }
@@ -361,17 +314,8 @@ class Tracks {
     return false;
   }
 
-  // Can the contact have slid to where it is now found?
-  bool within_reach(const KnownContact& k, const Answer& a, double passed) const {
-    const Candidate& best = a.candidates[0];
-    if (single_.surfaces()[best.surface].node != k.node) return false;
-    const double way = norm(best.point - single_.surfaces().to_world(k.point, k.node));
-    const double sigma = std::sqrt(best.along[0] + best.along[2] + k.place.trace());
-    return way < kSlide * (passed + brief()) + 3.0 * sigma;
-  }
-
   // Contact c is where it is found now; after a while that is where it is known to be.
-  void slide(Segmented& s, int c, const Answer& a) {
+  void slide(SegmentContacts& s, int c, const Answer& a) {
     for (int i = 0; i < s.count; ++i) {
       if (i != c) report(s.before.known[i]);
     }
@@ -380,28 +324,28 @@ class Tracks {
     std::copy(s.before.known, s.before.known + s.count, s.known);
     keep(a, single_.surfaces(), s.known[c]);
     s.arriving = false;
-    s.now.count = s.before.count = 0;
+    s.forget_references();
     end(s.newcomer);
   }
 
   // What is left without the known contacts, as one contact: with their forces held, or, where
   // that explains nothing, free.
   template <class Read>
-  Answer& remainder(Segmented& s, Read&& read) {
-    Segmented::Reference& r = s.before;
+  Answer& remainder(SegmentContacts& s, Read&& read) {
+    SegmentContacts::Reference& r = s.before;
     fit_.take_out(r.known, r.count, r.uncertainty, measurement_);
     const double lag = s.new_age.follow(force(), bandwidth_, time_) / bandwidth_;
     answer_ = single_.locate(g_, lag, measurement_);
     if (placed(answer_) || answer_.status == Status::wrench_only) return answer_;
     read();
-    loose(r.known, r.count, settings_.force_scale, loosened_);
+    JointFit::independent(r.known, r.count, settings_.force_scale, loosened_);
     fit_.take_out(r.known, r.count, loosened_, measurement_);
     const Answer& freed = single_.locate(g_, lag, measurement_);
     if (placed(freed)) answer_ = freed;
     return answer_;
   }
 
-  void commit(Segmented& s, const Answer& a) {
+  void commit(SegmentContacts& s, const Answer& a) {
     if (s.newcomer < 0) s.newcomer = next();
     std::copy(s.before.known, s.before.known + s.count, s.known);
     for (int c = 0; c < s.count; ++c) report(s.known[c]);
@@ -412,10 +356,10 @@ class Tracks {
 
   // --- several contacts, all known ---
   template <class Read>
-  void several(Segmented& s, Read&& read) {
+  void several(SegmentContacts& s, Read&& read) {
     fit_.allow_for_motion(s.known, s.count, measurement_);
     measurement_.spread(nullptr, 0);
-    if (!explained_by(s.known, s.count)) {
+    if (!known_.explain(s.known, s.count)) {
       begin_arrival(s);
       read();
       arrive(s, read);
@@ -429,18 +373,18 @@ class Tracks {
   }
 
   // Contacts without force have gone; the last one stays until the segment is quiet.
-  void release(Segmented& s, const double* sigma) {
+  void release(SegmentContacts& s, const double* sigma) {
     for (int c = s.count - 1; c >= 0 && s.count > 1; --c) {
       KnownContact& k = s.known[c];
       const bool gone = norm(k.force) < std::max(settings_.least_force, 4.0 * sigma[c]) &&
-                        sigma[c] < kSteady * 3.0;
+                        sigma[c] < KnownFit::kSteady * 3.0;
       if (!gone) k.gone = 0.0;
       if (gone && k.gone == 0.0) k.gone = time_;
       if (!gone || time_ - k.gone < brief()) continue;
       end(k.serial);
       std::copy(s.known + c + 1, s.known + s.count, s.known + c);
       --s.count;
-      s.now.count = s.before.count = 0;
+      s.forget_references();
     }
   }
 
@@ -449,6 +393,9 @@ class Tracks {
   const LocalizerSettings& settings_;
   double period_;
   JointFit fit_;
+  KnownFit known_;
+  PairSearch pairs_;
+  PairAnswer said_;
   JointFit::Uncertainty loosened_;
   Answer answer_;
   Report reports_[kReports];

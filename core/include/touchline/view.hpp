@@ -18,6 +18,7 @@ struct Candidate {
   Vec3 point, normal;
   Fit fit;
   int view = 0;          // of the bodies looked at
+  double radius = 0.0;   // of the region that it stands for, 0: a point [m]
   double weight = 0.0;   // log of the posterior, then the probability
   double along[3] = {};  // covariance of the two tangent coordinates: 00, 01, 11
 };

@@ -302,7 +302,11 @@ def _of_candidates(answers: list[Answer], touch: Touch, place: Array) -> dict:
     if not known:
         return {}
     errors = [float(np.linalg.norm(k.position - place)) for k in known]
-    near = [k.probability for k, error in zip(known, errors, strict=True) if error < NEAR]
+    near = [
+        k.probability
+        for k, error in zip(known, errors, strict=True)
+        if error < max(NEAR, k.radius)  # a candidate may stand for a part of its link
+    ]
     return {"candidate": max(near, default=0.0), "candidate_error": min(errors)}
 
 

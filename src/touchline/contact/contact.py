@@ -15,12 +15,16 @@ STATUSES = ("located", "ambiguous", "not_separable", "wrench_only")
 
 @dataclass(frozen=True)
 class Candidate:
-    """One explanation of a contact: `position` (3,) [m] in world on `link`, of rigid `body`."""
+    """One explanation of a contact: `position` (3,) [m] in world on `link`, of rigid `body`.
+
+    Where contacts cannot be told apart, it stands for the part of the link within `radius` [m].
+    """
 
     link: str
     body: str
     probability: float
     position: Array
+    radius: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,8 @@ class Contact:
         zone: "structure", "end_effector" or "handle"; None while that is open.
         clamped: whether forces on two sides oppose each other; None where that is not known.
         rate: at which the force grows [N/s].
+        rank: of two contacts that cannot be told apart: the independent equations at hand, of the
+            `unknowns` (two for each place, three for each force).
     """
 
     segment: str
@@ -61,6 +67,8 @@ class Contact:
     zone: str | None = None
     clamped: bool | None = False
     rate: float | None = None
+    rank: int | None = None
+    unknowns: int | None = None
 
     @property
     def size(self) -> float:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from touchline.contact.classification import Classes, Kind, of_contact
 from touchline.contact.contact import Candidate
 from touchline.contact.detector import Detection, Detector
-from touchline.contact.localizer import CONTACT, FORCE, EventAnswer, Localizer
+from touchline.contact.localizer import CONTACT, FORCE, UNKNOWNS, EventAnswer, Localizer
 from touchline.contact.zones import Zones
 from touchline.estimation.observer import Estimate
 
@@ -41,6 +41,7 @@ class Event:
         time_of_position: the last strong sample [s].
         position_std: root of the trace of its covariance [m].
         candidates: all explanations, best first, at `time_of_position`.
+        rank: of contacts that cannot be told apart: independent equations, of the `unknowns`.
         decided: when the level was decided [s]; None while it is a default.
         zone: "structure", "end_effector" or "handle"; None while that is open.
         clamped: whether forces on two sides opposed each other; None where that is not known.
@@ -69,6 +70,8 @@ class Event:
     zone: str | None = None
     clamped: bool | None = False
     rate: float | None = None
+    rank: int | None = None
+    unknowns: int | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The event as in `events.json`."""
@@ -94,6 +97,8 @@ class Event:
             "zone": self.zone,
             "clamped": self.clamped,
             "rate": self.rate,
+            "rank": self.rank,
+            "unknowns": self.unknowns,
             "candidates": [
                 {
                     "link": candidate.link,
@@ -101,6 +106,7 @@ class Event:
                     "probability": candidate.probability,
                     "position": _numbers(candidate.position),
                 }
+                | ({"radius": candidate.radius} if candidate.radius else {})
                 for candidate in self.candidates
             ],
         }
@@ -133,6 +139,7 @@ class _Gathered:
         self.force = 0.0  # the largest norm, and the wrench and the joint positions then
         self.wrench, self.q = np.zeros(6), np.zeros(joints)
         self.torque = np.zeros(joints)  # the largest of each joint
+        self.inseparable: Array | None = None  # the last answer that names a rank
         self._sum = np.zeros(rows)
         self._count = 0
 
@@ -248,11 +255,19 @@ class EventRecorder:
         """Brings the places of the events that last up to date."""
         for number, answer in self._localizer.open_events().items():
             if number in self._open:
-                self._place(self._open[number][0], answer)
+                self._place(*self._open[number], answer)
 
-    def _place(self, event: Event, answer: EventAnswer) -> None:
+    def _place(self, event: Event, gathered: "_Gathered", answer: EventAnswer) -> None:
         for name, value in vars(answer).items():
             setattr(event, name, value)
+        apart = gathered.inseparable
+        if event.status == "not_separable" and apart is not None:
+            last = self._localizer.answer(apart)
+            event.rank, event.unknowns, event.candidates = (
+                last.rank,
+                last.unknowns,
+                last.candidates,
+            )
         event.zone = self._zones.of(event.segment, event.link)
         if not event.clamped:
             event.clamped = None if event.status == "not_separable" else False
@@ -269,7 +284,7 @@ class EventRecorder:
     def _close(self, number: int, time: float, place: Array) -> None:
         event, gathered = self._open.pop(number)
         event.cleared = time
-        self._place(event, self._localizer.event_answer(place))
+        self._place(event, gathered, self._localizer.event_answer(place))
         self._name_joint(event, gathered)
 
     def _extend(
@@ -289,6 +304,9 @@ class EventRecorder:
         wrenches[~alone, :3] = part.answers[~alone, FORCE]
         strength = part.share * np.abs(normalized[:, own]).max(axis=1)
         forces = np.nan_to_num(wrenches[:, :3])
+        apart = np.flatnonzero(part.answers[:, UNKNOWNS] > 0)
+        if len(apart):
+            gathered.inseparable = part.answers[apart[-1]].copy()
         gathered.add_rows(strength, np.hstack([normalized, forces]))
         gathered.add_peaks(wrenches, q[part.sample], estimate.tau_ext[part.sample])
         if event.segment != "root":

@@ -151,6 +151,8 @@ class LiveContact(Contact):
     force = _lazy(lambda self: self._answer.force)
     covariance = _lazy(lambda self: self._answer.covariance)
     candidates = _lazy(lambda self: self._answer.candidates)
+    rank = _lazy(lambda self: self._answer.rank)
+    unknowns = _lazy(lambda self: self._answer.unknowns)
     zone = _lazy(lambda self: self._zones.of(self.segment, self.link))
     level = _lazy(lambda self: "collision" if self._class[0] == Kind.COLLISION else "contact")
     decided = _lazy(lambda self: self._class[0] >= Kind.CONTACT)

@@ -21,8 +21,12 @@ STATUS = (None, "located", "ambiguous", "not_separable", "wrench_only")
 FRICTION = 0.8  # coefficient of the friction cone: skin and rubber
 TORQUE_ERROR = 0.02  # a joint's torque sensor is no better, and a touch is no point
 CONTACT = 3  # numbers before an answer or an event: sample, segment, number of the contact
-FORCE = slice(7, 10)  # in an answer
-HEAD, PER_CANDIDATE = 23, 6  # numbers of a native answer (see core/contact_bindings.hpp)
+FORCE, UNKNOWNS = slice(7, 10), 23  # in an answer
+HEAD, OF_CANDIDATE, PER_CANDIDATE = (
+    25,
+    7,
+    6,
+)  # numbers of a native answer (see core/contact_bindings.hpp)
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,7 @@ class Answer:
         covariance: (3, 3) [m2] of the position, along the surface.
         pitch: how far the wrench is from that of one pure force [standard deviations].
         chi2: misfit of the best explanation, with `degrees` of freedom.
+        rank: independent equations for contacts that cannot be told apart, of the `unknowns`.
         candidates: all explanations, best first.
     """
 
@@ -52,6 +57,8 @@ class Answer:
     pitch: float | None = None
     chi2: float | None = None
     degrees: int = 0
+    rank: int | None = None
+    unknowns: int | None = None
     candidates: tuple[Candidate, ...] = ()
 
 
@@ -249,12 +256,13 @@ class Localizer:
     def answer(self, row: Array) -> Answer:
         """Names the numbers of a native answer."""
         status = STATUS[int(row[0])]
+        numbers = {"rank": int(row[22]) or None, "unknowns": int(row[23]) or None}
         if row[HEAD - 1] == 0:
-            return Answer(status, force=_known(row[7:10]))
+            return Answer(status, force=_known(row[7:10]), **numbers)
         candidates = self.candidates(row)
-        chi2 = {"pitch": float(row[19]), "chi2": float(row[20]), "degrees": int(row[21])}
+        numbers |= {"pitch": float(row[19]), "chi2": float(row[20]), "degrees": int(row[21])}
         if status in ("not_separable", "wrench_only"):
-            return Answer(status, force=_known(row[7:10]), candidates=candidates, **chi2)
+            return Answer(status, force=_known(row[7:10]), candidates=candidates, **numbers)
         return Answer(
             status,
             self.skin.patches[int(row[1])].link,
@@ -264,20 +272,21 @@ class Localizer:
             row[7:10],
             row[10:19].reshape(3, 3),
             candidates=candidates,
-            **chi2,
+            **numbers,
         )
 
     def candidates(self, row: Array) -> tuple[Candidate, ...]:
         """The explanations in a native answer, best first."""
-        parts = row[HEAD:].reshape(-1, PER_CANDIDATE)[: int(row[HEAD - 1])]
+        parts = row[HEAD:].reshape(-1, OF_CANDIDATE)[: int(row[HEAD - 1])]
         return tuple(
             Candidate(
                 self.skin.patches[int(surface)].link,
                 self._body_names[int(node)],
                 float(weight),
-                position,
+                part[3:6],
+                float(part[6]),
             )
-            for surface, node, weight, *_, position in ((*part[:3], part[3:]) for part in parts)
+            for surface, node, weight, part in ((*part[:3], part) for part in parts)
         )
 
 
