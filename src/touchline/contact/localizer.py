@@ -2,6 +2,7 @@
 """Where a segment is touched, and how sure that is."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -256,7 +257,7 @@ class Localizer:
     def answer(self, row: Array) -> Answer:
         """Names the numbers of a native answer."""
         status = STATUS[int(row[0])]
-        numbers = {"rank": int(row[22]) or None, "unknowns": int(row[23]) or None}
+        numbers: dict[str, Any] = {"rank": int(row[22]) or None, "unknowns": int(row[23]) or None}
         if row[HEAD - 1] == 0:
             return Answer(status, force=_known(row[7:10]), **numbers)
         candidates = self.candidates(row)
