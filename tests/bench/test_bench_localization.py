@@ -207,6 +207,12 @@ def test_a_folder_that_cannot_be_made_is_told_before_the_work(tmp_path):
         main(Plan(("sara",), runs=10**6), tmp_path / "file" / "out")
 
 
+@pytest.mark.parametrize("plan", [Plan(runs=0), Plan(contacts=()), Plan(robots=())])
+def test_a_plan_of_nothing_is_refused(plan):
+    with pytest.raises(InputError, match="must be at least 1|nothing to run"):
+        main(plan)
+
+
 def test_colours_are_those_of_the_nearest_touches():
     skin = Skin(tl.load_robot("sara"))
     points = np.array([[0.0, 0.0, 0.01 * i] for i in range(40)])

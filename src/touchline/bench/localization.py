@@ -129,6 +129,10 @@ def main(plan: Plan | None = None, out: Path | None = None, processes: int | Non
     from tqdm import tqdm
 
     plan = plan or Plan()
+    if plan.runs < 1:
+        raise InputError(f"runs is {plan.runs}, must be at least 1")
+    if not plan.cells():
+        raise InputError("nothing to run: one of robots, contacts, noise, begin, speeds is empty")
     if out is not None:
         _prepare(out)
     for arm in plan.robots:
