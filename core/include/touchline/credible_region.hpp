@@ -118,7 +118,7 @@ class CredibleRegion {
       const bool grasped = found_.surfaces()[surface].graspable;
       const Fit fit = found_.fitter().fit(view.q, view.earlier(centre), normal, grasped);
       const double volume = found_.fitter().log_volume(view.q, view.earlier(centre));
-      const double prior = found_.fitter().log_prior(fit.force, grasped);
+      const double prior = found_.fitter().log_prior(fit, grasped);
       const double log_density = -0.5 * fit.cost() + volume + prior - view.width;
       if (std::isfinite(log_density)) {
         cells_.push_back({surface, centre, normal, area, log_density});

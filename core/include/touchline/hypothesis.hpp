@@ -100,10 +100,13 @@ class ForceFitter {
   }
 
   // Logarithm of how dense forces are, per volume: their directions, in the friction cone or all
-  // of them, and sizes are equally likely.
-  double log_prior(const Vec3& force, bool grasped) const {
+  // of them, and sizes are equally likely, but that people push near the normal.
+  double log_prior(const Fit& fit, bool grasped) const {
     const double directions = grasped ? 2.0 : 1.0 - std::cos(cone_);
-    return -std::log(directions * std::max(dot(force, force), 1.0));
+    const double volume = directions * std::max(dot(fit.force, fit.force), 1.0);
+    if (grasped) return -std::log(volume);
+    const double beyond = std::max(0.0, std::acos(std::clamp(fit.cosine, -1.0, 1.0)) - kSlant);
+    return -std::log(volume) - 0.5 * beyond * beyond / (kSlantSigma * kSlantSigma);
   }
 
   double cone_cost(double cosine) const {
@@ -153,6 +156,8 @@ class ForceFitter {
   }
 
  private:
+  static constexpr double kSlant = 0.3, kSlantSigma = 0.2;  // of pushes from the normal [rad]
+
   static Vec3 unit(int i) { return {i == 0 ? 1.0 : 0.0, i == 1 ? 1.0 : 0.0, i == 2 ? 1.0 : 0.0}; }
 
   // chi2(f) = constant - 2 g . f + f^T A f for a force at `point`, plus the force's prior.

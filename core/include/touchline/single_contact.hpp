@@ -80,7 +80,7 @@ class SingleContact {
       found_.fitter().information(view.q, view.earlier(k.point), k.normal, k.fit.force, H, g);
       if (!cholesky(H, 5)) continue;
       k.weight = -0.5 * (k.fit.cost() + log_determinant(H, 5)) + 
-                 found_.fitter().log_prior(k.fit.force, graspable(k)) - view.width;
+                 found_.fitter().log_prior(k.fit, graspable(k)) - view.width;
       most = std::max(most, k.weight);
       covariance_along(H, k.along);
     }
