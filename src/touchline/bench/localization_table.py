@@ -31,7 +31,8 @@ PUBLISHED = (
 )
 LEGEND = (
     "found: every touch within 22.5 mm at the last sample, nothing else named; as event: the same\n"
-    "of the events' positions; in the set: every touch near one of the returned explanations;\n"
+    "of the events' positions; in the set: every touch near a returned explanation or in\n"
+    "the part of a link that one stands for;\n"
     "surely wrong: as many places as touches, all `located`, but not found; body: the right\n"
     "rigid body named; lengths in mm, force RMS in N; RMS over all that was located, RMS found\n"
     "without what is farther off than 22.5 mm; 90 % holds: share of truths in the 90 % region;\n"
