@@ -30,7 +30,7 @@ def main() -> None:
         #   send(command.torque)
         reactor = Reactor(robot, policy, {"gentle": gentle})
         outcome = scene.play(encounter, reactor, seconds=0.5)
-        force = np.linalg.norm(outcome.truth.force[:, 0], axis=1)
+        force = np.linalg.norm(outcome.force, axis=1)
         touch = outcome.readings.time[np.argmax(force > 0)]
         acted = [s.time - touch for s in outcome.steps if s.command.reaction != "ignore"]
         told = f"acts {1e3 * acted[0]:.0f} ms after the touch" if acted else "never acts"

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reactions as functions of a contact and a state, for any of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -8,7 +10,7 @@ from hypothesis import strategies as st
 
 import touchline as tl
 from touchline.contact.contact import Contact
-from touchline.contact.reaction import REACTIONS, Retract, escape_motion, is_pressed, stop
+from touchline.contact.reaction import REACTIONS, Retract, escape_motion, stop, yielding
 from touchline.contact.reactor import Reactor, limited
 from touchline.contact.state import Since, State
 from touchline.estimation.dynamics import inverse_dynamics, mass_matrix, point_jacobian
@@ -82,15 +84,36 @@ def test_torques_stay_within_their_limits_for_any_contact(seed, name, link, loca
 @given(seeds)
 def test_stop_takes_energy_out_and_keeps_the_direction(seed):
     robot = tl.load_robot("sara")
+    age = float(np.random.default_rng([seed, 2]).choice([0.0, 0.05, 0.15]))
     state = state_of(robot, seed)
-    push = stop(contact_of(state, "link3", seed), state) - state.bias_torque
+    state = replace(state, since=Since(state.time - age, state.q))
+    contact = contact_of(state, "link3", seed)
+    push = stop(contact, state) - state.bias_torque
     power = float(push @ state.qd)
     fits = np.all(np.abs(state.bias_torque) <= state.effort)
     assert power <= 1e-9
-    if fits and not is_pressed(contact_of(state, "link3", seed), state):
+    if age > 0.1:
+        assert yielding(contact, state) is None
+    if fits and yielding(contact, state) is None:
         deceleration = np.linalg.solve(state.inertia, push)
         cosine = deceleration @ state.qd / np.linalg.norm(deceleration) / np.linalg.norm(state.qd)
         assert cosine == pytest.approx(-1.0, abs=1e-9)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seeds, st.sampled_from(LINKS[2:]))
+def test_a_stop_never_drives_the_touched_point_against_the_contact(seed, link):
+    """Whatever the filtered torques say yet; a point that leaves is not slowed down."""
+    robot = tl.load_robot("sara")
+    state = state_of(robot, seed)
+    state = replace(state, since=Since(state.time - 0.01, state.q))
+    contact = contact_of(state, link, seed)
+    escape = escape_motion(contact, state)
+    if escape is not None:
+        push = stop(contact, state) - state.bias_torque
+        leaving = float(escape[0] @ state.qd)
+        acceleration = float(escape[0] @ np.linalg.solve(state.inertia, push))
+        assert acceleration == pytest.approx(0.0, abs=1e-6) if leaving > 0 else acceleration >= 0
 
 
 @settings(max_examples=60, deadline=None)

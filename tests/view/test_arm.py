@@ -212,7 +212,7 @@ def test_the_arm_reacts_and_goes_back_to_its_motion_when_it_is_left_alone(robots
     speeds, _ = go(0.6)
     assert room.arm.reacting == reaction
     if reaction == "stop":
-        assert speeds[-20:].max() < 0.08 < speeds[0]
+        assert speeds[-20:].max() < 0.02 < speeds[0]
     room.arm.hands.release_all()
     speeds, _ = go(4.0)
     assert room.arm.reacting is None

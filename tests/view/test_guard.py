@@ -2,8 +2,10 @@
 """The page answers itself and programs on this machine, and refuses pages from elsewhere."""
 
 import base64
+import gzip
 import os
 import socket
+import urllib.request
 
 import pytest
 import viser
@@ -175,3 +177,15 @@ def test_a_browser_with_the_token_gets_in_and_one_without_does_not(open_server, 
     assert not open_server.page.get_clients()
     browser.open(f"http://127.0.0.1:{port}/?token={open_server.token}")
     until(open_server.page.get_clients, pause=browser.rest, what="the page's connection")
+
+
+@pytest.mark.parametrize("packing", ["gzip", "identity"])
+def test_the_page_has_a_title_of_its_own(server, packing):
+    url = f"http://127.0.0.1:{server.page.get_port()}/"
+    asked = urllib.request.Request(url, headers={"Accept-Encoding": packing})
+    with urllib.request.urlopen(asked, timeout=10) as answer:
+        body = answer.read()
+        assert answer.headers["Content-Encoding"] == packing
+    html = gzip.decompress(body) if packing == "gzip" else body
+    assert html.count(b"<title>") == 1 and b"<title>Touchline</title>" in html
+    assert html.rstrip().endswith(b"</html>")

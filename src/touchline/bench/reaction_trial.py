@@ -127,7 +127,7 @@ def reactor(robot: Robot, reaction: str) -> Reactor:
 def pressing(outcome: Outcome) -> Array:
     """Force (N,) of the body on the arm along the body's way [N]."""
     inwards = np.asarray(outcome.encounter.body.direction)
-    return np.maximum(outcome.truth.force[:, 0] @ inwards, 0.0)
+    return np.maximum(outcome.force @ inwards, 0.0)
 
 
 def measure(outcome: Outcome, case: Case, reaction: str, robot: Robot) -> Trial:

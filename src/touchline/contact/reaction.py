@@ -26,6 +26,11 @@ Reaction = Callable[[Contact, State], Array]
 
 SERVO_TIME = 5e-3  # s in which a velocity is taken on, torque limits permitting
 HOLD_FREQUENCY = 30.0  # rad/s of the critically damped spring that holds a stopped robot
+SIDE_TIME = 0.05  # s in which a stopping robot that is pushed away loses its other motion
+NEW_TIME = 0.03  # s for which a contact presses whatever the external joint torques say
+YIELD_TIME = 0.1  # s after which a stopping robot does not let itself be pushed away any more
+HOLD_TIME = 0.2  # s after which it holds its pose even if it is pushed on: brakes alone creep
+REST = 0.02  # rad/s: slower than that the robot stands
 FLOAT_TIME = 0.5  # s in which a floating robot loses its velocity to friction
 RETRACT_EASE = 0.05  # s over which the retraction slows down at its end
 PRESSING = 5.0  # N: with less a contact does not press any more
@@ -41,18 +46,17 @@ def ignore(contact: Contact, state: State) -> Array:
 def stop(contact: Contact, state: State) -> Array:
     """Brakes along the path as hard as the torque limits allow, then holds the pose.
 
-    As long as the contact presses, what moves the robot away from it is not braked: else a robot
-    that stops would be harder to push away than one that does not react.
+    At first, as long as the contact presses, what moves the robot away from it is not braked: else
+    a robot that stops would be harder to push away than one that does not react. While the touched
+    point leaves, other motion is braked gently, as an error of the place mixes the two.
     """
-    escape = escape_motion(contact, state)
-    if escape is not None and pressing(escape[1], state) > PRESSING:
-        lever, direction = escape
-        resisted = state.qd - max(0.0, float(lever @ state.qd)) * direction
-        push = -state.inertia @ resisted / SERVO_TIME
-    elif state.since is not None and state.since.rest is not None:
+    rest = None if state.since is None else state.since.rest
+    escape = yielding(contact, state)
+    if rest is not None:
         w = HOLD_FREQUENCY
-        wanted = w**2 * (state.since.rest - state.q) - 2 * w * state.qd
-        push = state.inertia @ wanted
+        push = state.inertia @ (w**2 * (rest - state.q) - 2 * w * state.qd)
+    elif escape is not None and (leaving := float(escape[0] @ state.qd)) > 0.0:
+        push = -state.inertia @ (state.qd - leaving * escape[1]) / SIDE_TIME
     else:
         push = -state.inertia @ state.qd / SERVO_TIME
     return state.bias_torque + within_effort(state, push)
@@ -65,10 +69,24 @@ def pressing(direction: Array, state: State) -> float:
     return float(direction @ np.nan_to_num(state.tau_ext))
 
 
-def is_pressed(contact: Contact, state: State) -> bool:
-    """Whether the contact still presses the robot in a direction in which it could yield."""
-    escape = escape_motion(contact, state)
-    return escape is not None and pressing(escape[1], state) > PRESSING
+def yielding(contact: Contact, state: State) -> tuple[Array, Array] | None:
+    """The `escape_motion` that `stop` leaves free; None once nothing presses, or it took too long.
+
+    A new contact is taken to press: the external joint torques come through a filter, later.
+    """
+    age = 0.0 if state.since is None else state.time - state.since.time
+    escape = escape_motion(contact, state) if age < YIELD_TIME else None
+    if escape is None or age < NEW_TIME or pressing(escape[1], state) > PRESSING:
+        return escape
+    return None
+
+
+def settled(contact: Contact, state: State) -> bool:
+    """Whether `stop` may hold the pose: braked, or pushed on though it brakes."""
+    if state.since is None or yielding(contact, state) is not None:
+        return False
+    age = state.time - state.since.time
+    return age > HOLD_TIME or bool(np.max(np.abs(state.qd)) < REST)
 
 
 def float_(contact: Contact, state: State) -> Array:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from touchline.contact.contact import Contact
 from touchline.contact.policy import Choice, Policy
-from touchline.contact.reaction import REACTIONS, SERVO_TIME, Reaction, Retract, is_pressed
+from touchline.contact.reaction import REACTIONS, SERVO_TIME, Reaction, Retract, settled
 from touchline.contact.state import Since, State
 from touchline.errors import InputError
 from touchline.model.description import PolicyDescription
@@ -20,7 +20,6 @@ Array = NDArray[np.float64]
 
 OWN = "own:"  # begins the name of a user's own reaction in `policy`
 
-REST = 0.02  # rad/s: slower than that the robot stands
 LIMIT_TIME = 0.1  # s: how soon at the least a limit of position may be reached
 
 
@@ -151,11 +150,11 @@ class Reactor:
 
     def _react(self, active: _Active, state: State) -> Command:
         since = active.since
-        still = since.rest is None and np.max(np.abs(state.qd)) < REST
-        if still and not is_pressed(active.contact, state):
+        state = replace(state, since=since)
+        if since.rest is None and settled(active.contact, state):
             since = replace(since, rest=state.q.copy())
             self._active = replace(active, since=since)
-        state = replace(state, since=since)
+            state = replace(state, since=since)
         reaction = self._reactions[active.choice.reaction]
         torque, clipped = limited(reaction(active.contact, state), state)
         choice = active.choice

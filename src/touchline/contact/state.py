@@ -21,7 +21,7 @@ class Since:
     Attributes:
         time: [s].
         q: (n,) [rad or m].
-        rest: (n,) where it first stood still after that; None until then.
+        rest: (n,) that a robot which stops then holds; None until then.
     """
 
     time: float

@@ -17,7 +17,7 @@ from touchline.simulation.closed_loop import LiveSensors, ReactingController, St
 from touchline.simulation.control import Controller, Setpoint, Trajectory
 from touchline.simulation.guiding import GuidingHand, HandMotion, led
 from touchline.simulation.noise import SensorNoise
-from touchline.simulation.obstacle import PAD_RADIUS, Body, Obstacle
+from touchline.simulation.obstacle import PAD_RADIUS, TOUCHES, Body, Obstacle
 from touchline.simulation.readings import Readings
 from touchline.simulation.scene import Run, impedance, make_plant
 from touchline.simulation.setup import Setup, read_setup
@@ -71,7 +71,7 @@ class Outcome:
     Attributes:
         encounter: that was simulated.
         readings: of ideal sensors.
-        truth: the obstacle's force in the first slot, that of a hand in the second.
+        truth: the obstacle's forces in the first slots, that of a hand in the last.
         steps: of the loop.
         torque: (N, n) motor torques commanded [Nm or N].
     """
@@ -81,6 +81,11 @@ class Outcome:
     truth: Truth
     steps: list[Step]
     torque: Array
+
+    @property
+    def force(self) -> Array:
+        """Force (N, 3) of the body on the arm, of all links that it touches, in world [N]."""
+        return self.truth.force[:, :TOUCHES].sum(axis=1)
 
 
 class EncounterScene:

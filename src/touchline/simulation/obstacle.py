@@ -23,6 +23,7 @@ NAME = "obstacle"
 PAD_MASS, PAD_RADIUS = 0.1, 0.03  # kg, m
 PAD_STIFFNESS = 1e5  # N/m between pad and robot
 PAD_DAMPING = 0.3  # ratio of that contact, which else would chatter
+TOUCHES = 2  # links that the pad touches at once, where two of them meet
 SPRING_DAMPING = 0.1  # ratio of the spring with the mass, or with 5 kg before a wall
 WALL = 1e6  # kg
 
@@ -51,7 +52,7 @@ class Body:
 
 
 class Obstacle:
-    """One obstacle in a plant's model; one slot: the strongest link that it touches.
+    """One obstacle in a plant's model; its slots: the strongest links that it touches.
 
     Add it to the model first, `place` it after `Plant.reset`.
     """
@@ -61,10 +62,10 @@ class Obstacle:
     def __init__(self) -> None:
         self._mj: Any = import_module("mujoco")
         self._wrench = np.zeros(6)
-        self._idle = [no_touch("")]
+        self._idle = [no_touch("")] * TOUCHES
 
     def __len__(self) -> int:
-        return 1
+        return TOUCHES
 
     def add(self, spec: Any, bodies: dict[str, Any]) -> None:
         """Adds it to a model before it is compiled; see `build_model`."""
@@ -115,7 +116,7 @@ class Obstacle:
         return True
 
     def touches(self, plant: Plant) -> list[Touch]:
-        """The contact force on the robot at the plant's present state and inputs."""
+        """The contact forces on the robot at the plant's present state and inputs."""
         if plant.data.ncon == 0:
             return self._idle
         found: dict[str, list[tuple[Array, Array]]] = {}
@@ -132,7 +133,9 @@ class Obstacle:
             found.setdefault(link, []).append((contacts.pos[c].copy(), force))
         if not found:
             return self._idle
-        return [max((_joined(*item) for item in found.items()), key=lambda t: t.force @ t.force)]
+        touches = [_joined(*item) for item in found.items()]
+        touches.sort(key=lambda touch: -float(touch.force @ touch.force))
+        return (touches + self._idle)[:TOUCHES]
 
 
 def _joined(link: str, forces: list[tuple[Array, Array]]) -> Touch:

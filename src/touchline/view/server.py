@@ -2,11 +2,13 @@
 """The page's server: viser behind a guard, for this machine alone unless asked otherwise."""
 
 import contextlib
+import gzip
 import io
 import os
 import secrets
 import socket
 import sys
+from functools import lru_cache
 from typing import Any
 from unittest import mock
 
@@ -117,9 +119,26 @@ def _answering(guard: Guard, answer: Any) -> Any:
         response = answer(connection, request)
         if response is not None:
             response.headers.update(guard.page_headers(request.path))
+            _put_title(response)
         return response
 
     return process
+
+
+def _put_title(response: Response) -> None:
+    """Gives the page a title of its own; viser has no option for it."""
+    if response.headers.get("Content-Type", "").startswith("text/html"):
+        packed = response.headers.get("Content-Encoding") == "gzip"
+        response.body = _titled(bytes(response.body or b""), packed)
+        del response.headers["Content-Length"]
+        response.headers["Content-Length"] = str(len(response.body))
+
+
+@lru_cache(maxsize=2)  # with and without compression
+def _titled(page: bytes, packed: bool) -> bytes:
+    html = gzip.decompress(page) if packed else page
+    html = html.replace(b"<title>Viser</title>", b"<title>Touchline</title>", 1)
+    return gzip.compress(html) if packed else html
 
 
 def open_page(url: str) -> None:
