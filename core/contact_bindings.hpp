@@ -200,13 +200,13 @@ inline void follow(tl::Localizer& l, std::size_t i, const FollowedSample& x,
       push_event(l, i, g, *memory, ended);
       memory->serial = -1;
     }
-    for (int k = 0; touched && k < l.tracks().count(); ++k) {
+    for (int k = 0; touched && k < l.reports().count(); ++k) {
       const std::size_t at = answers.size();
       answers.resize(at + 3 + kWidth);
       answers[at] = static_cast<double>(i);
       answers[at + 1] = static_cast<double>(g);
-      answers[at + 2] = static_cast<double>(l.tracks()[k].serial);
-      write(l, l.tracks()[k].answer, answers.data() + at + 3);
+      answers[at + 2] = static_cast<double>(l.reports()[k].serial);
+      write(l, l.reports()[k].answer, answers.data() + at + 3);
     }
   }
 }

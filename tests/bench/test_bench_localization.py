@@ -174,6 +174,14 @@ def test_credibility_of_truths_from_the_posterior_is_uniform():
     assert np.mean(np.array(doubled) < 0.9) < 0.6  # a posterior that is too sure is seen
 
 
+def test_regions_of_contacts_on_one_segment_hold_what_they_say():
+    panda()
+    trials = [run_trial(Cell("panda", contacts=2, tier=3), run) for run in range(30)]
+    levels = np.array([touch.level for trial in trials for touch in trial.touches])
+    assert 0.8 < np.mean(levels < 0.9) < 0.98
+    assert 0.36 < np.mean(levels < 0.5) < 0.64
+
+
 def test_wilson_interval():
     low, high = wilson(10, 10)
     assert (low, high) == pytest.approx((0.7225, 1.0), abs=1e-4)  # Wilson 1927, 95 %

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Several contacts whose places are known explain one measurement: their forces, and small shifts
 // of their places, from a linear Gaussian model,
-//   rows = sum of H_c (p_c) (f_c + df_c) + G_c dp_c + noise,   df_c ~ (0, s_c^2),  dp_c ~ (0, P_c).
+//   rows = sum of H_c (p_c) (f_c + df_c) + G_c dp_c + noise,   df_c ~ (0, s_c^2),  dp ~ (0, P),
+// P being joint: where the wrench alone tells two places, what one gains the other loses.
 // No allocation after construction.
 #pragma once
 
@@ -61,37 +62,50 @@ class JointFit {
       }
       cost += d[n] * d[n];
     }
-    for (int c = 0; c < count; ++c) {
-      double* to = factor_ + kEach * c * (n + 1);
-      for (int i = 0; i < 3; ++i) to[i * (n + 1)] += 1.0 / (sigma[c] * sigma[c]);
-      const Spread prior = known[c].place.inverse();
-      to[3 * (n + 1)] += prior.a;
-      to[4 * n + 3] += prior.b;
-      to[4 * (n + 1)] += prior.c;
-    }
-    double rhs[kEach * kMost];
-    std::copy(b, b + n, rhs);
+    std::copy(factor_, factor_ + n * n, information_);
+    std::copy(b, b + n, rhs_);
+    places_before(known, count);
+    add_prior(factor_, sigma);
     if (!cholesky(factor_, n)) return std::numeric_limits<double>::infinity();
     solve_cholesky(factor_, n, b);
-    for (int i = 0; i < n; ++i) cost -= rhs[i] * b[i];
+    for (int i = 0; i < n; ++i) cost -= rhs_[i] * b[i];
     return cost;
   }
 
-  // Takes the last fit over: forces, and of the places the part `independence` that a sample of
-  // filtered rows brings; `drift`: how fast places may move, as a variance [m2].
-  void apply(KnownContact* known, double independence, double drift) const {
+  // Takes the forces of the last fit over.
+  void apply_forces(KnownContact* known) const {
     for (int c = 0; c < count_; ++c) {
       const double* x = solution_ + kEach * c;
       known[c].force = known[c].force + Vec3{x[0], x[1], x[2]};
-      move(known[c], x[3], x[4], place_after(c), independence, drift);
+    }
+  }
+
+  // And of the places what the part `independence` of a sample of filtered rows tells, with forces
+  // known to `sigma` [N] at that; `drift`: how far places may have moved, as a variance [m2].
+  // Forces follow the noise of the rows: what was found of them is no second source for the places.
+  void apply_places(KnownContact* known, double independence, const double* sigma,
+                    double drift) const {
+    const int n = kEach * count_;
+    double factor[kEach * kMost * kEach * kMost], x[kEach * kMost];
+    for (int i = 0; i < n * n; ++i) factor[i] = independence * information_[i];
+    for (int i = 0; i < n; ++i) x[i] = independence * rhs_[i];
+    add_prior(factor, sigma);
+    if (!cholesky(factor, n)) return;
+    solve_cholesky(factor, n, x);
+    for (int c = 0; c < count_; ++c) {
+      share(factor, known, c, drift);
+      shift(known[c], x[kEach * c + 3], x[kEach * c + 4]);
     }
   }
 
   // Standard deviation of the force of a contact after the last fit [N], in its worst direction at
   // most.
   double force_sigma(int c) const {
-    double sum = 0.0;
-    for (int i = 0; i < 3; ++i) sum += variance(kEach * c + i, kEach * c + i);
+    double sum = 0.0, column[kEach * kMost];
+    for (int i = 0; i < 3; ++i) {
+      covariances(factor_, kEach * c + i, column);
+      sum += column[kEach * c + i];
+    }
     return std::sqrt(sum);
   }
 
@@ -100,6 +114,14 @@ class JointFit {
   struct Uncertainty {
     int size = 0;
     double root[kEach * kMost * kEach * kMost];  // columns of the inverse, transposed factor
+    // Standard deviation of a contact's force along an axis, on average [N].
+    double force_sigma(int c) const {
+      double sum = 0.0;
+      for (int k = 0; k < size; ++k) {
+        for (int i = kEach * c; i < kEach * c + 3; ++i) sum += root[k * size + i] * root[k * size + i];
+      }
+      return std::sqrt(sum / 3.0);
+    }
   };
   void uncertainty(Uncertainty& out) const {
     const int n = out.size = kEach * count_;
@@ -187,38 +209,80 @@ class JointFit {
     for (int i = 0; i < width; ++i) m.whiten(d + i, width);
   }
 
-  // An element of the covariance after the fit.
-  double variance(int i, int j) const {
+  // The inverse of the joint covariance of the places, in `prior_`.
+  void places_before(const KnownContact* known, int count) {
+    const int n = 2 * count;
+    double P[4 * kMost * kMost];
+    for (bool jointly : {true, false}) {
+      for (int a = 0; a < count; ++a) {
+        for (int b = 0; b <= a; ++b) block(known[a], known[b], jointly, P + 2 * a * n + 2 * b, n);
+      }
+      if (cholesky(P, n)) break;
+    }
+    for (int i = 0; i < n; ++i) {
+      double* column = prior_ + i * n;
+      for (int k = 0; k < n; ++k) column[k] = i == k ? 1.0 : 0.0;
+      solve_cholesky(P, n, column);
+    }
+  }
+
+  static void block(const KnownContact& a, const KnownContact& b, bool jointly, double* out,
+                    int width) {
+    const Spread& p = a.place;
+    double with[2][2] = {{p.a, p.b}, {p.b, p.c}};
+    if (&a != &b) {
+      const KnownContact::Shared* s = jointly ? shared(a, b) : nullptr;
+      for (int i = 0; i < 4; ++i) with[i / 2][i % 2] = s == nullptr ? 0.0 : s->with[i / 2][i % 2];
+    }
+    for (int i = 0; i < 4; ++i) out[i / 2 * width + i % 2] = with[i / 2][i % 2];
+  }
+
+  // To the lower half of an information matrix.
+  void add_prior(double* H, const double* sigma) const {
+    const int n = kEach * count_, m = 2 * count_;
+    for (int a = 0; a < count_; ++a) {
+      for (int i = 0; i < 3; ++i) H[(kEach * a + i) * (n + 1)] += 1.0 / (sigma[a] * sigma[a]);
+      for (int b = 0; b <= a; ++b) {
+        for (int i = 0; i < 4; ++i)
+          H[(kEach * a + 3 + i / 2) * n + kEach * b + 3 + i % 2] +=
+              prior_[(2 * a + i / 2) * m + 2 * b + i % 2];
+      }
+    }
+  }
+
+  // A column of the covariance after a fit.
+  void covariances(const double* factor, int i, double* column) const {
     const int n = kEach * count_;
-    double x[kEach * kMost] = {};
-    x[i] = 1.0;
-    solve_cholesky(factor_, n, x);
-    return x[j];
+    std::fill(column, column + n, 0.0);
+    column[i] = 1.0;
+    solve_cholesky(factor, n, column);
   }
 
-  Spread place_after(int c) const {
-    const int s = kEach * c + 3, t = s + 1;
-    return {variance(s, s), variance(s, t), variance(t, t)};
+  // Notes how uncertain contact c is after a fit, and what it shares with the others.
+  void share(const double* factor, KnownContact* known, int c, double drift) const {
+    double column[2][kEach * kMost];
+    for (int i = 0; i < 2; ++i) covariances(factor, kEach * c + 3 + i, column[i]);
+    KnownContact& k = known[c];
+    const int own = kEach * c + 3;
+    k.place = {std::max(column[0][own] + drift, kSharpest), column[0][own + 1],
+               std::max(column[1][own + 1] + drift, kSharpest)};
+    KnownContact::Shared* to = k.shared;
+    for (KnownContact::Shared& s : k.shared) s.serial = -1;
+    for (int b = 0; b < count_; ++b) {
+      if (b == c) continue;
+      to->serial = known[b].serial;
+      for (int i = 0; i < 4; ++i) to->with[i / 2][i % 2] = column[i / 2][kEach * b + 3 + i % 2];
+      ++to;
+    }
   }
 
-  // The shift that the sample's own part of the information leads to.
-  void move(KnownContact& k, double along, double across, const Spread& after, double independence,
-            double drift) const {
-    const Spread prior = k.place.inverse(), information = after.inverse();
-    const Spread gain = information.plus(prior, -1.0);
-    const double x = independence * (information.a * along + information.b * across);
-    const double y = independence * (information.b * along + information.c * across);
-    k.place = prior.plus(gain, independence).inverse();
-    const double ds = k.place.a * x + k.place.b * y, dt = k.place.b * x + k.place.c * y;
-    k.place.a += drift;
-    k.place.c += drift;
-    k.place.a = std::max(k.place.a, kSharpest);
-    k.place.c = std::max(k.place.c, kSharpest);
-    if (std::fabs(ds) + std::fabs(dt) < 1e-7) return;
+  // Moves a place along its surface [m].
+  void shift(KnownContact& k, double along, double across) const {
+    if (std::fabs(along) + std::fabs(across) < 1e-7) return;
     Vec3 s, t;
     tangents(k.normal, s, t);
     const SurfacePoint p =
-        surfaces_[k.surface].mesh.nearest_to_point(k.point + ds * s + dt * t, 0.06);
+        surfaces_[k.surface].mesh.nearest_to_point(k.point + along * s + across * t, 0.06);
     if (p.face < 0) return;
     k.point = p.point;
     k.normal = p.normal;
@@ -228,6 +292,8 @@ class JointFit {
   const LinkSurfaces& surfaces_;
   int count_ = 0;
   std::vector<double> rows_, loose_;
+  double information_[kEach * kMost * kEach * kMost], rhs_[kEach * kMost];
+  double prior_[4 * kMost * kMost];
   double factor_[kEach * kMost * kEach * kMost], solution_[kEach * kMost];
 };
 

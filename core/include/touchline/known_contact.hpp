@@ -50,10 +50,16 @@ struct Spread {
 };
 
 struct KnownContact {
+  static constexpr int kOthers = 3;  // contacts beside it on its segment at most
   int serial = -1, surface = -1, node = -1;
   Vec3 point, normal;  // in the frame of the node
   Vec3 force;          // in world [N]
   Spread place;        // in the tangents of `normal`
+  // Covariances of its two coordinates (rows) with those of contacts beside it [m2].
+  struct Shared {
+    int serial = -1;
+    double with[2][2];
+  } shared[kOthers];
   double lag = 0.0;    // how old that is which the force speaks of [s]
   Age age;
   double gone = 0.0;   // since when there is no force [s]; 0: there is
@@ -67,6 +73,17 @@ struct KnownContact {
     double weight;
   } others[Answer::kCandidates];
 };
+
+// What two places have in common: null unless both know of it.
+inline const KnownContact::Shared* shared(const KnownContact& a, const KnownContact& b) {
+  const auto find = [](const KnownContact& k, int serial) -> const KnownContact::Shared* {
+    for (const KnownContact::Shared& s : k.shared) {
+      if (serial >= 0 && s.serial == serial) return &s;
+    }
+    return nullptr;
+  };
+  return find(b, a.serial) != nullptr ? find(a, b.serial) : nullptr;
+}
 
 // Takes over what was said of a contact at one instant.
 inline void keep(const Answer& answer, const LinkSurfaces& surfaces, KnownContact& known) {
@@ -98,6 +115,7 @@ inline void keep(const Answer& answer, const LinkSurfaces& surfaces, KnownContac
            turn[i][1] * (best.along[1] * turn[k][0] + best.along[2] * turn[k][1]);
   };
   known.place = {element(0, 0), element(0, 1), element(1, 1)};
+  for (KnownContact::Shared& s : known.shared) s.serial = -1;
 }
 
 // What is said of a known contact now.

@@ -26,11 +26,11 @@ class Localizer {
         tracks_(single_, measurement_, settings_, measurement_.most_rows(),
                 observer.row_layout().segments, period_),
         states_(observer.row_layout().segments),
-        memories_(observer.row_layout().segments, std::vector<Memory>(Tracks::kReports + 1)) {
+        memories_(observer.row_layout().segments, std::vector<Memory>(Reports::kMost + 1)) {
     for (std::vector<Memory>& of_segment : memories_) {
       for (Memory& m : of_segment) m.q.resize(observer.row_layout().joints, kNaN);
     }
-    ended_.reserve(Tracks::kReports + 1);
+    ended_.reserve(Reports::kMost + 1);
   }
 
   Localizer(const Localizer&) = delete;
@@ -80,7 +80,7 @@ class Localizer {
     return single_.locate(g, lag, measurement_);
   }
 
-  // Takes a sample of segment g at `time` [s]: what is said of each contact on it is in `tracks()`,
+  // Takes a sample of segment g at `time` [s]: what is said of each contact on it is in `reports()`,
   // and the events that have ended in `ended()`.
   void follow(int g, bool touched, const double* row, const double* normalized, double time,
               const double* q) {
@@ -97,17 +97,18 @@ class Localizer {
     if (!touched) return;
     tracks_.follow(s, g, bandwidth(g), time,
                    [&] { return measurement_.read(g, row, normalized); });
-    for (int i = 0; i < tracks_.ended(); ++i) end(g, tracks_.ended(i));
+    const Reports& reports = tracks_.reports();
+    for (int i = 0; i < reports.ended(); ++i) end(g, reports.ended(i));
     const double strength = measurement_.strength(g, normalized);
     double sum = 0.0;
-    for (int i = 0; i < tracks_.count(); ++i) sum += size(tracks_[i].answer);
-    for (int i = 0; i < tracks_.count(); ++i) {
-      const double share = tracks_.count() > 1 && sum > 0.0 ? size(tracks_[i].answer) / sum : 1.0;
-      remember(g, tracks_[i], share * strength, time, q);
+    for (int i = 0; i < reports.count(); ++i) sum += size(reports[i].answer);
+    for (int i = 0; i < reports.count(); ++i) {
+      const double share = reports.count() > 1 && sum > 0.0 ? size(reports[i].answer) / sum : 1.0;
+      remember(g, reports[i], share * strength, time, q);
     }
   }
 
-  const Tracks& tracks() const { return tracks_; }
+  const Reports& reports() const { return tracks_.reports(); }
 
   // An event: its number, its places, and the joint positions at the time of its position.
   struct Memory {

@@ -10,6 +10,8 @@ namespace touchline {
 
 struct SegmentContacts {
   static constexpr int kMost = JointFit::kMost;
+  static constexpr double kYoung = 3.0;  // times 1 / K, until a contact counts as known
+  static constexpr double kRefit = 0.5;  // times 1 / K, between fits of a sole contact
 
   // Contacts at a time before anything new could have been felt.
   struct Reference {
@@ -25,7 +27,9 @@ struct SegmentContacts {
   Age age;               // of the segment's wrench
   double explained = 0;  // since when one contact has explained all [s]
   bool explains = false;
-  double updated = 0.0;  // time of the last fit [s]
+  // Time of the last fit of the places [s]. That which a contact was found by lies ahead: the noise
+  // of a filtered sample tells nothing new for 1 / K.
+  double updated = 0.0;
   double referred = 0.0; // and of the last reference [s]
   Reference now, before;
 

@@ -6,24 +6,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "touchline/known_fit.hpp"
-#include "touchline/pair_answer.hpp"
+#include "touchline/reports.hpp"
 #include "touchline/segment_contacts.hpp"
 #include "touchline/single_contact.hpp"
+#include "touchline/twins.hpp"
 
 namespace touchline {
 
-// What is said of one contact, under its number.
-struct Report {
-  int serial = -1;
-  Answer answer;
-};
-
 class Tracks {
  public:
-  static constexpr int kMost = SegmentContacts::kMost, kReports = kMost + 1;
+  static constexpr int kMost = SegmentContacts::kMost;
 
   Tracks(SingleContact& single, Measurement& measurement, const LocalizerSettings& settings,
          std::size_t rows, int segments, double period)
@@ -33,13 +27,13 @@ class Tracks {
         period_(period),
         fit_(measurement.posture(), single.surfaces(), rows),
         known_(measurement, fit_, settings.force_scale),
-        pairs_(measurement.posture(), single.surfaces(), settings, rows, segments),
-        said_(settings) {}
+        reports_(single.surfaces()),
+        twins_(single.surfaces(), measurement, settings, fit_, known_, reports_, rows, segments) {}
 
   // One sample of segment g: fills the reports. `read()` takes the measurement anew.
   template <class Read>
   void follow(SegmentContacts& s, int g, double bandwidth, double time, Read&& read) {
-    count_ = ended_ = 0;
+    reports_.clear();
     g_ = g;
     bandwidth_ = bandwidth;
     time_ = time;
@@ -67,21 +61,17 @@ class Tracks {
     }
   }
 
-  int count() const { return count_; }
-  const Report& operator[](int i) const { return reports_[i]; }
-  // Numbers of contacts that have ended with this sample.
-  int ended() const { return ended_; }
-  int ended(int i) const { return endings_[i]; }
-  int next() { return serial_++; }
+  // What is said after the last sample.
+  const Reports& reports() const { return reports_; }
+  int next() { return reports_.next(); }
 
  private:
-  static constexpr double kYoung = 3.0;        // times 1 / K, until a contact counts as known
-  static constexpr double kRefit = 0.5;        // times 1 / K, between fits of a sole contact
   static constexpr double kNear = 2e-3;        // places that differ by less are the same [m]
   static constexpr double kSlide = 0.5;        // contacts slide no faster [m/s]
-  static constexpr double kDrift = 1e-5;       // of a place's variance [m2/s]
+  static constexpr double kAnywhere = 1e-2;    // variance of a place before it is known [m2]
+  static constexpr double kDrift = 3e-6;       // of a place's variance [m2/s]
 
-  double young() const { return kYoung / bandwidth_; }
+  double young() const { return SegmentContacts::kYoung / bandwidth_; }
   double brief() const { return 1.0 / bandwidth_; }
 
   Vec3 force() const {
@@ -89,19 +79,9 @@ class Tracks {
     return {w[0], w[1], w[2]};
   }
 
-  void report(int serial, const Answer& answer) {
-    if (count_ == kReports) return;
-    reports_[count_].serial = serial;
-    reports_[count_++].answer = answer;
-  }
-  void report(const KnownContact& k) {
-    if (count_ == kReports) return;
-    reports_[count_].serial = k.serial;
-    touchline::report(k, single_.surfaces(), reports_[count_++].answer);
-  }
-  void end(int serial) {
-    if (serial >= 0 && ended_ < kReports) endings_[ended_++] = serial;
-  }
+  void report(int serial, const Answer& answer) { reports_.add(serial, answer); }
+  void report(const KnownContact& k) { reports_.add(k); }
+  void end(int serial) { reports_.end(serial); }
 
   // --- one contact, as far as is known ---
   template <class Read>
@@ -110,11 +90,11 @@ class Tracks {
     if (s.count == 0) {
       if (a.status == Status::not_separable) {
         s.explains = false;
-        together(s, a);
+        twins_.follow(s, g_, a, lag_, bandwidth_, time_);
         return;
       }
       report(s.first, a);
-      if (placed(a)) forget_pair(s);
+      if (placed(a)) twins_.forget(s);
       if (!placed(a)) {
         s.explains = false;
       } else if (!s.explains) {
@@ -127,7 +107,7 @@ class Tracks {
     }
     if (agrees(s.known[0], a, single_.surfaces(), kNear)) {
       report(s.known[0].serial, a);
-      const bool due = time_ - s.updated >= kRefit / bandwidth_;
+      const bool due = time_ - s.updated >= SegmentContacts::kRefit / bandwidth_;
       if (due && known_.explain_freely(s.known, 1)) accept(s);
       return;
     }
@@ -140,63 +120,6 @@ class Tracks {
     arrive(s, read);
   }
 
-  // --- two at the same instant ---
-  // One contact explains nothing, from the beginning: looks for two, again and again while their
-  // forces rise, then ever more rarely.
-  void together(SegmentContacts& s, const Answer& one) {
-    if (s.apart < 0.0) {
-      s.apart = time_;
-      s.next_search = time_;
-    }
-    if (time_ >= s.next_search) {
-      pairs_.search(g_, lag_, measurement_);
-      take(s, one);
-      s.searched = time_;
-      s.next_search = time_ + std::max(kRefit / bandwidth_, 0.5 * (time_ - s.apart));
-    } else if (s.paired) {
-      known_.explain_freely(s.pair, 2);
-      fit_.apply(s.pair, 0.0, 0.0);
-    }
-    if (!s.paired) {
-      end(s.twin);
-      s.twin = -1;
-      s.inseparable.force = one.force;
-      report(s.first, s.inseparable);
-      return;
-    }
-    if (s.twin < 0) s.twin = next();
-    s.pair[0].serial = s.first;
-    s.pair[1].serial = s.twin;
-    for (const KnownContact& k : s.pair) report(k);
-    if (s.searched - s.apart < young()) return;
-    std::copy(s.pair, s.pair + 2, s.known);
-    s.count = 2;
-    s.twin = -1;
-    s.paired = false;
-    s.apart = -1.0;
-    s.forget_references();
-  }
-
-  void forget_pair(SegmentContacts& s) {
-    end(s.twin);
-    s.twin = -1;
-    s.paired = false;
-    s.apart = -1.0;
-  }
-
-  // Takes the outcome of a search over.
-  void take(SegmentContacts& s, const Answer& one) {
-    s.inseparable = one;
-    s.paired = said_.separable(pairs_, measurement_.size());
-    if (!s.paired) return said_.name_all(pairs_, s.inseparable);
-    for (int k = 0; k < 2; ++k) {
-      said_.name(pairs_, k, measurement_.size(), answer_);
-      keep(answer_, single_.surfaces(), s.pair[k]);
-      s.pair[k].lag = lag_;
-      s.pair[k].age = s.age;
-    }
-  }
-
   // A contact has become known.
   void settle(SegmentContacts& s, int serial, const Answer& a) {
     KnownContact& k = s.known[s.count++];
@@ -205,15 +128,21 @@ class Tracks {
     keep(a, single_.surfaces(), k);
     k.lag = brief();
     k.age = s.count == 1 ? s.age : s.new_age;
+    s.updated = time_ + brief();
     s.forget_references();
   }
 
   // Takes the last fit over, and keeps it for when something arrives.
   void accept(SegmentContacts& s) {
-    const double passed = std::clamp(time_ - s.updated, period_, brief());
-    s.updated = time_;
-    fit_.apply(s.known, std::min(1.0, 0.5 * bandwidth_ * passed), kDrift * passed);
-    s.refer(fit_, time_, kRefit / bandwidth_);
+    fit_.apply_forces(s.known);
+    const double passed = std::min(time_ - s.updated, brief());
+    if (passed > 0.0) {
+      double free[kMost];
+      std::fill(free, free + kMost, settings_.force_scale);
+      fit_.apply_places(s.known, 0.5 * bandwidth_ * passed, free, kDrift * passed);
+      s.updated = time_;
+    }
+    s.refer(fit_, time_, SegmentContacts::kRefit / bandwidth_);
   }
 
   // --- something new ---
@@ -240,13 +169,13 @@ class Tracks {
     if (found && !s.is_placed) s.placed = time_;
     s.is_placed = found;
     if (found && time_ - s.placed >= brief() && time_ - s.since >= young() && s.count < kMost) {
-      commit(s, a);
+      commit(s, a, read);
       return;
     }
     const bool lasting = time_ - s.since >= 2.0 * brief();
     for (int c = 0; c < s.count; ++c) {
       report(s.before.known[c]);
-      if (lasting && !found) reports_[count_ - 1].answer.status = Status::ambiguous;
+      if (lasting && !found) reports_.doubt_last();
     }
     if (!found && !lasting) return;
     if (s.newcomer < 0) s.newcomer = next();
@@ -282,7 +211,7 @@ class Tracks {
     if (!s.is_calm) s.calm = time_;
     s.is_calm = true;
     std::copy(s.before.known, s.before.known + s.count, s.known);
-    fit_.apply(s.known, 0.0, 0.0);
+    fit_.apply_forces(s.known);
     for (int c = 0; c < s.count; ++c) report(s.known[c]);
     if (time_ - s.calm >= brief()) {
       s.arriving = false;
@@ -336,22 +265,42 @@ class Tracks {
     fit_.take_out(r.known, r.count, r.uncertainty, measurement_);
     const double lag = s.new_age.follow(force(), bandwidth_, time_) / bandwidth_;
     answer_ = single_.locate(g_, lag, measurement_);
+    freed_ = false;
     if (placed(answer_) || answer_.status == Status::wrench_only) return answer_;
     read();
     JointFit::independent(r.known, r.count, settings_.force_scale, loosened_);
     fit_.take_out(r.known, r.count, loosened_, measurement_);
     const Answer& freed = single_.locate(g_, lag, measurement_);
-    if (placed(freed)) answer_ = freed;
+    freed_ = placed(freed);
+    if (freed_) answer_ = freed;
     return answer_;
   }
 
-  void commit(SegmentContacts& s, const Answer& a) {
+  template <class Read>
+  void commit(SegmentContacts& s, const Answer& a, Read&& read) {
     if (s.newcomer < 0) s.newcomer = next();
     std::copy(s.before.known, s.before.known + s.count, s.known);
     for (int c = 0; c < s.count; ++c) report(s.known[c]);
     report(s.newcomer, a);
+    read();
     settle(s, s.newcomer, a);
+    relate(s);
     s.arriving = false;
+  }
+
+  // What the place of the newest contact shares with the others, since it was found without them:
+  // a fit in which it is not known yet.
+  void relate(SegmentContacts& s) {
+    double sigma[kMost];
+    for (int c = 0; c < s.count; ++c)
+      sigma[c] = freed_ || c == s.count - 1 ? settings_.force_scale
+                                            : s.before.uncertainty.force_sigma(c);
+    KnownContact& newest = s.known[s.count - 1];
+    newest.place = {kAnywhere, 0.0, kAnywhere};
+    fit_.allow_for_motion(s.known, s.count, measurement_);
+    measurement_.spread(nullptr, 0);
+    fit_.fit(measurement_, s.known, s.count, sigma);
+    fit_.apply_places(s.known, 1.0, sigma, 0.0);
   }
 
   // --- several contacts, all known ---
@@ -394,13 +343,12 @@ class Tracks {
   double period_;
   JointFit fit_;
   KnownFit known_;
-  PairSearch pairs_;
-  PairAnswer said_;
   JointFit::Uncertainty loosened_;
   Answer answer_;
-  Report reports_[kReports];
-  int endings_[kReports];
-  int count_ = 0, ended_ = 0, serial_ = 0, g_ = 0;
+  bool freed_ = false;  // was it found with the forces of the known contacts free?
+  Reports reports_;
+  Twins twins_;
+  int g_ = 0;
   double bandwidth_ = 0.0, time_ = 0.0, lag_ = 0.0;
   Vec3 total_;
 };
