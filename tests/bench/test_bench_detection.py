@@ -1,17 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """The detection benchmark: its motion is exact, its delays are counted from the onset."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import touchline as tl
+from touchline.bench import detection_classical
 from touchline.bench.detection import Outcome, alarm_table, delay_table
-from touchline.bench.detection_work import Setting
+from touchline.bench.detection_classical import FastClassical, less_baseline
+from touchline.bench.detection_work import Setting, maker
 from touchline.bench.free_motion import MotionMaker, generator, imperfect, random_trajectory
 from touchline.bench.pushes import AFTER, BEFORE, PushMaker, random_pushes
-from touchline.contact.calibration import Statistics
+from touchline.contact.calibration import Statistics, watching, with_methods
+from touchline.contact.detector import Detector
 from touchline.contact.tail import Tail
-from touchline.estimation.dynamics import inverse_dynamics
+from touchline.estimation.classical import ClassicalObserver
+from touchline.estimation.dynamics import from_world, inverse_dynamics
+from touchline.estimation.observer import Observer
 
 
 @pytest.fixture(scope="module")
@@ -65,3 +72,57 @@ def test_delays_and_alarms_are_counted_against_the_tails():
     assert o.alarms("glrt", 1.0) == 3  # two blocks side by side are one alarm
     assert "3 [0.62, 8.8]" in alarm_table([o])
     assert "33.3 %" in delay_table([o])
+
+
+@pytest.fixture(scope="module", params=[1000.0, 8000.0])
+def classical(request):
+    setting = Setting("classical", request.param, 1e-3)
+    make = maker(setting, 1.0)
+    rng = generator(4)
+    path = random_trajectory(make.robot, rng)
+    return setting, make, path, make.samples(path, rng)
+
+
+def test_the_quick_classical_route_is_the_classical_observer(classical):
+    _, make, path, s = classical
+    robot = make.robot
+    slow = ClassicalObserver(robot).run(s.time, s.q, s.qd, s.tau, s.wrench)
+    torque, wrench, settled = FastClassical(make).run(path, s)
+    np.testing.assert_allclose(torque, slow.tau_ext, atol=1e-10)
+    assert not settled[0]
+    assert settled[-1]
+    poses = np.array([robot.sensor_poses(q) for q in s.q])
+    for g, name in enumerate(robot.segment_names):
+        T = poses[:, robot.sensor_names.index(name)]
+        wanted = from_world(slow.segment_wrench[:, g], T[:, :3, :3], T[:, :3, 3])
+        np.testing.assert_allclose(wrench[:, g], wanted, atol=3e-4)  # noise is above 0.05 N
+        assert np.std(wanted) > 1e-2
+
+
+def test_the_classical_rows_see_a_push_from_its_onset_on():
+    setting, typical = Setting("classical", 1000.0, 2e-4), np.ones((2, 25))
+    found = detection_classical.push_statistics(setting, typical, 50.0, range(2))
+    assert found.shape == (2, round(AFTER * 1000.0) + 1, 2)
+    before, after = found[:, 0], found[:, -20:].min(axis=1)
+    assert (before < 5.0).all()
+    assert (after > 10.0).all()
+
+
+def test_the_baseline_is_the_detectors(sara):
+    maker = MotionMaker(sara, imperfect(sara, 0.02, 1), 1000.0, 8.0)
+    s = maker.samples(random_trajectory(sara, generator(6)), generator(7))
+    robot = with_methods(sara, "scaled")
+    thresholds = watching(robot, 1e-3, {})
+    rows = tuple(replace(row, baseline_limit=1e9) for row in thresholds.rows)
+    detector = Detector(Observer(robot), replace(thresholds, rows=rows), 1e-3)
+    slow = detector.details(s.time, s.q, s.qd, s.tau, s.wrench, 1).slow
+    estimate = Observer(robot).run(s.time, s.q, s.qd, s.tau, s.wrench)
+    row = next(i for i, row in enumerate(thresholds.rows) if row.joint == 2)
+    first = int(np.argmax(estimate.joint_settled[:, 2]))
+    residual = estimate.segment_torque[first:, 2:3]
+    known = slow[np.isfinite(slow[:, row]), row]
+    np.testing.assert_allclose(
+        less_baseline(residual, 1e-3, robot.description.detection.baseline.time)[:, 0],
+        known[-len(residual) :],
+        atol=1e-9,
+    )

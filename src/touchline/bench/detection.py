@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.bench import detection_classical, detection_work
 from touchline.bench.detection_work import (
     CALIBRATED,
     SECONDS,
@@ -22,19 +23,16 @@ from touchline.bench.detection_work import (
     description,
     joined,
     pieces,
-    push_statistics,
-    row_figures,
-    statistics,
 )
 from touchline.bench.tables import Row, aligned
-from touchline.contact.calibration import METHODS, Statistics, count_alarms, fit_tails
+from touchline.contact.calibration import Statistics, count_alarms, fit_tails
 from touchline.contact.tail import Tail, poisson_interval
 
 Array = NDArray[np.float64]
 
 SETTINGS = tuple(
     Setting(layout, rate, velocity)
-    for layout in ("sara", "joints")
+    for layout in ("sara", "joints", "classical")
     for rate in (1000.0, 8000.0)
     for velocity in (1e-3, 2e-4)
 )
@@ -50,7 +48,7 @@ RATES = np.geomspace(0.3, 300.0, 31)  # per hour, of the curves
 TRIALS = 200  # pushes of each force
 FIGURES = 10  # recordings that the row figures come from
 PIECE = 10  # recordings, or pushes times five, that a process takes at a time
-LAYOUTS = {"sara": "extended", "joints": "joint torques"}
+LAYOUTS = {"sara": "extended", "joints": "joint torques", "classical": "classical"}
 
 
 @dataclass(frozen=True)
@@ -94,25 +92,26 @@ class Outcome:
 
 def measure(setting: Setting, hours: float, trials: int, pool: Pool) -> Outcome:
     """Calibrates, counts false alarms for `hours`, and pushes `trials` times with each force."""
+    work = detection_classical if setting.layout == "classical" else detection_work
     name = f"{LAYOUTS[setting.layout]}, {setting.rate / 1000:g} kHz, {setting.velocity:g} rad/s"
     count = max(1, round(hours * 3600 / SECONDS))
-    (rows,) = pool.map(f"{name}: rows", row_figures, [(setting, min(FIGURES, count))])
+    (rows,) = pool.map(f"{name}: rows", work.row_figures, [(setting, min(FIGURES, count))])
     parts = [
         joined(
             pool.map(
                 f"{name}: {what}",
-                statistics,
+                work.statistics,
                 [(setting, rows, which, numbers) for numbers in pieces(count, PIECE)],
             )
         )
         for what, which in (("calibration", CALIBRATED), ("false alarms", TESTED))
     ]
-    tails = fit_tails(description(setting.layout, setting.velocity), parts[0])
+    tails = fit_tails(description(setting.layout, setting.velocity), parts[0], work.METHODS)
     pushes = {}
     for force in FORCES:
-        work = [(setting, rows, force, numbers) for numbers in pieces(trials, 5 * PIECE)]
-        pushes[force] = np.concatenate(pool.map(f"{name}: {force:g} N", push_statistics, work))
-    return Outcome(setting, METHODS, tails, parts[1], pushes, parts[0].hours)
+        jobs = [(setting, rows, force, numbers) for numbers in pieces(trials, 5 * PIECE)]
+        pushes[force] = np.concatenate(pool.map(f"{name}: {force:g} N", work.push_statistics, jobs))
+    return Outcome(setting, work.METHODS, tails, parts[1], pushes, parts[0].hours)
 
 
 def alarm_table(outcomes: list[Outcome]) -> str:

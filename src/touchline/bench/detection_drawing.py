@@ -16,6 +16,7 @@ COLOURS = {
     "chi2": "#1f77b4",
     "glrt": "#d62728",
     "cusum": "#2ca02c",
+    "lowpass": "#9467bd",
 }
 
 

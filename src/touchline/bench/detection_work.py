@@ -27,6 +27,7 @@ from touchline.model.robot import Robot, load_robot
 
 Array = NDArray[np.float64]
 
+METHODS = cal.METHODS
 ERROR = 0.02  # 1 sigma of the inertias
 ARM_SEED = 1  # one arm has one set of errors
 SECONDS = 60.0  # length of a recording
@@ -39,7 +40,7 @@ class Setting:
 
     Attributes:
         layout: "sara": joints 2 to 5 and three six-axis sensors; "joints": seven joint torques
-            and no other sensor.
+            and no other sensor; "classical": both, seven and three, for the classical observer.
         rate: samples per second [Hz].
         velocity: noise of the velocities [rad/s], 1 sigma per sample.
     """
@@ -114,7 +115,7 @@ def push_statistics(
     """Statistics (trials, samples, methods) on the structure, from the onset of pushes on."""
     robot, period = description(setting.layout, setting.velocity), 1.0 / setting.rate
     make = PushMaker(maker(setting, BEFORE + AFTER))
-    robot = cal.with_methods(robot, *cal.METHODS)
+    robot = cal.with_methods(robot, *METHODS)
     calibration = cal.describe(1.0, period, rows, {})
     robot = cal.with_calibration(robot, calibration)
     thresholds = cal.watching(robot, period, rows)

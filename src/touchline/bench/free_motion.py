@@ -99,24 +99,37 @@ class MotionMaker:
         arm: the arm that moves (see `imperfect`).
         rate: samples per second [Hz], a multiple of COARSE.
         seconds: length of a recording.
+
+    Attributes:
+        time: of the samples [s].
+        coarse: times [s] that loads are computed at, some before and after the recording, too.
+        factor: samples from one of them to the next.
     """
 
     def __init__(self, robot: Robot, arm: Robot, rate: float, seconds: float = 60.0) -> None:
         self.robot, self.arm, self.rate = robot, arm, rate
         self.factor = round(rate / COARSE)
         self.time = np.arange(round(seconds * rate)) / rate
+        half, count = len(POINTS) // 2, -(-len(self.time) // self.factor)
+        self.coarse = (np.arange(count + 2 * half) - (half - 1)) / COARSE
         self._weights = _lagrange(np.arange(self.factor) / self.factor)
 
     def loads(self, trajectory: Path) -> tuple[Array, Array, Array]:
         """Positions, velocities and what ideal sensors read (N, n + 6 k): torques, wrenches."""
-        half, count = len(POINTS) // 2, -(-len(self.time) // self.factor)
-        coarse = (np.arange(count + 2 * half) - (half - 1)) / COARSE
-        needed = inverse_dynamics(self.arm, *trajectory(coarse))
-        values = np.hstack([needed.torque, needed.wrench.reshape(len(coarse), -1)])
-        near = np.stack([values[k : k + count] for k in range(len(POINTS))])
-        fine = np.tensordot(self._weights, near, axes=(1, 0)).transpose(1, 0, 2)
+        needed = inverse_dynamics(self.arm, *trajectory(self.coarse))
+        values = np.hstack([needed.torque, needed.wrench.reshape(len(self.coarse), -1)])
         q, qd, _ = trajectory(self.time)
-        return q, qd, fine.reshape(-1, values.shape[1])[: len(self.time)]
+        return q, qd, self.interpolated(values, slice(0, len(self.time)))
+
+    def interpolated(self, values: Array, rows: slice) -> Array:
+        """Smooth values, given at the times `coarse` (C, c), at some samples (N, c).
+
+        `rows` are those samples; they begin at a multiple of `factor`.
+        """
+        first, count = rows.start // self.factor, -(-(rows.stop - rows.start) // self.factor)
+        near = np.stack([values[first + k : first + k + count] for k in range(len(POINTS))])
+        fine = np.tensordot(self._weights, near, axes=(1, 0)).transpose(1, 0, 2)
+        return fine.reshape(-1, values.shape[1])[: rows.stop - rows.start]
 
     def samples(self, trajectory: Trajectory, rng: np.random.Generator) -> Samples:
         """A recording without contact."""

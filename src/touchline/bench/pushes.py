@@ -33,6 +33,10 @@ class Push:
     onset: float
     touch: Touch
 
+    def path(self) -> "_Shifted":
+        """The motion from `BEFORE` before the onset on."""
+        return _Shifted(self.trajectory, self.onset - BEFORE)
+
 
 def random_pushes(robot: Robot, count: int, seed: int) -> Iterator[Push]:
     """Pushes at reachable points of the structure, uniform over its surface, in random motion."""
@@ -59,8 +63,7 @@ class PushMaker:
     def samples(self, push: Push, force: float, rng: np.random.Generator) -> Samples:
         """A trial: the force [N] begins half an interval before sample `first`."""
         maker, n = self._maker, len(self._maker.robot.joint_names)
-        shifted = _Shifted(push.trajectory, push.onset - BEFORE)
-        q, qd, loads = maker.loads(shifted)
+        q, qd, loads = maker.loads(push.path())
         after = q[self.first :]
         link = push.touch.patch.link
         contact = contact_loads(maker.robot, after, link, force * self._wrench(push, after))
