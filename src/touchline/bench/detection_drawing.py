@@ -52,6 +52,8 @@ def draw(
         for method in o.methods:
             median = [1e3 * np.median(o.delays(method, f, 1.0)) for f in forces]
             axes.loglog(forces, median, "o-", ms=3, color=COLOURS[method], label=method)
+        axes.set_xticks(forces, [f"{force:g}" for force in forces])
+        axes.set_xticks([], minor=True)
         axes.set_xlabel("force [N]")
         axes.set_ylabel("median delay at 1 per hour [ms]")
 
