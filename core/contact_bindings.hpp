@@ -342,5 +342,3 @@ inline void bind(nb::module_& m) {
 }
 
 }  // namespace contact
-
-inline void bind_contact(nanobind::module_& m) { contact::bind(m); }
