@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from touchline.errors import InputError
-from touchline.model.description import Friction
+from touchline.model import schema
+from touchline.model.description import Friction, RowCalibration
 from touchline.model.loading import load_description, read_robot_file
 
 CONTRACT_JOINT = """name: shoulder, torque: motor, sign: -1, gain: 2, bias: 0.5, delay: 1e-3,
@@ -368,6 +369,21 @@ def test_one_error_does_not_make_others_up(folder):
         "joints[1].gain: 'x' is not a number",
         "force_torque_sensors[1].link: is missing",
     ]
+
+
+def test_a_required_key_without_a_check_of_its_own_may_be_missing(monkeypatch):
+    """Its place is taken by nothing, and the rest is read on."""
+    monkeypatch.setitem(schema.HOOKS, RowCalibration, {})
+    monkeypatch.setattr(schema, "_CONVERTER", schema._make_converter())
+    rows = {"j1": {}, "j2": {"typical": "x"}, "j3": {"typical": 2.0}}
+    calibration = {"hours": 1.0, "period": 0.001, "rows": rows}
+    file, problems = schema.structure({"detection": {"calibration": calibration}})
+    assert problems == [
+        "detection.calibration.rows.j1.typical: is missing",
+        "detection.calibration.rows.j2.typical: 'x' is not a number",
+    ]
+    read = file.detection.calibration.rows
+    assert {name: row.typical for name, row in read.items()} == {"j1": None, "j2": None, "j3": 2.0}
 
 
 def test_corrections_and_gravity_reach_the_mechanism(folder):

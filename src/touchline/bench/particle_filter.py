@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from touchline.contact.skin import Skin
 from touchline.estimation.dynamics import contact_loads
+from touchline.model.transforms import rotation_to_axis
 
 Array = NDArray[np.float64]
 
@@ -164,11 +165,9 @@ class ParticleFilter:
         R, p = self._poses[nodes][:, :3, :3], self._poses[nodes][:, :3, 3]
         point = np.einsum("nij,nj->ni", R, particles.point[part]) + p
         normal = np.einsum("nij,nj->ni", R, particles.normal[part])
-        helper = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
-        s = np.cross(normal, helper)
-        s /= np.linalg.norm(s, axis=1)[:, None]
-        t = np.cross(normal, s)
-        edges = np.stack([s, t, -s, -t], axis=1) * self._friction - normal[:, None]
+        frames = rotation_to_axis(normal)
+        s, t = frames[..., 0], frames[..., 1]
+        edges = np.stack([-s, -t, s, t], axis=1) * self._friction - normal[:, None]
         edges /= np.linalg.norm(edges, axis=2)[..., None]
         wrenches = np.concatenate([edges, np.cross(point[:, None], edges)], axis=2)
         loads = self._loads[patches] / self._scale[:, None]

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from touchline.contact.skin import Patch, Skin
 from touchline.estimation.dynamics import gravity_loads
 from touchline.model.robot import Robot
+from touchline.model.transforms import rotation_to_axis
 
 Array = NDArray[np.float64]
 
@@ -122,11 +123,8 @@ def _in_cone(axis: Array, friction: float, rng: np.random.Generator) -> Array:
     """A unit vector uniform over the solid angle of a cone around `axis`."""
     cosine = rng.uniform(1.0 / np.sqrt(1.0 + friction**2), 1.0)
     turn = rng.uniform(0.0, 2 * np.pi)
-    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    s = np.cross(axis, helper)
-    s /= np.linalg.norm(s)
-    side = np.cos(turn) * s + np.sin(turn) * np.cross(axis, s)
-    return cosine * axis + np.sqrt(1.0 - cosine**2) * side
+    side = rotation_to_axis(axis)[:, :2] @ np.array([np.cos(turn), np.sin(turn)])
+    return cosine * axis - np.sqrt(1.0 - cosine**2) * side
 
 
 @dataclass(frozen=True)

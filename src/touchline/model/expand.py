@@ -11,8 +11,8 @@ from touchline.model.description import (
     Noise,
     Vector,
 )
+from touchline.model.entries import SensorEntry
 from touchline.model.names import RESERVED_SENSORS
-from touchline.model.schema import SensorEntry
 from touchline.suggest import unknown
 
 DEFAULT_NOISE = {"q": 0.0, "qd": 2e-4, "tau": 0.05}

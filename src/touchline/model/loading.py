@@ -7,12 +7,13 @@ from pathlib import Path
 from touchline.errors import InputError
 from touchline.model.corrections import apply_corrections
 from touchline.model.description import JointDescription, RobotDescription, SensorDescription
+from touchline.model.entries import JointEntry, RobotFile, SensorEntry
 from touchline.model.expand import Expander
 from touchline.model.mechanism import Mechanism
 from touchline.model.names import Names, check_names, joint_entries, names_in, sensor_entries
 from touchline.model.packages import resolve, resolve_robot
 from touchline.model.policy_names import check_policy
-from touchline.model.schema import JointEntry, RobotFile, SensorEntry, structure
+from touchline.model.schema import structure
 from touchline.model.topology import independent_joints
 from touchline.model.urdf import load_urdf, parse_xml
 from touchline.model.yaml_file import read_yaml

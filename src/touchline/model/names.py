@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from touchline.model.entries import JointEntry, RobotFile, SensorEntry
 from touchline.model.mechanism import Mechanism
-from touchline.model.schema import JointEntry, RobotFile, SensorEntry
 from touchline.model.topology import independent_joints, outboard_links
 from touchline.suggest import unknown
 

@@ -3,9 +3,9 @@
 
 from collections.abc import Iterator
 
+from touchline.model.entries import RobotFile
 from touchline.model.mechanism import Mechanism
 from touchline.model.names import Names, Problem, numbered
-from touchline.model.schema import RobotFile
 from touchline.suggest import unknown
 
 

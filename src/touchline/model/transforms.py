@@ -7,6 +7,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from touchline.model.mechanism import Array, Inertia
 
@@ -40,6 +41,18 @@ def rotation_about(axis: Array, angle: float) -> Array:
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def rotation_to_axis(axis: NDArray[np.floating]) -> Array:
+    """Return rotations (..., 3, 3) whose z columns are the unit vectors `axis` (..., 3).
+
+    Their x columns are square to that world axis to which `axis` is squarest.
+    """
+    axis = np.asarray(axis, np.float64)
+    squarest = np.eye(3)[np.argmin(np.abs(axis), axis=-1)]
+    x = np.cross(squarest, axis)
+    x /= np.linalg.norm(x, axis=-1, keepdims=True)
+    return np.stack([x, np.asarray(np.cross(axis, x), float), axis], axis=-1)
 
 
 def pose(R: Array | None = None, p: Sequence[float] | Array | None = None) -> Array:

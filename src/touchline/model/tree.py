@@ -19,6 +19,7 @@ from touchline.model.transforms import (
     move_inertia,
     pose,
     pose_rpy,
+    rotation_to_axis,
 )
 
 Array = NDArray[np.float64]
@@ -51,14 +52,6 @@ class Place:
 def invert(T: Array) -> Array:
     """Inverse of a rigid transform (4, 4)."""
     return pose(T[:3, :3].T, -T[:3, :3].T @ T[:3, 3])
-
-
-def rotation_to_axis(axis: Array) -> Array:
-    """A rotation (3, 3) whose z column is the unit vector `axis`."""
-    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    x = np.cross(helper, axis)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(axis, x), axis])
 
 
 class TreeBuilder:

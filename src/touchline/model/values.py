@@ -115,6 +115,12 @@ def truth(value: Any, _: Any = None) -> bool:
     return value
 
 
+def require_mapping(value: Any, more: str = "") -> None:
+    """Raise unless it is a mapping; `more` goes on with what is allowed."""
+    if not isinstance(value, dict):
+        raise ValueError(f"{show(value)} is {kind_of(value)}, not a mapping{more}")
+
+
 def reaction(value: Any, _: Any = None) -> str:
     """Return the name of a reaction, or `own:NAME`."""
     if isinstance(value, str) and value.startswith(OWN) and len(value) > len(OWN):

@@ -12,11 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from touchline.simulation.contacts import NOTHING, Touch, no_touch
+from touchline.model.transforms import rotation_to_axis
+from touchline.simulation.contacts import Touch, no_touch
 from touchline.simulation.mujoco_model import quaternion
 from touchline.simulation.plant import Plant
-from touchline.simulation.pushers import FRICTION_RATIO, IMPEDANCE
-from touchline.simulation.shapes import OTHER, ROBOT
+from touchline.simulation.pressing import (
+    Pressing,
+    add_ball,
+    contact_spring,
+    firm_friction,
+    strength,
+)
 
 Array = NDArray[np.float64]
 NAME = "obstacle"
@@ -61,7 +67,6 @@ class Obstacle:
 
     def __init__(self) -> None:
         self._mj: Any = import_module("mujoco")
-        self._wrench = np.zeros(6)
         self._idle = [no_touch("")] * TOUCHES
 
     def __len__(self) -> int:
@@ -69,26 +74,15 @@ class Obstacle:
 
     def add(self, spec: Any, bodies: dict[str, Any]) -> None:
         """Adds it to a model before it is compiled; see `build_model`."""
-        spec.option.impratio = FRICTION_RATIO
-        spec.option.cone = self._mj.mjtCone.mjCONE_ELLIPTIC
+        firm_friction(spec)
         slide = {"type": self._mj.mjtJoint.mjJNT_SLIDE, "axis": [1.0, 0.0, 0.0]}
         mass = spec.worldbody.add_body(name=NAME, gravcomp=1.0, pos=[0.0, 0.0, 100.0])
         mass.explicitinertial, mass.mass, mass.inertia = True, 1.0, np.full(3, 1e-3)
         mass.add_joint(name=NAME, **slide)
         pad = mass.add_body(name=f"{NAME}:pad", gravcomp=1.0)
         pad.add_joint(name=f"{NAME}:pad", **slide)
-        pad.add_geom(
-            name=NAME,
-            type=self._mj.mjtGeom.mjGEOM_SPHERE,
-            size=[PAD_RADIUS, 0, 0],
-            mass=PAD_MASS,
-            contype=OTHER,
-            conaffinity=ROBOT,
-            condim=3,
-            priority=1,
-            solref=_contact_spring(),
-            solimp=[IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0],
-        )
+        spring = contact_spring(PAD_STIFFNESS, PAD_MASS, PAD_DAMPING)
+        add_ball(pad, NAME, PAD_RADIUS, PAD_MASS, spring)
 
     def place(self, plant: Plant, body: Body) -> None:
         """Puts it on its way; to be called after each `Plant.reset`."""
@@ -101,15 +95,15 @@ class Obstacle:
         m.geom_friction[m.geom(NAME).id, 0] = body.friction
         direction = np.asarray(body.direction, float)
         m.body_pos[b] = np.asarray(body.point, float) - PAD_RADIUS * direction
-        m.body_quat[b] = quaternion(_frame_along(direction))
+        along = rotation_to_axis(direction)[:, [2, 0, 1]]  # the rail is the x axis
+        m.body_quat[b] = quaternion(along)
         state = d.qpos.copy(), d.qvel.copy(), d.time
         self._mj.mj_setConst(m, d)
         d.qpos[:], d.qvel[:], d.time = state
         rail = m.joint(NAME).dofadr[0]
         d.qpos[rail] = body.speed * (d.time - body.time)
         d.qvel[rail] = body.speed
-        self._links = {body: link for link, body in plant.bodies.items()}
-        self._geom = m.geom(NAME).id
+        self._pressing = Pressing(plant, [NAME])
 
     def apply(self, plant: Plant) -> bool:
         """Nothing drives it."""
@@ -119,40 +113,5 @@ class Obstacle:
         """The contact forces on the robot at the plant's present state and inputs."""
         if plant.data.ncon == 0:
             return self._idle
-        found: dict[str, list[tuple[Array, Array]]] = {}
-        contacts = plant.data.contact
-        for c, (first, second) in enumerate(contacts.geom.tolist()):
-            if self._geom not in (first, second):
-                continue
-            self._mj.mj_contactForce(plant.model, plant.data, c, self._wrench)
-            if self._wrench[0] <= 0.0:
-                continue
-            sign, other = (1.0, second) if first == self._geom else (-1.0, first)
-            force = sign * (self._wrench[:3] @ contacts.frame[c].reshape(3, 3))
-            link = self._links.get(int(plant.model.geom_bodyid[other]), "")
-            found.setdefault(link, []).append((contacts.pos[c].copy(), force))
-        if not found:
-            return self._idle
-        touches = [_joined(*item) for item in found.items()]
-        touches.sort(key=lambda touch: -float(touch.force @ touch.force))
-        return (touches + self._idle)[:TOUCHES]
-
-
-def _joined(link: str, forces: list[tuple[Array, Array]]) -> Touch:
-    """All contacts with one link as one force at their centre; the pad is small."""
-    weights = np.array([np.linalg.norm(force) for _, force in forces])
-    point = weights @ np.array([at for at, _ in forces]) / weights.sum()
-    return Touch(True, link, point, np.sum([force for _, force in forces], axis=0), NOTHING)
-
-
-def _contact_spring() -> list[float]:
-    """MuJoCo's `solref` of a spring between the pad and something much heavier."""
-    k = PAD_STIFFNESS / PAD_MASS
-    return [-k, -2 * PAD_DAMPING * np.sqrt(k)]
-
-
-def _frame_along(direction: Array) -> Array:
-    """A rotation (3, 3) whose x column is a unit vector."""
-    y = np.cross(np.eye(3)[int(np.argmin(np.abs(direction)))], direction)
-    y /= np.linalg.norm(y)
-    return np.column_stack([direction, y, np.cross(direction, y)])
+        (found,) = self._pressing.touches()
+        return (sorted(found.values(), key=strength, reverse=True) + self._idle)[:TOUCHES]

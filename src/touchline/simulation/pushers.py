@@ -9,20 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from touchline.simulation.contacts import NOTHING, Touch, cross, no_touch
+from touchline.simulation.contacts import Touch, no_touch
 from touchline.simulation.mujoco_model import quaternion
 from touchline.simulation.plant import Plant
-from touchline.simulation.shapes import OTHER, ROBOT
+from touchline.simulation.pressing import (
+    Pressing,
+    add_ball,
+    contact_spring,
+    firm_friction,
+    strength,
+)
 
 Array = NDArray[np.float64]
-Force = tuple[Array, Array]  # point and force, (3,) each
-
-
-# MuJoCo's contact force is (impedance * the other forces on the ball) + spring + damper. At its
-# default impedance a contact begins and ends with a jump by nearly all of these other forces; at a
-# small one it is a plain spring. `impratio` keeps friction firm all the same.
-IMPEDANCE = 0.02
-FRICTION_RATIO = 50.0
 CONTACT_DAMPING = 0.05  # ratio; the rail damps too, and more would make touching down a jump
 
 
@@ -90,17 +88,15 @@ class CollidingPushers:
     def __init__(self, pushers: Sequence[Pusher]) -> None:
         self._mj: Any = import_module("mujoco")
         self.pushers = tuple(pushers)
-        self._owners: tuple[str, ...] = ()
         self._idle = [no_touch(pusher.link) for pusher in self.pushers for _ in range(2)]
-        self._wrench = np.zeros(6)
+        self._pressing: Pressing | None = None  # found once there is a plant
 
     def __len__(self) -> int:
         return 2 * len(self.pushers)
 
     def add(self, spec: Any, bodies: dict[str, Any]) -> None:
         """Adds the balls to a model before it is compiled; see `build_model`."""
-        spec.option.impratio = FRICTION_RATIO
-        spec.option.cone = self._mj.mjtCone.mjCONE_ELLIPTIC
+        firm_friction(spec)
         for pusher in self.pushers:
             direction = _unit(pusher.direction)
             away = pusher.radius + pusher.gap
@@ -115,85 +111,36 @@ class CollidingPushers:
                 axis=direction,
                 damping=2.0 * np.sqrt(pusher.stiffness * pusher.mass),
             )
-            body.add_geom(
-                name=f"pusher:{pusher.name}",
-                type=self._mj.mjtGeom.mjGEOM_SPHERE,
-                size=[pusher.radius, 0, 0],
+            add_ball(
+                body,
+                f"pusher:{pusher.name}",
+                pusher.radius,
+                pusher.mass,
+                contact_spring(pusher.contact_stiffness, pusher.mass, CONTACT_DAMPING),
                 quat=quaternion(np.eye(3)),
-                mass=pusher.mass,
-                contype=OTHER,
-                conaffinity=ROBOT,
-                condim=3,
-                priority=1,
                 friction=[pusher.friction, 0.005, 0.0001],
-                solref=_contact_spring(pusher),
-                solimp=[IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0],
             )
 
     def apply(self, plant: Plant) -> bool:
         """Draws the balls along; to be called after `evaluate`."""
-        if not self._owners:
-            self._find(plant)
+        if self._pressing is None:
+            names = [f"pusher:{pusher.name}" for pusher in self.pushers]
+            self._dofs = [int(plant.model.joint(name).dofadr[0]) for name in names]
+            self._pressing = Pressing(plant, names)
         for pusher, dof in zip(self.pushers, self._dofs, strict=True):
             stretch = pusher.travel(plant.time) - plant.data.qpos[dof]
             plant.data.qfrc_applied[dof] = pusher.stiffness * stretch
         return True
 
-    def _find(self, plant: Plant) -> None:
-        model = plant.model
-        links = {body: link for link, body in plant.bodies.items()}
-        self._owners = tuple(links.get(int(body), "") for body in model.geom_bodyid)
-        names = [f"pusher:{pusher.name}" for pusher in self.pushers]
-        self._dofs = [int(model.joint(name).dofadr[0]) for name in names]
-        self._geoms = {int(model.geom(name).id): i for i, name in enumerate(names)}
-
     def touches(self, plant: Plant) -> list[Touch]:
         """The contact forces on the robot at the plant's present state and inputs."""
-        if plant.data.ncon == 0:
+        if plant.data.ncon == 0 or self._pressing is None:
             return self._idle
         touches = list(self._idle)
-        for i, by_link in self._sorted(plant).items():
-            joined = {link: _joined(link, forces) for link, forces in by_link.items()}
-            touches[2 * i] = joined.pop(self.pushers[i].link, touches[2 * i])
-            touches[2 * i + 1] = max(joined.values(), key=_strength, default=touches[2 * i + 1])
+        for i, by_link in enumerate(self._pressing.touches()):
+            touches[2 * i] = by_link.pop(self.pushers[i].link, touches[2 * i])
+            touches[2 * i + 1] = max(by_link.values(), key=strength, default=touches[2 * i + 1])
         return touches
-
-    def _sorted(self, plant: Plant) -> dict[int, dict[str, list[Force]]]:
-        """Points and forces on the robot by ball and link."""
-        contacts, found = plant.data.contact, {}
-        pairs, points = contacts.geom.tolist(), contacts.pos
-        for c, (first, second) in enumerate(pairs):
-            sign = 1.0 if first in self._geoms else -1.0
-            ball, other = (first, second) if first in self._geoms else (second, first)
-            if ball not in self._geoms:
-                continue
-            self._mj.mj_contactForce(plant.model, plant.data, c, self._wrench)
-            if self._wrench[0] > 0.0:
-                # MuJoCo gives the force of the first shape on the second, in the contact's axes.
-                force = sign * (self._wrench[:3] @ contacts.frame[c].reshape(3, 3))
-                links = found.setdefault(self._geoms[ball], {})
-                links.setdefault(self._owners[other], []).append((points[c].copy(), force))
-        return found
-
-
-def _contact_spring(pusher: Pusher) -> list[float]:
-    """MuJoCo's `solref` of a spring between the ball and something much heavier."""
-    k = pusher.contact_stiffness / pusher.mass
-    return [-k, -2 * CONTACT_DAMPING * np.sqrt(k)]
-
-
-def _strength(touch: Touch) -> float:
-    return float(touch.force @ touch.force)
-
-
-def _joined(link: str, forces: list[Force]) -> Touch:
-    """Contacts of one ball with one link as one: at their centre, with the moment that is left."""
-    if len(forces) == 1:
-        return Touch(True, link, *forces[0], NOTHING)
-    weights = np.array([np.linalg.norm(force) for _, force in forces])
-    point = weights @ np.array([at for at, _ in forces]) / weights.sum()
-    moment = np.sum([cross(at - point, force) for at, force in forces], axis=0)
-    return Touch(True, link, point, np.sum([force for _, force in forces], axis=0), moment)
 
 
 def _unit(vector: ArrayLike) -> Array:

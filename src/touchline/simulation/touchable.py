@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from touchline.errors import InputError
 from touchline.model.robot import Robot
 from touchline.model.surface import link_surface
+from touchline.model.transforms import rotation_to_axis
 from touchline.simulation.mujoco_model import build_model
 from touchline.simulation.shapes import surfaces_for_rays
 
@@ -172,7 +173,5 @@ def push_direction(normal: Array, friction: float, rng: np.random.Generator) -> 
     """
     cosine = rng.uniform(1.0 / np.sqrt(1.0 + friction**2), 1.0)
     angle = rng.uniform(0, 2 * np.pi)
-    a = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    a /= np.linalg.norm(a)
-    side = np.cos(angle) * a + np.sin(angle) * np.cross(normal, a)
-    return -cosine * normal + np.sqrt(1.0 - cosine**2) * side
+    side = rotation_to_axis(normal)[:, :2] @ np.array([np.cos(angle), np.sin(angle)])
+    return -cosine * normal - np.sqrt(1.0 - cosine**2) * side

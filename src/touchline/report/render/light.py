@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.model.transforms import rotation_to_axis
 from touchline.report.render.camera import Camera
 from touchline.report.render.raster import box, rasterize
 
@@ -47,9 +48,7 @@ class ShadowMap:
 
     def __init__(self, corners: Array, light: Array, width: int = MAP) -> None:
         self._width = width
-        x = np.cross(np.eye(3)[np.abs(light).argmin()], light)
-        x /= np.linalg.norm(x)
-        self._axes = np.array([x, np.cross(light, x), light])
+        self._axes = rotation_to_axis(light).T
         seen = corners @ self._axes.T
         low, high = box(seen)
         room = 0.08 * (high - low)[:2].max()

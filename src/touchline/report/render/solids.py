@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.model.transforms import pose, rotation_to_axis
 from touchline.report.render.skin import Triangles
 
 Array = NDArray[np.floating[Any]]
@@ -79,10 +80,4 @@ def _turned(profile: Array) -> Triangles:
 
 def _frame(origin: Array, direction: Array) -> Array:
     """A pose (4, 4) whose z axis lies along the direction."""
-    z = direction / np.linalg.norm(direction)
-    x = np.cross(np.eye(3)[np.abs(z).argmin()], z)
-    x /= np.linalg.norm(x)
-    T = np.eye(4)
-    T[:3, :3] = np.column_stack([x, np.cross(z, x), z])
-    T[:3, 3] = origin
-    return T
+    return pose(rotation_to_axis(direction / np.linalg.norm(direction)), np.asarray(origin, float))
