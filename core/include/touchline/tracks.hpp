@@ -69,7 +69,7 @@ class Tracks {
   static constexpr double kNear = 2e-3;        // places that differ by less are the same [m]
   static constexpr double kSlide = 0.5;        // contacts slide no faster [m/s]
   static constexpr double kAnywhere = 1e-2;    // variance of a place before it is known [m2]
-  static constexpr double kDrift = 3e-6;       // of a place's variance [m2/s]
+  static constexpr double kDrift = 1e-8;       // of a place's variance [m2/s]
 
   double young() const { return SegmentContacts::kYoung / bandwidth_; }
   double brief() const { return 1.0 / bandwidth_; }
