@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "arrays.hpp"
+#include "classifier_bindings.hpp"
 #include "contact_bindings.hpp"
 #include "detector_bindings.hpp"
 #include "samples.hpp"
@@ -205,6 +206,7 @@ NB_MODULE(TOUCHLINE_MODULE, m) {
   arrays::initialize();
   bind_enums(m);
   bind_rows(m);
+  classification::bind(m);
   contact::bind(m);
   detection::bind(m);
   nb::class_<tl::Observer>(m, "Observer")

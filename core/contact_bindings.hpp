@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "arrays.hpp"
+#include "touchline/classifier.hpp"
 #include "touchline/localizer.hpp"
 
 namespace contact {
@@ -186,10 +187,32 @@ struct FollowedSample {
   const double *row, *normalized, *levels, *quiet, *q, *qd;
 };
 
-// For each contact on a segment that is touched: sample `i`, segment, number, answer; and for each
-// event that ends: sample, segment, number, event.
-inline void follow(tl::Localizer& l, std::size_t i, const FollowedSample& x,
+// What comes before the answer of a contact that is followed: sample, segment, number, its share of
+// the segment's load, its kind, whether it is clamped (NaN where that is not known), the rate of the
+// segment's force.
+constexpr int kClass = 7;
+
+inline void write(const tl::Localizer& l, const tl::Classifier& c, std::size_t i, int g, int k,
+                  double* out) {
+  const tl::Answer& answer = l.reports()[k].answer;
+  const double share = l.reports().share(k);
+  const bool open = answer.status == tl::Status::not_separable;
+  const double head[kClass] = {static_cast<double>(i),
+                               static_cast<double>(g),
+                               static_cast<double>(l.reports()[k].serial),
+                               share,
+                               static_cast<double>(c.kind(g, share)),
+                               c.clamped(g) ? 1.0 : open ? std::nan("") : 0.0,
+                               c.rate(g)};
+  std::copy(head, head + kClass, out);
+  write(l, answer, out + kClass);
+}
+
+// For each contact on a segment that is touched: its class and its answer; and for each event that
+// ends: sample, segment, number, event.
+inline void follow(tl::Localizer& l, tl::Classifier& c, std::size_t i, const FollowedSample& x,
                    std::vector<double>& answers, std::vector<double>& ended) {
+  c.step(x.time, x.row, x.levels);
   bool ready = false;
   for (std::size_t g = 0; g < l.segments(); ++g) {
     const bool touched = x.levels[g] > 0.0;
@@ -201,12 +224,8 @@ inline void follow(tl::Localizer& l, std::size_t i, const FollowedSample& x,
       memory->serial = -1;
     }
     for (int k = 0; touched && k < l.reports().count(); ++k) {
-      const std::size_t at = answers.size();
-      answers.resize(at + 3 + kWidth);
-      answers[at] = static_cast<double>(i);
-      answers[at + 1] = static_cast<double>(g);
-      answers[at + 2] = static_cast<double>(l.reports()[k].serial);
-      write(l, l.reports()[k].answer, answers.data() + at + 3);
+      answers.resize(answers.size() + kClass + kWidth);
+      write(l, c, i, static_cast<int>(g), k, &*answers.end() - kClass - kWidth);
     }
   }
 }
@@ -218,9 +237,9 @@ inline nb::object table(const std::vector<double>& values, std::size_t columns) 
 }
 
 // N samples.
-inline nb::tuple follow_run(tl::Localizer& l, nb::handle time, nb::handle rows,
-                            nb::handle normalized, nb::handle levels, nb::handle quiet,
-                            nb::handle q, nb::handle qd) {
+inline nb::tuple follow_run(tl::Localizer& l, tl::Classifier& c, nb::handle time,
+                            nb::handle rows, nb::handle normalized, nb::handle levels,
+                            nb::handle quiet, nb::handle q, nb::handle qd) {
   const std::size_t n = l.joints(), m = l.segments(), r = l.tests(), width = l.width();
   const std::size_t count = arrays::length(time);
   const double* stamps = arrays::numbers(time, {count});
@@ -233,15 +252,15 @@ inline nb::tuple follow_run(tl::Localizer& l, nb::handle time, nb::handle rows,
     nb::gil_scoped_release release;
     for (std::size_t i = 0; i < count; ++i) {
       x.time = stamps[i];
-      follow(l, i, x, answers, ended);
+      follow(l, c, i, x, answers, ended);
       x = {0.0, x.row + width, x.normalized + r, x.levels + m, x.quiet + m, x.q + n, x.qd + n};
     }
   }
-  return nb::make_tuple(table(answers, 3 + kWidth), table(ended, event_width(l)));
+  return nb::make_tuple(table(answers, kClass + kWidth), table(ended, event_width(l)));
 }
 
 // One sample.
-inline nb::tuple follow_sample(tl::Localizer& l, double time, nb::handle row,
+inline nb::tuple follow_sample(tl::Localizer& l, tl::Classifier& c, double time, nb::handle row,
                                nb::handle normalized, nb::handle levels, nb::handle quiet,
                                nb::handle q, nb::handle qd) {
   const std::size_t n = l.joints(), m = l.segments();
@@ -250,9 +269,9 @@ inline nb::tuple follow_sample(tl::Localizer& l, double time, nb::handle row,
                          arrays::numbers(quiet, {m}), arrays::numbers(q, {n}),
                          arrays::numbers(qd, {n})};
   std::vector<double> answers, ended;
-  answers.reserve(4 * (3 + kWidth));
-  follow(l, 0, x, answers, ended);
-  return nb::make_tuple(table(answers, 3 + kWidth), table(ended, event_width(l)));
+  answers.reserve(4 * (kClass + kWidth));
+  follow(l, c, 0, x, answers, ended);
+  return nb::make_tuple(table(answers, kClass + kWidth), table(ended, event_width(l)));
 }
 
 // Rows: surface, centre, probability, log of the density.
@@ -336,7 +355,7 @@ inline void bind(nb::module_& m) {
            "quiet"_a.none())
       .def("region", &region)
       .def("events", &events)
-      .def("follow", &follow_run, "time"_a, "rows"_a, "normalized"_a, "levels"_a, "quiet"_a,
+      .def("follow", &follow_run, "classifier"_a, "time"_a, "rows"_a, "normalized"_a, "levels"_a, "quiet"_a,
            "q"_a, "qd"_a)
       .def("follow_sample", &follow_sample);
 }

@@ -100,12 +100,8 @@ class Localizer {
     const Reports& reports = tracks_.reports();
     for (int i = 0; i < reports.ended(); ++i) end(g, reports.ended(i));
     const double strength = measurement_.strength(g, normalized);
-    double sum = 0.0;
-    for (int i = 0; i < reports.count(); ++i) sum += size(reports[i].answer);
-    for (int i = 0; i < reports.count(); ++i) {
-      const double share = reports.count() > 1 && sum > 0.0 ? size(reports[i].answer) / sum : 1.0;
-      remember(g, reports[i], share * strength, time, q);
-    }
+    for (int i = 0; i < reports.count(); ++i)
+      remember(g, reports[i], reports.share(i) * strength, time, q);
   }
 
   const Reports& reports() const { return tracks_.reports(); }
@@ -165,11 +161,6 @@ class Localizer {
     for (Memory& m : memories_[g]) {
       if (m.serial >= 0) ended_.push_back(&m);
     }
-  }
-
-  static double size(const Answer& a) {
-    const double f = norm(a.force);
-    return std::isfinite(f) ? f : 0.0;
   }
 
   // Adds what is said of a contact to its event.

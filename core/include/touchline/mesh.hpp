@@ -14,8 +14,6 @@
 
 namespace touchline {
 
-inline double norm(const Vec3& v) { return std::sqrt(dot(v, v)); }
-
 // A line in space; `direction` is a unit vector.
 struct ForceLine {
   Vec3 origin, direction;

@@ -2,6 +2,8 @@
 // What is said of the contacts on one segment after a sample, each under its number.
 #pragma once
 
+#include <cmath>
+
 #include "touchline/known_contact.hpp"
 #include "touchline/segment_contacts.hpp"
 
@@ -38,6 +40,12 @@ class Reports {
 
   int count() const { return count_; }
   const Report& operator[](int i) const { return reports_[i]; }
+  // How much of the load on the segment each carries; 1 for the only one.
+  double share(int i) const {
+    double sum = 0.0;
+    for (int k = 0; k < count_; ++k) sum += size(k);
+    return count_ > 1 && sum > 0.0 ? size(i) / sum : 1.0;
+  }
   // Numbers of contacts that have ended with this sample.
   int ended() const { return ended_; }
   int ended(int i) const { return endings_[i]; }
@@ -45,6 +53,11 @@ class Reports {
   int next() { return serial_++; }
 
  private:
+  double size(int i) const {
+    const double force = norm(reports_[i].answer.force);
+    return std::isfinite(force) ? force : 0.0;
+  }
+
   const LinkSurfaces& surfaces_;
   Report reports_[kMost];
   int endings_[kMost];

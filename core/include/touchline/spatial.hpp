@@ -79,6 +79,8 @@ using Vec3 = BasicVec3<double>;
 using Mat3 = BasicMat3<double>;
 using Spatial = BasicSpatial<double>;
 
+inline double norm(const Vec3& v) { return std::sqrt(dot(v, v)); }
+
 template <class T>
 BasicMat3<T> identity() {
   const T zero{}, one = zero + 1.0;

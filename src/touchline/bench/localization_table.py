@@ -36,7 +36,8 @@ LEGEND = (
     "surely wrong: as many places as touches, all `located`, but not found; body: the right\n"
     "rigid body named; lengths in mm, force RMS in N; RMS over all that was located, RMS found\n"
     "without what is farther off than 22.5 mm; 90 % holds: share of truths in the 90 % region;\n"
-    "unsure: not answered by `located`; us: median time of Pipeline.update while touched."
+    "unsure: not answered by `located`; us: median time of Pipeline.update while touched,\n"
+    "with position, force, level and clamping of each contact read."
 )
 
 

@@ -18,9 +18,9 @@ from touchline.bench.localization_baselines import baseline_places
 from touchline.bench.matching import distances, match
 from touchline.bench.moving import moving_signals
 from touchline.bench.touches import Signals, Touch, TouchSampler, resting_signals
+from touchline.contact.answer import Answer
 from touchline.contact.detector import Detection
 from touchline.contact.event import Event
-from touchline.contact.localizer import Answer
 from touchline.contact.pipeline import Pipeline
 from touchline.contact.skin import Skin
 from touchline.estimation.observer import Estimate

@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where a segment is touched, and how sure that is."""
 
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from touchline.contact.contact import Candidate
+from touchline.contact.answer import ENDED, NUMBER, Answer, EventAnswer, Names, event_answer
+from touchline.contact.classification import Classifier
 from touchline.contact.detector import Detection, native_noise
 from touchline.contact.region import Region
 from touchline.contact.skin import Skin
@@ -18,64 +16,8 @@ from touchline.native import core
 Array = NDArray[np.float64]
 
 RULES = ("likelihood", "paper")
-STATUS = (None, "located", "ambiguous", "not_separable", "wrench_only")
 FRICTION = 0.8  # coefficient of the friction cone: skin and rubber
 TORQUE_ERROR = 0.02  # a joint's torque sensor is no better, and a touch is no point
-CONTACT = 3  # numbers before an answer or an event: sample, segment, number of the contact
-FORCE, UNKNOWNS = slice(7, 10), 23  # in an answer
-HEAD, OF_CANDIDATE, PER_CANDIDATE = (
-    25,
-    7,
-    6,
-)  # numbers of a native answer (see core/contact_bindings.hpp)
-
-
-@dataclass(frozen=True)
-class Answer:
-    """Where a segment is touched at one instant; what is not known is None.
-
-    Attributes:
-        status: "located", "ambiguous", "not_separable" or "wrench_only"; None without a
-            measurement.
-        link: the link that carries the point, of the rigid `body`.
-        body_probability: of that body, 0 to 1.
-        position: (3,) [m] in world; None where no point is an honest answer.
-        force: (3,) [N] on the robot, in world.
-        covariance: (3, 3) [m2] of the position, along the surface.
-        pitch: how far the wrench is from that of one pure force [standard deviations].
-        chi2: misfit of the best explanation, with `degrees` of freedom.
-        rank: independent equations for contacts that cannot be told apart, of the `unknowns`.
-        candidates: all explanations, best first.
-    """
-
-    status: str | None
-    link: str | None = None
-    body: str | None = None
-    body_probability: float | None = None
-    position: Array | None = None
-    force: Array | None = None
-    covariance: Array | None = None
-    pitch: float | None = None
-    chi2: float | None = None
-    degrees: int = 0
-    rank: int | None = None
-    unknowns: int | None = None
-    candidates: tuple[Candidate, ...] = ()
-
-
-@dataclass(frozen=True)
-class EventAnswer:
-    """Where an event is, from all its strong samples; see `touchline.Event`."""
-
-    status: str
-    link: str | None = None
-    body: str | None = None
-    body_probability: float | None = None
-    position: Array | None = None
-    position_link: Array | None = None
-    time_of_position: float | None = None
-    position_std: float | None = None
-    candidates: tuple[Candidate, ...] = ()
 
 
 class Localizer:
@@ -115,7 +57,7 @@ class Localizer:
             raise ValueError(f"rule is '{rule}', allowed: {', '.join(RULES)}")
         self.observer, self.robot = observer, observer.robot
         self.skin = skin or Skin(self.robot)
-        self._body_names = {body.node: body.name for body in self.robot.bodies}
+        self._names = Names(self.skin.patches, {body.node: body.name for body in self.robot.bodies})
         graspable = self.robot.description.graspable
         settings = core.LocalizerSettings()
         settings.friction = friction
@@ -161,17 +103,23 @@ class Localizer:
         return self.answer(row[0])
 
     def follow(
-        self, time: Array, q: Array, qd: Array, estimate: Estimate, detection: Detection
+        self,
+        classifier: Classifier,
+        time: Array,
+        q: Array,
+        qd: Array,
+        estimate: Estimate,
+        detection: Detection,
     ) -> tuple[Array, Array]:
-        """Takes N samples: answers where a segment is touched, and keeps track of the events.
+        """Takes N samples, and the classifier with it: who is touched where, and how.
 
         Returns:
-            (M, 3 + w): sample, segment, number of the contact, then a native answer for `answer`;
-            one row for each sample and contact on a touched segment. And (E, 3 + v): sample,
-            segment, number of the contact, then a native event, for `event_answer`, of each event
-            that ended.
+            (M, w): a row for each sample and contact on a touched segment, with the columns of
+            `touchline.contact.answer`. And (E, v): sample, segment, number of the contact, then a
+            native event, for `event_answer`, of each event that ended.
         """
         return self.core.follow(
+            classifier.core,
             np.ascontiguousarray(time, float),
             estimate.rows,
             detection.normalized,
@@ -182,10 +130,17 @@ class Localizer:
         )
 
     def follow_sample(
-        self, time: float, q: Array, qd: Array, estimate: Estimate, detection: Detection
+        self,
+        classifier: Classifier,
+        time: float,
+        q: Array,
+        qd: Array,
+        estimate: Estimate,
+        detection: Detection,
     ) -> tuple[Array, Array]:
         """Takes one sample, as `follow` takes N."""
         return self.core.follow_sample(
+            classifier.core,
             time,
             estimate.rows,
             detection.normalized,
@@ -212,38 +167,11 @@ class Localizer:
 
     def open_events(self) -> dict[int, EventAnswer]:
         """The events that last, by the number of the contact."""
-        return {int(row[2]): self.event_answer(row[CONTACT:]) for row in self.core.events()}
+        return {int(row[NUMBER]): self.event_answer(row[ENDED:]) for row in self.core.events()}
 
     def event_answer(self, row: Array) -> EventAnswer:
         """Names the numbers of a native event."""
-        status = STATUS[int(row[0])] or "wrench_only"
-        n = len(self.robot.joint_names)
-        time, variance, q = float(row[1]), float(row[2]), row[4 : 4 + n]
-        places = row[4 + n :].reshape(-1, PER_CANDIDATE)[: int(row[3])]
-        poses = self.robot.poses(q) if len(places) else np.empty((0, 4, 4))
-        candidates = tuple(self._candidate(place, poses) for place in places)
-        if status not in ("located", "ambiguous"):
-            return EventAnswer(status, candidates=candidates)
-        best = candidates[0]
-        T_node_link = self.skin.patches[int(places[0][0])].T_node_link
-        return EventAnswer(
-            status,
-            best.link,
-            best.body,
-            sum(other.probability for other in candidates if other.body == best.body),
-            best.position,
-            T_node_link[:3, :3].T @ (places[0][3:] - T_node_link[:3, 3]),
-            time,
-            float(np.sqrt(variance)),
-            candidates,
-        )
-
-    def _candidate(self, place: Array, poses: Array) -> Candidate:
-        surface, node, share = place[:3]
-        T = poses[int(node)]
-        position = T[:3, :3] @ place[3:] + T[:3, 3]
-        link = self.skin.patches[int(surface)].link
-        return Candidate(link, self._body_names[int(node)], float(share), position)
+        return event_answer(row, self._names, self.robot)
 
     def wrench_covariance(self, segment: str, q: ArrayLike, estimate: Estimate) -> Array:
         """Covariance (6, 6) of a segment's filtered wrench, world axes, about the world origin.
@@ -256,40 +184,4 @@ class Localizer:
 
     def answer(self, row: Array) -> Answer:
         """Names the numbers of a native answer."""
-        status = STATUS[int(row[0])]
-        numbers: dict[str, Any] = {"rank": int(row[22]) or None, "unknowns": int(row[23]) or None}
-        if row[HEAD - 1] == 0:
-            return Answer(status, force=_known(row[7:10]), **numbers)
-        candidates = self.candidates(row)
-        numbers |= {"pitch": float(row[19]), "chi2": float(row[20]), "degrees": int(row[21])}
-        if status in ("not_separable", "wrench_only"):
-            return Answer(status, force=_known(row[7:10]), candidates=candidates, **numbers)
-        return Answer(
-            status,
-            self.skin.patches[int(row[1])].link,
-            self._body_names[int(row[2])],
-            float(row[3]),
-            row[4:7],
-            row[7:10],
-            row[10:19].reshape(3, 3),
-            candidates=candidates,
-            **numbers,
-        )
-
-    def candidates(self, row: Array) -> tuple[Candidate, ...]:
-        """The explanations in a native answer, best first."""
-        parts = row[HEAD:].reshape(-1, OF_CANDIDATE)[: int(row[HEAD - 1])]
-        return tuple(
-            Candidate(
-                self.skin.patches[int(surface)].link,
-                self._body_names[int(node)],
-                float(weight),
-                part[3:6],
-                float(part[6]),
-            )
-            for surface, node, weight, part in ((*part[:3], part) for part in parts)
-        )
-
-
-def _known(values: Array) -> Array | None:
-    return values if np.isfinite(values).all() else None
+        return Answer(row, self._names)

@@ -6,12 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from touchline.contact.answer import ANSWER, NUMBER, SAMPLE, SEGMENT
 from touchline.contact.classification import Classifier
 from touchline.contact.contact import Contact
 from touchline.contact.detector import Detection, Detector
-from touchline.contact.event import Event, EventRecorder
-from touchline.contact.live_contact import LiveContact, LiveStream
-from touchline.contact.localizer import CONTACT, FRICTION, TORQUE_ERROR, Localizer
+from touchline.contact.event import Event
+from touchline.contact.event_recorder import EventRecorder
+from touchline.contact.live_contact import LiveContact, LiveSample
+from touchline.contact.localizer import FRICTION, TORQUE_ERROR, Localizer
 from touchline.contact.skin import Skin
 from touchline.contact.table import ContactTable
 from touchline.contact.zones import Zones
@@ -82,9 +84,9 @@ class Pipeline:
         )
         self.zones = Zones(robot)
         self.classifier = Classifier(self.observer, self.detector.thresholds, self.zones)
-        self.recorder = EventRecorder(self.detector, self.localizer)
+        self.recorder = EventRecorder(self.detector, self.localizer, self.zones)
         self.contacts = ContactTable.empty(self.localizer)
-        self._stream = LiveStream(self.classifier)
+        self._pending: list[LiveSample] = []
         self._touched = b""
         self._idle = np.zeros(len(robot.segment_names)).tobytes()
 
@@ -110,7 +112,7 @@ class Pipeline:
         if touched != self._idle or self._touched != self._idle:
             contacts = self._follow(time, q, qd, estimate, detection, touched)
         else:
-            self.classifier.wait(time, estimate)
+            self.classifier.core.step(float(time), estimate.rows, detection.levels)
         self._touched = touched
         return Result(estimate, contacts, detection, estimate.health)
 
@@ -130,44 +132,44 @@ class Pipeline:
         self._record()
         estimate, detection = self.detector.run(time, q, qd, tau, wrench)
         stamps, q, qd = (np.asarray(signal, dtype=float) for signal in (time, q, qd))
-        answers, ended = self.localizer.follow(stamps, q, qd, estimate, detection)
-        classes = self.classifier.follow(stamps, estimate, detection.levels)
-        ids = self.recorder.add(stamps, q, estimate, detection, classes, answers, ended)
-        sample, segment = answers[:, 0].astype(int), answers[:, 1].astype(int)
-        self.contacts = ContactTable(sample, segment, ids, answers[:, CONTACT:], self.localizer)
+        contacts, ended = self.localizer.follow(self.classifier, stamps, q, qd, estimate, detection)
+        ids = self.recorder.add(stamps, q, estimate, detection, contacts, ended)
+        sample, segment = (contacts[:, column].astype(int) for column in (SAMPLE, SEGMENT))
+        self.contacts = ContactTable(sample, segment, ids, contacts[:, ANSWER:], self.localizer)
         if len(stamps):
             self._touched = detection.levels[-1].tobytes()
         return estimate, detection
 
     def _follow(self, time, q, qd, estimate, detection, touched: bytes) -> list[Contact]:
         q, qd = np.array(q, float), np.ascontiguousarray(qd, float)
-        answers, ended = self.localizer.follow_sample(time, q, qd, estimate, detection)
-        sample = self._stream.add(float(time), q, estimate, detection, answers, ended)
-        numbers = answers[:, 2].tolist()
+        contacts, ended = self.localizer.follow_sample(
+            self.classifier, float(time), q, qd, estimate, detection
+        )
+        self._pending.append(LiveSample(float(time), q, estimate, detection, contacts, ended))
+        numbers = contacts[:, NUMBER].tolist()
         events = self.recorder.open_events(numbers)
         changed = touched != self._touched or len(ended)
-        if changed or len(events) < len(numbers) or len(self._stream.samples) >= PENDING:
+        if changed or len(events) < len(numbers) or len(self._pending) >= PENDING:
             self._record()
             events |= self.recorder.open_events(numbers)  # one may have ended with this sample
         return [
-            LiveContact(sample, row, events[number], self.localizer, self.zones)
-            for row, number in zip(answers, numbers, strict=True)
+            LiveContact(row, estimate, events[number], self.localizer, self.zones)
+            for row, number in zip(contacts, numbers, strict=True)
             if number in events
         ]
 
     def _record(self) -> None:
         """Hands the samples of a live stream on to the events."""
-        if not self._stream.samples:
+        samples, self._pending = self._pending, []
+        if not samples:
             return
-        samples, classes = self._stream.take()
         for i, sample in enumerate(samples):
-            sample.answers[:, 0] = sample.ended[:, 0] = i
+            sample.contacts[:, SAMPLE] = sample.ended[:, SAMPLE] = i
         self.recorder.add(
             np.array([sample.time for sample in samples]),
             np.array([sample.q for sample in samples]),
             self.observer.estimate(np.array([sample.estimate.rows for sample in samples])),
             Detection.joined([sample.detection for sample in samples]),
-            classes,
-            np.concatenate([sample.answers for sample in samples]),
+            np.concatenate([sample.contacts for sample in samples]),
             np.concatenate([sample.ended for sample in samples]),
         )

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.localizer import FORCE, HEAD, STATUS, Localizer
+from touchline.contact.answer import COVARIANCE, FORCE, HEAD, POSITION, PROBABILITY, STATUS, SURFACE
+from touchline.contact.localizer import Localizer
 
 Array = NDArray[np.float64]
 
-SURFACE, NODE, PROBABILITY = 1, 2, 3  # columns of a native answer
-POSITION, COVARIANCE = slice(4, 7), slice(10, 19)
 UPPER = {"pxx": 0, "pxy": 1, "pxz": 2, "pyy": 4, "pyz": 5, "pzz": 8}
 
 
