@@ -217,7 +217,7 @@ def test_a_folder_that_cannot_be_made_is_told_before_the_work(tmp_path):
 
 @pytest.mark.parametrize("plan", [Plan(runs=0), Plan(contacts=()), Plan(robots=())])
 def test_a_plan_of_nothing_is_refused(plan):
-    with pytest.raises(InputError, match="must be at least 1|nothing to run"):
+    with pytest.raises(InputError, match="--runs 0: must be at least 1|nothing to run"):
         main(plan)
 
 

@@ -76,7 +76,7 @@ def test_results_are_written(result, tmp_path):
 def test_bad_options_are_refused_before_anything_runs(tmp_path, capsys):
     with pytest.raises(InputError, match=r"bench.txt', allowed endings: .json, .csv"):
         main(tmp_path / "bench.txt")
-    with pytest.raises(InputError, match="rounds is 0"):
+    with pytest.raises(InputError, match="--rounds 0: must be at least 1"):
         main(rounds=0)
     assert capsys.readouterr().out == ""
 

@@ -11,6 +11,7 @@ from free_motion import free_motion
 
 import touchline as tl
 from touchline.cli import main
+from touchline.cli.bench import BENCHMARKS
 from touchline.logs import write_table
 
 TOUCH = slice(1000, 1200)  # samples
@@ -161,6 +162,15 @@ def test_help_has_an_example_in_every_command(capsys):
     for command in ("demo", "analyze", "check", "bench"):
         assert main([command, "--help"]) == 0
         assert f"Example: touchline {command}" in capsys.readouterr().out
+
+
+def test_every_benchmark_explains_itself(capsys):
+    assert main(["bench", "--help"]) == 0
+    listed = capsys.readouterr().out
+    for name in BENCHMARKS:
+        assert f"\n  {name} " in listed
+        assert main(["bench", name, "--help"]) == 0
+        assert f"Example: touchline bench {name}" in capsys.readouterr().out
 
 
 def test_events_are_numbered_in_the_order_of_detection(robot, tmp_path, monkeypatch):

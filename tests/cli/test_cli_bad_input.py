@@ -3,6 +3,7 @@
 
 import gzip
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -329,3 +330,30 @@ def test_gzip_that_is_none(capsys, tmp_path):
     path = tmp_path / "log.csv.gz"
     path.write_bytes(gzip.compress(b"time,a\n0,1\n")[:10])
     assert "log.csv.gz" in refused(capsys, path, tmp_path / "r")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            "localisation",
+            "benchmark 'localisation'; there are: .*did you mean 'localization'",
+        ),
+        ("--runs 3", "--runs: options belong to one benchmark"),
+        ("observer wrench --seed 1", "--seed: options belong to one benchmark"),
+        ("observer --rounds 0", "--rounds 0: must be at least 1"),
+        ("localization --runs 0", "--runs 0: must be at least 1"),
+        ("localization --seed -1", "--seed -1: must be at least 0"),
+        ("localization --speeds 1 -2", "--speeds -2: must be at least 0"),
+        ("classification --interactions -5", "--interactions -5: must be at least 1"),
+        ("reaction --encounters 0", "--encounters 0: must be at least 1"),
+        ("reaction --guiding nan", "--guiding nan: must be at least 0"),
+        ("wrench --seed -1", "--seed -1: must be at least 0"),
+        ("detection --hours -1", "--hours -1: must be a positive number"),
+        ("detection --hours inf", "--hours inf: must be a positive number"),
+        ("detection --pushes 0", "--pushes 0: must be at least 1"),
+    ],
+)
+def test_a_benchmark_is_told_what_it_cannot_do(arguments, message, capsys):
+    assert main(["bench", *arguments.split()]) == 2
+    assert re.search(message, capsys.readouterr().err)

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from touchline.bench.interactions import BEGIN, Interaction, InteractionSampler
+from touchline.bench.request import check_least, prepare_results
 from touchline.bench.tables import Row, aligned
 from touchline.bench.touches import TouchSampler
 from touchline.contact.event import Event
@@ -152,6 +153,9 @@ def main(count: int = 2000, seed: int = 0, out: Path | None = None) -> None:
     """
     from tqdm import tqdm
 
+    check_least(1, interactions=count)
+    check_least(0, seed=seed)
+    prepare_results(out)
     verdicts: list[Verdict] = []
     with tqdm(total=count, desc="classification", disable=None, leave=False) as bar:
         for part in judge_all(count, seed):
@@ -160,7 +164,6 @@ def main(count: int = 2000, seed: int = 0, out: Path | None = None) -> None:
     print(f"classification benchmark: sara, {count} interactions; rows: what it was\n")
     print(tables(verdicts))
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
         with (out / "classification.csv").open("w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, list(asdict(verdicts[0])))
             writer.writeheader()

@@ -24,6 +24,7 @@ from touchline.bench.detection_work import (
     joined,
     pieces,
 )
+from touchline.bench.request import check_least, check_positive, prepare_results
 from touchline.bench.tables import Row, aligned
 from touchline.contact.calibration import Statistics, count_alarms, fit_tails
 from touchline.contact.tail import Tail, poisson_interval
@@ -277,6 +278,9 @@ def main(hours: float = 1.0, trials: int = TRIALS, out: Path | None = None) -> N
         trials: pushes of each force.
         out: folder for roc.csv, tails.csv and figures.
     """
+    check_positive(hours=hours)
+    check_least(1, pushes=trials)
+    prepare_results(out)
     outcomes = []
     with Pool() as pool:
         for setting in SETTINGS:
@@ -292,7 +296,6 @@ def main(hours: float = 1.0, trials: int = TRIALS, out: Path | None = None) -> N
     if out is not None:
         from touchline.bench.detection_drawing import draw
 
-        out.mkdir(parents=True, exist_ok=True)
         write_tables(outcomes, out)
         draw(outcomes, RATES, GOALS, LAYOUTS, out)
         print(f"\n{out}: roc.csv, tails.csv, figures")

@@ -11,7 +11,6 @@ import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
-from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
 from time import perf_counter
@@ -36,6 +35,7 @@ from touchline.bench.localization_trial import (
     make_scene,
     run_trial,
 )
+from touchline.bench.request import check_least, prepare_results
 from touchline.errors import InputError
 
 CHUNK = 25  # runs handed to a process at once
@@ -133,12 +133,11 @@ def main(plan: Plan | None = None, out: Path | None = None, processes: int | Non
     from tqdm import tqdm
 
     plan = plan or Plan()
-    if plan.runs < 1:
-        raise InputError(f"runs is {plan.runs}, must be at least 1")
+    check_least(1, runs=plan.runs)
+    check_least(0, seed=plan.seed, **{"speeds": min(plan.speeds, default=0.0)})
     if not plan.cells():
         raise InputError("nothing to run: one of robots, contacts, noise, begin, speeds is empty")
-    if out is not None:
-        _prepare(out)
+    prepare_results(out)
     for arm in plan.robots:
         arm_and_skin(arm, plan.noise[0])  # a missing model is told before the work
     cells = plan.cells()
@@ -161,15 +160,6 @@ def main(plan: Plan | None = None, out: Path | None = None, processes: int | Non
 
         save_figures(out, trials)
         print(f"\nTables, every touch, and figures are in {out}")
-
-
-def _prepare(out: Path) -> None:
-    """Makes the folder, and misses before the work what is missing."""
-    import_module("matplotlib")
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{out}: cannot be used as a directory: {error.strerror}") from error
 
 
 def write(path: Path, trials: Sequence[Trial]) -> None:

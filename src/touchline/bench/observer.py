@@ -16,6 +16,7 @@ import numpy as np
 
 from touchline.bench.discretization import DiscretizationError, discretization_errors
 from touchline.bench.motion import Motion, fast_motion, pushed_link
+from touchline.bench.request import check_least
 from touchline.bench.robots import sara_like
 from touchline.bench.tables import error_table, timing_table
 from touchline.bench.timing import Candidate, Timing, measure
@@ -258,8 +259,7 @@ def main(output: Path | None = None, rounds: int = 40, robot: Robot | None = Non
     """
     if output is not None and output.suffix not in (".json", ".csv"):
         raise InputError(f"output is '{output}', allowed endings: .json, .csv")
-    if rounds < 1:
-        raise InputError(f"rounds is {rounds}, must be at least 1")
+    check_least(1, rounds=rounds)
     result = run_benchmark(robot, rounds)
     print(result)
     if output is not None:

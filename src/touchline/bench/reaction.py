@@ -20,6 +20,7 @@ import numpy as np
 
 from touchline.bench.guiding import PART, Guided, guide, told
 from touchline.bench.reaction_trial import QUIET, SCENES, Case, Trial, cases, play
+from touchline.bench.request import check_least, prepare_results
 from touchline.bench.tables import Row, aligned
 from touchline.contact.reaction import REACTIONS
 
@@ -120,6 +121,9 @@ def main(encounters: int = 2, hours: float = 1.0, out: Path | None = None) -> No
         hours: of guiding by the handle; 0 leaves it out.
         out: folder for `reaction.csv`, one row for each encounter and reaction, and figures.
     """
+    check_least(1, encounters=encounters)
+    check_least(0, guiding=hours)
+    prepare_results(out)
     todo = list(cases(encounters))
     trials = run_trials(todo)
     print(f"reaction benchmark: sara, {len(todo)} encounters, each with every reaction; medians")
@@ -131,7 +135,6 @@ def main(encounters: int = 2, hours: float = 1.0, out: Path | None = None) -> No
     if out is not None:
         from touchline.bench.reaction_figure import save_figures
 
-        out.mkdir(parents=True, exist_ok=True)
         write(out / "reaction.csv", trials)
         save_figures(out, trials)
 

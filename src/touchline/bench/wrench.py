@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from touchline.bench.request import check_least, prepare_results
 from touchline.bench.wrench_methods import METHODS, Method
 from touchline.bench.wrench_scenarios import Scenario, scenarios
 from touchline.bench.wrench_scores import DEFAULT, MARGIN, TIE, Outcome, run_scenario
@@ -104,14 +105,8 @@ def main(out: Path | None = None, seed: int = 0) -> None:
         InputError: the directory cannot be made.
         ModuleNotFoundError: figures are wanted and matplotlib is missing.
     """
-    if out is not None:
-        from importlib import import_module
-
-        import_module("matplotlib")  # better missed now than after the work
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{out}: cannot be used as a directory: {error.strerror}") from error
+    check_least(0, seed=seed)
+    prepare_results(out)
     result = run_benchmark(seed)
     print(result)
     if out is not None:

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """`touchline COMMAND`: finds the command, runs it, and turns errors into messages."""
 
+import inspect
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from itertools import takewhile
 
 from touchline import __version__
 from touchline.cli.analyze import analyze
-from touchline.cli.bench import bench
+from touchline.cli.bench import BENCHMARKS, bench
 from touchline.cli.calibrate import calibrate
 from touchline.cli.check import check
 from touchline.cli.demo import demo
@@ -37,6 +39,15 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "reproduce": reproduce,
     "bench": bench,
 }
+
+BENCH_USAGE = """\
+{text}
+
+usage: touchline bench [NAME] [OPTIONS], or several names; without a name: all of them
+
+{commands}
+
+`touchline bench NAME --help` explains one and its options."""
 
 EXTRAS = {
     "pyarrow": "logs",
@@ -85,29 +96,52 @@ def _dispatch(arguments: list[str]) -> int:
     if name == "--version":
         print(f"touchline {__version__}")
         return 0
-    if name not in COMMANDS:
+    _check_name("command", name, COMMANDS)
+    return _bench(rest) if name == "bench" else _run(COMMANDS[name], name, rest)
+
+
+def _bench(arguments: list[str]) -> int:
+    names = list(takewhile(lambda word: not word.startswith("-"), arguments))
+    options = arguments[len(names) :]
+    for name in names:
+        _check_name("benchmark", name, BENCHMARKS)
+    if not names and options in (["-h"], ["--help"]):
+        text = inspect.cleandoc(bench.__doc__ or "")
+        print(BENCH_USAGE.format(text=text, commands=_listing(BENCHMARKS, 16)))
+        return 0
+    if options and len(names) != 1:
+        raise InputError(f"{options[0]}: options belong to one benchmark: touchline bench NAME ...")
+    if not names:
+        return bench()
+    return max([_run(BENCHMARKS[name], f"bench {name}", options) for name in names])
+
+
+def _check_name(kind: str, name: str, known: Iterable[str]) -> None:
+    if name not in known:
         raise InputError(
-            f"unknown command '{name}'; there are: {', '.join(COMMANDS)}"
-            f"{did_you_mean(name, COMMANDS)}"
+            f"unknown {kind} '{name}'; there are: {', '.join(known)}{did_you_mean(name, known)}"
         )
-    return _run(name, rest)
 
 
-def _run(name: str, arguments: list[str]) -> int:
+def _run(command: Callable[..., int], name: str, arguments: list[str]) -> int:
     import tyro
 
     try:
-        return int(tyro.cli(COMMANDS[name], prog=f"touchline {name}", args=arguments))
+        return int(tyro.cli(command, prog=f"touchline {name}", args=arguments))
     except SystemExit as stop:  # help, or arguments that cannot be understood
         return stop.code if isinstance(stop.code, int) else 2
 
 
 def _usage() -> str:
+    return USAGE.format(commands=_listing(COMMANDS, 10))
+
+
+def _listing(commands: dict[str, Callable[..., int]], width: int) -> str:
     lines = []
-    for name, command in COMMANDS.items():
+    for name, command in commands.items():
         text = (command.__doc__ or "").splitlines()
-        lines += [f"  {name:10}{text[0]}", f"{'':12}{_example(text)}"]
-    return USAGE.format(commands="\n".join(lines))
+        lines += [f"  {name:{width}}{text[0]}", f"{'':{width + 2}}{_example(text)}"]
+    return "\n".join(lines)
 
 
 def _example(lines: list[str]) -> str:

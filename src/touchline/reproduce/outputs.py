@@ -8,25 +8,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.errors import InputError
 from touchline.figure import save
+from touchline.folder import make_folder
 from touchline.reproduce.experiment import Experiment, Row
 from touchline.reproduce.page import page_text
 
 Array = NDArray[np.float64]
-
-
-def make_folder(path: Path) -> Path:
-    """Makes sure that a folder exists.
-
-    Raises:
-        InputError: it cannot be made.
-    """
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be used as a directory: {error.strerror}") from error
-    return path
 
 
 def write_experiment(experiment: Experiment, out: Path) -> None:

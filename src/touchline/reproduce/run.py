@@ -7,8 +7,9 @@ from importlib import import_module
 from pathlib import Path
 
 from touchline.errors import InputError
+from touchline.folder import make_folder
 from touchline.reproduce.experiment import Experiment
-from touchline.reproduce.outputs import make_folder, write_experiment, write_page
+from touchline.reproduce.outputs import write_experiment, write_page
 from touchline.suggest import did_you_mean
 
 EXPERIMENTS = {
