@@ -36,9 +36,10 @@ class Explanations {
   Explanations(const Explanations&) = delete;
   Explanations& operator=(const Explanations&) = delete;
 
-  // Finds all that may explain segment g; `measurement` has read it. `lag`: the age of what its
-  // wrench speaks of [s].
-  void find(int g, double lag, Measurement& measurement) {
+  // Finds all that may explain segment g; `measurement` has read it. `mean(node)`: where a body was
+  // when it felt what the wrench speaks of, and `doubt`: which part of the way since is not known.
+  template <class MeanOf>
+  void find(int g, MeanOf&& mean, double doubt, Measurement& measurement) {
     count_ = used_ = 0;
     best_ = std::numeric_limits<double>::infinity();
     for (const Body& body : surfaces_.bodies(g)) {
@@ -49,8 +50,8 @@ class Explanations {
       view.q = measurement.quadratic(body.node);
       if (measurement.has_wrench()) {
         const double* w = measurement.wrench();
-        view.allow_for_motion(posture_.twist(body.node), posture_.pose(body.node).p, lag,
-                              norm(Vec3{w[0], w[1], w[2]}));
+        view.allow_for_motion(posture_.pose(body.node), mean(body.node),
+                              norm(Vec3{w[0], w[1], w[2]}), doubt);
       }
       view.begin();
     }

@@ -50,7 +50,7 @@ class JointFit {
     count_ = count;
     const int n = kEach * count;
     fill(measurement, known, count);
-    double* b = solution_;
+    double* b = rhs_;
     for (int i = 0; i < n; ++i) b[i] = 0.0;
     std::fill(factor_, factor_ + n * n, 0.0);
     double cost = 0.0;
@@ -62,14 +62,36 @@ class JointFit {
       }
       cost += d[n] * d[n];
     }
-    std::copy(factor_, factor_ + n * n, information_);
-    std::copy(b, b + n, rhs_);
-    places_before(known, count);
-    add_prior(factor_, sigma);
-    if (!cholesky(factor_, n)) return std::numeric_limits<double>::infinity();
-    solve_cholesky(factor_, n, b);
-    for (int i = 0; i < n; ++i) cost -= rhs_[i] * b[i];
-    return cost;
+    return solve(known, sigma, cost);
+  }
+
+  // The same of one contact, whose body was at the mean place `then` when it felt the wrench that
+  // `q` tells of.
+  double fit_alone(const Quadratic& q, const KnownContact& k, const Pose& then, double sigma) {
+    count_ = 1;
+    const Vec3 p = then.R * k.point + then.p, axes[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    Vec3 along[2];
+    tangents(k.normal, along[0], along[1]);
+    double w[6], rest[6], D[kEach][6];
+    for (int i = 0; i < 3; ++i) wrench_of(p, axes[i], D[i]);
+    for (int i = 0; i < 2; ++i) store({{}, cross(then.R * along[i], k.force)}, D[3 + i]);
+    wrench_of(p, k.force, w);
+    for (int r = 0; r < 6; ++r) {
+      rest[r] = q.vector[r];
+      for (int c = 0; c < 6; ++c) rest[r] -= q.information[6 * r + c] * w[c];
+    }
+    for (int i = 0; i < kEach; ++i) {
+      rhs_[i] = 0.0;
+      for (int r = 0; r < 6; ++r) rhs_[i] += D[i][r] * rest[r];
+      for (int j = 0; j <= i; ++j) {
+        double sum = 0.0;
+        for (int r = 0; r < 6; ++r) {
+          for (int c = 0; c < 6; ++c) sum += D[i][r] * q.information[6 * r + c] * D[j][c];
+        }
+        factor_[kEach * i + j] = sum;
+      }
+    }
+    return solve(&k, &sigma, q(w));
   }
 
   // Takes the forces of the last fit over.
@@ -172,6 +194,19 @@ class JointFit {
   }
 
  private:
+  // Of the unknowns, from their information in `factor_` and `rhs_`; `cost`: that of the last values.
+  double solve(const KnownContact* known, const double* sigma, double cost) {
+    const int n = kEach * count_;
+    std::copy(factor_, factor_ + n * n, information_);
+    std::copy(rhs_, rhs_ + n, solution_);
+    places_before(known, count_);
+    add_prior(factor_, sigma);
+    if (!cholesky(factor_, n)) return std::numeric_limits<double>::infinity();
+    solve_cholesky(factor_, n, solution_);
+    for (int i = 0; i < n; ++i) cost -= rhs_[i] * solution_[i];
+    return cost;
+  }
+
   static constexpr double kUncertainWay = 0.1;  // of the way that a contact has come
   static constexpr double kSharpest = 1e-8;     // variance of a place [m2]
 

@@ -50,6 +50,12 @@ class KnownFit {
     return fit_.fit(measurement_, known, count, sigma) < limit(3 * count);
   }
 
+  // Does a sole one, if `mean` is where its body was when it felt what `q` says of its wrench?
+  bool explain_alone(const KnownContact& known, Quadratic q, const Mean& mean) {
+    q.shift({{}, mean.moment});
+    return fit_.fit_alone(q, known, mean.pose, free_) < limit(3);
+  }
+
  private:
   // What chi2 does not exceed, with so many unknowns.
   double limit(int unknowns) const {

@@ -87,7 +87,7 @@ class Localizer {
     SegmentContacts& s = states_[g];
     ended_.clear();
     if (touched && !s.touched) {
-      const int first = tracks_.next();
+      const int first = tracks_.begin(g);
       s = SegmentContacts{};
       s.first = first;
       s.age.restart(time);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "touchline/dense.hpp"
+#include "touchline/spatial.hpp"
 
 namespace touchline {
 
@@ -22,6 +23,20 @@ struct Quadratic {
       chi2 += row * w[i];
     }
     return chi2;
+  }
+
+  // Measured is not w but w + `more`.
+  void shift(const Spatial& more) {
+    double d[6], product[6];
+    store(more, d);
+    for (int i = 0; i < 6; ++i) {
+      product[i] = 0.0;
+      for (int j = 0; j < 6; ++j) product[i] += information[6 * i + j] * d[j];
+    }
+    for (int i = 0; i < 6; ++i) {
+      constant += d[i] * (product[i] - 2.0 * vector[i]);
+      vector[i] -= product[i];
+    }
   }
 };
 

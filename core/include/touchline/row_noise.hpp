@@ -65,8 +65,9 @@ class RowNoise {
   }
 
   // The lower triangle of the covariance (size, size) of the first rows, of which `forces` are
-  // forces.
-  void covariance(int size, int forces, double* out) const {
+  // forces; `speed2`: sum of squares of the joints' velocities.
+  void covariance(int size, int forces, double speed2, double* out) const {
+    const double motion = 1.0 + speed2 / (kFast * kFast);
     for (int a = 0; a < size; ++a) {
       for (int b = 0; b <= a; ++b) {
         const double* x = coefficients_.data() + a * sources_;
@@ -76,11 +77,13 @@ class RowNoise {
         out[a * size + b] = sum;
       }
       const double least = a < forces ? figures_.force : figures_.moment;
-      out[a * size + a] += least * least;
+      out[a * size + a] += motion * least * least;
     }
   }
 
  private:
+  static constexpr double kFast = 3.0;  // the trapezoid errs noticeably [rad/s]
+
   // How a first-order filter passes noise: of readings, averaged over each interval, and of
   // velocities, which enter through a difference of momenta.
   struct Gains {

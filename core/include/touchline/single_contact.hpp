@@ -20,26 +20,21 @@ class SingleContact {
   SingleContact(const Observer& observer, const Posture& posture, const LocalizerSettings& settings,
                 std::vector<LinkSurface> surfaces)
       : observer_(observer),
+        posture_(posture),
         settings_(settings),
         found_(observer, posture, settings, std::move(surfaces)) {}
 
   // The contact on segment g, which `measurement` has read; its wrench is `lag` [s] old.
   const Answer& locate(int g, double lag, Measurement& measurement) {
-    clear();
-    if (measurement.has_wrench()) {
-      const double* w = measurement.wrench();
-      answer_.force = {w[0], w[1], w[2]};
-    }
-    if (settings_.first_entry) {
-      first_entry(g, measurement);
-    } else if (measurement.has_wrench() && weak(measurement)) {
-      answer_.status = Status::wrench_only;
-    } else {
-      found_.find(g, lag, measurement);
-      weigh();
-      conclude(g, measurement);
-    }
-    return answer_;
+    const auto mean = [&](int node) {
+      return steady_mean(posture_.pose(node), posture_.twist(node), lag);
+    };
+    return locate(g, mean, kDoubt, measurement);
+  }
+
+  // The same, if it is known where the bodies were when they felt it.
+  const Answer& locate(int g, const Past& past, Measurement& measurement) {
+    return locate(g, [&](int node) { return past.mean(node); }, kRemembered, measurement);
   }
 
   // Nothing is known.
@@ -58,6 +53,27 @@ class SingleContact {
  private:
   static constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   static constexpr double kNegligible = 10.0;  // of the log posterior, below the best
+  // Of the way that a contact has come: unknown.
+  static constexpr double kDoubt = 0.1, kRemembered = 0.02;
+
+  template <class MeanOf>
+  const Answer& locate(int g, MeanOf&& mean, double doubt, Measurement& measurement) {
+    clear();
+    if (measurement.has_wrench()) {
+      const double* w = measurement.wrench();
+      answer_.force = {w[0], w[1], w[2]};
+    }
+    if (settings_.first_entry) {
+      first_entry(g, measurement);
+    } else if (measurement.has_wrench() && weak(measurement)) {
+      answer_.status = Status::wrench_only;
+    } else {
+      found_.find(g, mean, doubt, measurement);
+      weigh();
+      conclude(g, measurement);
+    }
+    return answer_;
+  }
 
   // Too small a force to draw a line.
   bool weak(const Measurement& measurement) const {
@@ -226,6 +242,7 @@ class SingleContact {
   }
 
   const Observer& observer_;
+  const Posture& posture_;
   const LocalizerSettings& settings_;
   Explanations found_;
   Answer answer_;

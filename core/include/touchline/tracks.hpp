@@ -6,8 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "touchline/known_fit.hpp"
+#include "touchline/past.hpp"
 #include "touchline/reports.hpp"
 #include "touchline/segment_contacts.hpp"
 #include "touchline/single_contact.hpp"
@@ -28,6 +30,7 @@ class Tracks {
         fit_(measurement.posture(), single.surfaces(), rows),
         known_(measurement, fit_, settings.force_scale),
         reports_(single.surfaces()),
+        pasts_(segments, Past(measurement.posture().nodes().size())),
         twins_(single.surfaces(), measurement, settings, fit_, known_, reports_, rows, segments) {}
 
   // One sample of segment g: fills the reports. `read()` takes the measurement anew.
@@ -48,6 +51,7 @@ class Tracks {
     total_ = force();
     const double age = s.age.follow(total_, bandwidth, time);
     lag_ = age / bandwidth;
+    pasts_[g].follow(total_, bandwidth, time, measurement_.posture());
     for (int c = 0; c < s.count; ++c) {
       if (!s.arriving || s.count > 1)
         s.known[c].lag = s.known[c].age.follow(s.known[c].force, bandwidth, time) / bandwidth;
@@ -61,9 +65,14 @@ class Tracks {
     }
   }
 
+  // Segment g is touched anew.
+  int begin(int g) {
+    pasts_[g].restart();
+    return reports_.next();
+  }
+
   // What is said after the last sample.
   const Reports& reports() const { return reports_; }
-  int next() { return reports_.next(); }
 
  private:
   static constexpr double kNear = 2e-3;        // places that differ by less are the same [m]
@@ -86,7 +95,9 @@ class Tracks {
   // --- one contact, as far as is known ---
   template <class Read>
   void sole(SegmentContacts& s, Read&& read) {
-    const Answer& a = single_.locate(g_, lag_, measurement_);
+    const Past& past = pasts_[g_];
+    const Answer& a = past.known() ? single_.locate(g_, past, measurement_)
+                                   : single_.locate(g_, lag_, measurement_);
     if (s.count == 0) {
       if (a.status == Status::not_separable) {
         s.explains = false;
@@ -108,16 +119,23 @@ class Tracks {
     if (agrees(s.known[0], a, single_.surfaces(), kNear)) {
       report(s.known[0].serial, a);
       const bool due = time_ - s.updated >= SegmentContacts::kRefit / bandwidth_;
-      if (due && known_.explain_freely(s.known, 1)) accept(s);
+      if (due && explains(s.known[0])) accept(s);
       return;
     }
-    if (known_.explain_freely(s.known, 1)) {
+    if (explains(s.known[0])) {
       report(s.known[0].serial, a);
       return;
     }
     begin_arrival(s);
     read();
     arrive(s, read);
+  }
+
+  // Does a sole contact explain all, with its force free?
+  bool explains(const KnownContact& k) {
+    const Past& past = pasts_[g_];
+    return past.known() ? known_.explain_alone(k, measurement_.quadratic(k.node), past.mean(k.node))
+                        : known_.explain_freely(&k, 1);
   }
 
   // A contact has become known.
@@ -178,7 +196,7 @@ class Tracks {
       if (lasting && !found) reports_.doubt_last();
     }
     if (!found && !lasting) return;
-    if (s.newcomer < 0) s.newcomer = next();
+    if (s.newcomer < 0) s.newcomer = reports_.next();
     report(s.newcomer, a);
   }
 
@@ -278,7 +296,7 @@ class Tracks {
 
   template <class Read>
   void commit(SegmentContacts& s, const Answer& a, Read&& read) {
-    if (s.newcomer < 0) s.newcomer = next();
+    if (s.newcomer < 0) s.newcomer = reports_.next();
     std::copy(s.before.known, s.before.known + s.count, s.known);
     for (int c = 0; c < s.count; ++c) report(s.known[c]);
     report(s.newcomer, a);
@@ -347,6 +365,7 @@ class Tracks {
   Answer answer_;
   bool freed_ = false;  // was it found with the forces of the known contacts free?
   Reports reports_;
+  std::vector<Past> pasts_;  // per segment: of its whole wrench
   Twins twins_;
   int g_ = 0;
   double bandwidth_ = 0.0, time_ = 0.0, lag_ = 0.0;

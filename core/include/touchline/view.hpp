@@ -9,6 +9,7 @@
 #include "touchline/dense.hpp"
 #include "touchline/hypothesis.hpp"
 #include "touchline/link_surfaces.hpp"
+#include "touchline/past.hpp"
 #include "touchline/quadratic.hpp"
 
 namespace touchline {
@@ -40,25 +41,30 @@ struct View {
   Spatial wrench;      // the pure force that explains best
   bool met = false;    // does its line meet the body, and steeply enough?
   bool steep = false;
-  // How far the body has moved since the time that the filtered wrench speaks of: at the world
-  // origin, and turned.
-  Vec3 shift, turn;
-  double width = 0.0;  // log of how much that adds to the spread of the measurements
+  double width = 0.0;  // log of how much motion adds to the spread of the measurements
 
-  Vec3 earlier(const Vec3& point) const { return point - shift - cross(turn, point); }
+  // Where a point of the body was at the time that the filtered wrench speaks of.
+  Vec3 earlier(const Vec3& point) const { return before + back * (point - now); }
   // The line of points of that time, as it is carried along.
   ForceLine later_line() const {
     const ForceLine line = line_of(wrench);
-    const Vec3 direction = line.direction + cross(turn, line.direction);
-    return {line.origin + shift + cross(turn, line.origin), (1.0 / norm(direction)) * direction};
+    const Vec3 direction = onward(line.direction);
+    return {now + onward(line.origin - before), (1.0 / norm(direction)) * direction};
   }
 
-  // The body moves with `twist` (about the world origin, its frame at `centre`), and the wrench of
-  // `force` [N] is `lag` [s] old. The way come since is known but for a part of it.
-  void allow_for_motion(const Spatial& twist, const Vec3& centre, double lag, double force) {
-    shift = lag * twist.linear;
-    turn = lag * twist.angular;
-    const double moment = kUncertainWay * norm(shift + cross(turn, centre)) * force;
+  // The body is at `here`, and was at `mean` when it felt the filtered wrench of `force` [N]. The
+  // way come since is known but for the part `doubt`.
+  void allow_for_motion(const Pose& here, const Mean& mean, double force, double doubt) {
+    const Mat3& R = here.R;
+    const Mat3& M = mean.pose.R;
+    now = here.p;
+    before = mean.pose.p;
+    back = {M * Vec3{R.x.x, R.y.x, R.z.x}, M * Vec3{R.x.y, R.y.y, R.z.y},
+            M * Vec3{R.x.z, R.y.z, R.z.z}};  // M R^T
+    q.shift({{}, mean.moment});
+    const double way = norm(now - before) + kReach * norm(back.x - Vec3{1.0, 0.0, 0.0}) +
+                       kReach * norm(back.y - Vec3{0.0, 1.0, 0.0});
+    const double moment = doubt * way * force;
     if (moment > 1e-6) width = loosen(q, moment);
   }
 
@@ -99,10 +105,18 @@ struct View {
   }
 
  private:
-  static constexpr double kUncertainWay = 0.1;  // of the way since then
+  static constexpr double kReach = 0.15;  // of a body, from its origin [m]
   static constexpr double kRidge = 1e-7;        // information on any wrench, where there is none
   static constexpr double kExact = 1e-6;        // sigmas of the pitch that is left
 
+  // A vector fixed on the body, from that time to now.
+  Vec3 onward(const Vec3& v) const {
+    const Vec3 yz = cross(back.y, back.z), zx = cross(back.z, back.x), xy = cross(back.x, back.y);
+    return (1.0 / dot(back.x, yz)) * Vec3{dot(yz, v), dot(zx, v), dot(xy, v)};
+  }
+
+  Vec3 now, before;                // the body's origin
+  Mat3 back = identity<double>();  // turns vectors fixed on the body to where they were
   double factor_[36] = {}, best_[6] = {};
 };
 
