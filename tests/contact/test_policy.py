@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The policy table: which rule decides, and what is said of bad keys."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -74,6 +76,21 @@ def test_a_collision_goes_before_a_contact_and_stays_until_reset():
     assert reactor.update([soft], state_of(robot, 0.3)).reaction == "stop"
     reactor.reset()
     assert reactor.update([], state_of(robot, 0.4)).reaction == "ignore"
+
+
+def test_a_contact_that_turns_out_to_be_a_collision_does_not_begin_anew():
+    robot, begun = tl.load_robot("sara"), []
+
+    def own(contact, state):
+        begun.append(state.since.time)
+        return state.torque
+
+    reactor = Reactor(robot, PolicyDescription(rules=[PolicyRule("own:it")]), {"it": own})
+    touches = [contact(), contact("collision"), contact("collision")]
+    touches[2] = replace(touches[2], event=1)
+    for i, touch in enumerate(touches):
+        assert reactor.update([touch], state_of(robot, 0.1 * i)).reaction == "own:it"
+    assert begun == [0.0, 0.0, 0.0]
 
 
 def test_a_reaction_of_ones_own_is_called_and_its_torques_are_cut():

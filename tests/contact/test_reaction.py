@@ -134,6 +134,18 @@ def test_retract_accelerates_the_point_along_the_force(seed, link):
         assert lever @ acceleration > 0.0
 
 
+@pytest.mark.parametrize("name", ["stop", "retract"])
+def test_what_is_no_blow_is_answered_without_a_jerk(sara, name):
+    state = state_of(sara, 4, speed=0.3)
+    held = replace(contact_of(state, "link5", 4), level="contact")
+    torques = []
+    for age in (0.0, 0.001, 0.1):
+        since = Since(state.time - age, state.q)
+        torques.append(REACTIONS[name](held, replace(state, since=since)))
+    begin, soon, late = (np.abs(torque - state.bias_torque).max() for torque in torques)
+    assert begin == 0.0 < soon < 0.1 * late
+
+
 def test_a_joint_near_its_limit_is_braked_and_that_is_told(sara):
     state = state_of(sara, 3)
     q, qd = np.zeros(7), np.zeros(7)

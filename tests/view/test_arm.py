@@ -18,6 +18,7 @@ from touchline.view.motion import EASE, Switched
 from touchline.view.readout import Speed, readout
 
 FRAME = 33  # samples
+PART = 5  # samples, after which the arm may react
 
 
 @pytest.fixture(scope="module")
@@ -37,12 +38,15 @@ class Room:
         self.judge = Judge(sara)
         self.go(0.2)
 
-    def go(self, seconds):
-        """Verdicts after some time, by segment."""
-        for _ in range(round(seconds * 1000 / FRAME)):
-            samples, truth = self.arm.advance(FRAME)
+    def go(self, seconds, rows=FRAME):
+        """Verdicts after some time, by segment; `speeds` are the largest of each part."""
+        self.speeds = []
+        for _ in range(round(seconds * 1000 / rows)):
+            samples, truth = self.arm.advance(rows)
             self.felt = self.method.take(samples)
+            self.arm.feel(self.felt.contacts, self.felt.tau_ext)
             verdicts = self.judge.judge(self.felt, truth, self.arm.hands.active())
+            self.speeds.append(np.abs(samples.qd).max())
         return {verdict.segment: verdict for verdict in verdicts}
 
     def surface(self, link):
@@ -197,28 +201,33 @@ def test_a_hand_with_a_target_pulls_like_a_spring_up_to_its_limit():
 def test_the_arm_reacts_and_goes_back_to_its_motion_when_it_is_left_alone(robots, reaction):
     room = Room(robots, stiffness=0.5, moving=True)
     room.arm.set(Conditions(moving=True, stiffness=0.5, reaction=reaction))
-
-    def go(seconds):
-        speeds = []
-        for _ in range(round(seconds * 1000 / 5)):
-            samples, truth = room.arm.advance(5)
-            room.arm.feel(room.method.take(samples).contacts)
-            speeds.append(np.abs(samples.qd).max())
-        return np.array(speeds), truth
-
-    go(2.5)
+    room.go(2.5, PART)
     assert room.arm.reacting is None
     room.arm.press(*room.surface("link4")[:2], 20.0)
-    speeds, _ = go(0.6)
+    room.go(0.6, PART)
     assert room.arm.reacting == reaction
+    # Its own jerk would look like a blow.
+    assert [contact.level for contact in room.felt.contacts] == ["contact"]
     if reaction == "stop":
-        assert speeds[-20:].max() < 0.02 < speeds[0]
+        assert max(room.speeds[-20:]) < 0.02 < room.speeds[0]
     room.arm.hands.release_all()
-    speeds, _ = go(4.0)
+    room.go(4.0, PART)
     assert room.arm.reacting is None
-    assert speeds[-200:].max() > 0.05 and speeds.max() < 3.0
+    assert max(room.speeds[-200:]) > 0.05 and max(room.speeds) < 3.0
     goal = room.arm._trajectory(room.arm.time)
     assert np.abs(goal.q - room.arm.q).max() < 0.05
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_whatever_method_feels_the_push_the_arm_moves_away_from_it(robots, method):
+    room = Room(robots, method, stiffness=1.0, reaction="retract")
+    room.go(0.3)
+    hand = room.arm.press(*room.surface("link4")[:2], 25.0)
+    begin = room.arm.grip(hand)
+    room.go(0.6, PART)
+    assert room.arm.reacting == "retract"
+    way = (room.arm.grip(hand) - begin) @ hand.acting / np.linalg.norm(hand.acting)
+    assert 0.03 < way < 0.1  # 0.05 m are asked for
 
 
 def test_resuming_is_smooth_and_ends_on_the_trajectory():

@@ -26,9 +26,11 @@ Reaction = Callable[[Contact, State], Array]
 
 SERVO_TIME = 5e-3  # s in which a velocity is taken on, torque limits permitting
 HOLD_FREQUENCY = 30.0  # rad/s of the critically damped spring that holds a stopped robot
+CALM_TIME = 0.05  # s over which what is no collision is answered: a jerk looks like a blow
 SIDE_TIME = 0.05  # s in which a stopping robot that is pushed away loses its other motion
 NEW_TIME = 0.03  # s for which a contact presses whatever the external joint torques say
 YIELD_TIME = 0.1  # s after which a stopping robot does not let itself be pushed away any more
+YIELD_EASE = 0.03  # s before that over which it takes on the brake, without a jerk either
 HOLD_TIME = 0.2  # s after which it holds its pose even if it is pushed on: brakes alone creep
 REST = 0.02  # rad/s: slower than that the robot stands
 FLOAT_TIME = 0.5  # s in which a floating robot loses its velocity to friction
@@ -51,15 +53,25 @@ def stop(contact: Contact, state: State) -> Array:
     point leaves, other motion is braked gently, as an error of the place mixes the two.
     """
     rest = None if state.since is None else state.since.rest
-    escape = yielding(contact, state)
     if rest is not None:
         w = HOLD_FREQUENCY
         push = state.inertia @ (w**2 * (rest - state.q) - 2 * w * state.qd)
-    elif escape is not None and (leaving := float(escape[0] @ state.qd)) > 0.0:
-        push = -state.inertia @ (state.qd - leaving * escape[1]) / SIDE_TIME
+        return state.bias_torque + within_effort(state, push)
+    escape = yielding(contact, state)
+    if escape is not None and (leaving := float(escape[0] @ state.qd)) > 0.0:
+        spared = min((YIELD_TIME - state.age) / YIELD_EASE, 1.0)
+        brake_time = SERVO_TIME + spared * (SIDE_TIME - SERVO_TIME)
+        push = -state.inertia @ (state.qd - spared * leaving * escape[1]) / brake_time
     else:
         push = -state.inertia @ state.qd / SERVO_TIME
-    return state.bias_torque + within_effort(state, push)
+    return state.bias_torque + within_effort(state, urgency(contact, state) * push)
+
+
+def urgency(contact: Contact, state: State) -> float:
+    """Share, up to 1, of what the joints could do: at once, but for what is known to be no blow."""
+    if contact.level == "collision" or not contact.decided:
+        return 1.0
+    return min(state.age / CALM_TIME, 1.0)
 
 
 def pressing(direction: Array, state: State) -> float:
@@ -74,9 +86,8 @@ def yielding(contact: Contact, state: State) -> tuple[Array, Array] | None:
 
     A new contact is taken to press: the external joint torques come through a filter, later.
     """
-    age = 0.0 if state.since is None else state.time - state.since.time
-    escape = escape_motion(contact, state) if age < YIELD_TIME else None
-    if escape is None or age < NEW_TIME or pressing(escape[1], state) > PRESSING:
+    escape = escape_motion(contact, state) if state.age < YIELD_TIME else None
+    if escape is None or state.age < NEW_TIME or pressing(escape[1], state) > PRESSING:
         return escape
     return None
 
@@ -85,8 +96,7 @@ def settled(contact: Contact, state: State) -> bool:
     """Whether `stop` may hold the pose: braked, or pushed on though it brakes."""
     if state.since is None or yielding(contact, state) is not None:
         return False
-    age = state.time - state.since.time
-    return age > HOLD_TIME or bool(np.max(np.abs(state.qd)) < REST)
+    return state.age > HOLD_TIME or bool(np.max(np.abs(state.qd)) < REST)
 
 
 def float_(contact: Contact, state: State) -> Array:
@@ -120,7 +130,7 @@ class Retract:
         goal = direction * np.clip(left / RETRACT_EASE, 0.0, self.speed)
         goal = goal / max(1.0, float(np.max(np.abs(goal) / state.speed_limit)))
         push = state.inertia @ (goal - state.qd) / SERVO_TIME
-        return state.bias_torque + within_effort(state, push)
+        return state.bias_torque + within_effort(state, urgency(contact, state) * push)
 
 
 def escape_motion(contact: Contact, state: State) -> tuple[Array, Array] | None:

@@ -138,7 +138,7 @@ class Reactor:
             choice = self.policy.choose(contact, state.time - self._begun[contact.event])
             if active is None or _before(choice, active.choice):
                 if choice.reaction != "ignore":
-                    active = _Active(choice, contact, Since(state.time, state.q.copy()))
+                    active = _taken_on(active, choice, contact, state)
             elif choice.rank == active.choice.rank or contact.event == active.contact.event:
                 active = replace(active, contact=_clearer(active.contact, contact))
         self._active = active
@@ -159,6 +159,14 @@ class Reactor:
         torque, clipped = limited(reaction(active.contact, state), state)
         choice = active.choice
         return Command(torque, choice.reaction, active.contact, choice.reason, clipped)
+
+
+def _taken_on(active: _Active | None, choice: Choice, contact: Contact, state: State) -> _Active:
+    """What a contact calls for, begun anew unless the same contact has called for it before."""
+    if active and active.choice.reaction == choice.reaction:
+        if active.contact.event == contact.event:
+            return replace(active, choice=choice, contact=contact)
+    return _Active(choice, contact, Since(state.time, state.q.copy()))
 
 
 def _before(choice: Choice, other: Choice) -> bool:

@@ -51,6 +51,11 @@ class State:
     tau_ext: Array | None = None
     since: Since | None = field(default=None)
 
+    @property
+    def age(self) -> float:
+        """Time since the reaction began [s]."""
+        return 0.0 if self.since is None else self.time - self.since.time
+
     @cached_property
     def inertia(self) -> Array:
         """Mass matrix (n, n): the momenta of unit velocities (eq. 11)."""

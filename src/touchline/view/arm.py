@@ -102,9 +102,9 @@ class LiveArm:
         """The reaction that has taken over from the arm's own controller."""
         return self._controller.active
 
-    def feel(self, contacts: list[Contact]) -> None:
-        """Tells the arm what it feels, for it to react."""
-        self._controller.contacts = contacts
+    def feel(self, contacts: list[Contact], tau_ext: Array) -> None:
+        """Tells the arm what it feels, for it to react: `tau_ext` (n,) [Nm], NaN if not known."""
+        self._controller.contacts, self._controller.tau_ext = contacts, tau_ext
 
     def set(self, conditions: Conditions) -> None:
         """Takes on what a visitor has set."""

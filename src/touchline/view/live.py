@@ -150,7 +150,7 @@ class LivePage:
         step = (time.perf_counter() - began) / rows
         smooth = self._speed.step + SMOOTHING * (step - self._speed.step)
         self._speed = Speed(smooth, self._speed.real_time)
-        self.arm.feel(felt.contacts)
+        self.arm.feel(felt.contacts, felt.tau_ext)
         self.verdicts = self._judge.judge(felt, truth, self.arm.hands.active())
         self._history.add(felt.time, felt.segments, felt.wrench)
         return samples.q[-1], touched(truth)

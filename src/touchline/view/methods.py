@@ -40,6 +40,7 @@ class Felt:
         time: (N,) [s].
         levels: (N, m) 0, 1 contact, 2 collision.
         wrench: (N, m, 6) on each segment, world axes, about the world origin; NaN if not known.
+        tau_ext: (n,) external joint torques at the last sample [Nm]; NaN if not known.
         contacts: at the last sample.
         health: bits of the last sample.
     """
@@ -48,6 +49,7 @@ class Felt:
     time: Array
     levels: Array
     wrench: Array
+    tau_ext: Array
     contacts: list[Contact]
     health: int = 0
 
@@ -77,7 +79,13 @@ class Observed:
         levels = np.vstack([detection.levels, last.detection.levels])
         wrench = np.vstack([estimate.segment_wrench, last.estimate.segment_wrench[None]])
         return Felt(
-            self._robot.segment_names, s.time, levels, wrench, last.contacts, int(last.health)
+            self._robot.segment_names,
+            s.time,
+            levels,
+            wrench,
+            last.estimate.tau_ext,
+            last.contacts,
+            int(last.health),
         )
 
 
@@ -117,6 +125,7 @@ class JointsOnly:
                     answer.force,
                     answer.covariance,
                     answer.candidates,
+                    decided=True,  # by its threshold; onsets are not looked at
                 )
             )
         return Felt(
@@ -124,6 +133,7 @@ class JointsOnly:
             s.time,
             detection.levels,
             estimate.segment_wrench,
+            estimate.tau_ext[-1],
             contacts,
             int(estimate.health[-1]),
         )
@@ -153,6 +163,7 @@ class Classical:
         self._window: deque[tuple] = deque(maxlen=WINDOW)
         self._count, self._next = 0, -np.inf
         self._wrench, self._levels = np.full((m, 6), np.nan), np.zeros(m)
+        self._tau_ext = np.full(len(robot.joint_names), np.nan)
         self._contacts: list[Contact] = []
 
     def take(self, samples: Samples) -> Felt:
@@ -170,15 +181,19 @@ class Classical:
             samples.time,
             np.tile(self._levels, (n, 1)),
             np.tile(self._wrench, (n, 1, 1)),
+            self._tau_ext,
             self._contacts,
         )
 
     def _answer(self) -> None:
         signals = [np.array(signal) for signal in zip(*self._window, strict=True)]
+        wrench = np.full((WINDOW, len(self._limits), 6), np.nan)
+        self._tau_ext = np.full(signals[1].shape[1], np.nan)
         try:
-            wrench = self._observer.run(*signals).segment_wrench
+            estimate = self._observer.run(*signals)
+            wrench, self._tau_ext = estimate.segment_wrench, estimate.tau_ext[-1]
         except InputError:  # a torque that is not a number: it has no answer
-            wrench = np.full((WINDOW, len(self._limits), 6), np.nan)
+            pass
         self._wrench = filter_truth(wrench, signals[0], self._bandwidth)[-1]
         self._levels = (np.abs(self._wrench) > self._limits).any(axis=1).astype(float)
         q = signals[1][-1]
@@ -201,8 +216,9 @@ class Classical:
                     1.0,
                     crossing.position,
                     force,
+                    decided=True,
                 )
-        return Contact(segment, 0, LEVELS[0], "wrench_only", wrench, force=force)
+        return Contact(segment, 0, LEVELS[0], "wrench_only", wrench, force=force, decided=True)
 
 
 METHODS: dict[str, Callable[[Robot, Robot, Skin], Method]] = {

@@ -29,11 +29,13 @@ class ReactingImpedance:
     Attributes:
         reaction: to every contact, of `contact.reaction.REACTIONS`.
         contacts: that are felt now.
+        tau_ext: (n,) external joint torques that are felt now [Nm]; None: not yet.
     """
 
     def __init__(self, robot: Robot, impedance: JointImpedance, trajectory: Switched) -> None:
         self.impedance, self.reaction = impedance, "ignore"
         self.contacts: list[Contact] = []
+        self.tau_ext: Array | None = None
         self._robot, self._trajectory = robot, trajectory
         self._reactor: Reactor | None = None
         self._reacts_by = "ignore"
@@ -51,8 +53,10 @@ class ReactingImpedance:
         own = self.impedance.torque(plant)
         torque = own
         if self._reactor is not None:
-            state = State(self._robot, plant.time, plant.q, plant.qd, own)
-            torque = self._reactor.update(self.contacts, state).torque
+            friction = plant.friction_torque()  # a state's torques are those behind the drives
+            now = plant.time, plant.q, plant.qd, own - friction
+            state = State(self._robot, *now, self.tau_ext)
+            torque = self._reactor.update(self.contacts, state).torque + friction
         if before and not self.active:
             self._trajectory.resume(plant.q, plant.time)
             torque = self.impedance.torque(plant)
