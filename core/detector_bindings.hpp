@@ -66,8 +66,8 @@ inline nb::tuple detect_run(tl::Observer& o, tl::Detector& d, nb::handle time, n
 }
 
 // N samples, for those who set thresholds: levels (N, m), statistics (N, m, tests), and of every
-// `every`-th sample the residuals (r) less baseline, less reference, their variance (r) by noise, and the
-// activity (2).
+// `every`-th sample the residuals (r) less baseline, the same low-passed once more, less reference
+// and low-passed, the variance (r) of the latter by noise, and the activity (2).
 inline nb::tuple detect_details(tl::Observer& o, tl::Detector& d, nb::handle time, nb::handle q,
                          nb::handle qd, nb::handle tau, nb::handle wrench, std::size_t every) {
   const samples::Many in = samples::many(o, time, q, qd, tau, wrench);
@@ -76,27 +76,33 @@ inline nb::tuple detect_details(tl::Observer& o, tl::Detector& d, nb::handle tim
   const std::size_t kept = (in.rows + every - 1) / every;
   arrays::Out levels({in.rows, segments}),
       statistics({in.rows, segments, d.statistics().size() / std::max<std::size_t>(segments, 1)}),
-      slow({kept, rows}), quick({kept, rows}), noise({kept, rows}), activity({kept, 2});
+      residual({kept, rows}), slow({kept, rows}), quick({kept, rows}), noise({kept, rows}),
+      activity({kept, 2});
   constexpr std::size_t kBlock = 256;  // samples whose rows are held at a time
   std::vector<double> scratch(kBlock * o.output().size());
-  double *level = levels.data(), *value = statistics.data(), *a = slow.data(), *b = quick.data(),
-         *v = noise.data(), *c = activity.data();
+  double *level = levels.data(), *value = statistics.data(), *x = residual.data(), *a = slow.data(),
+         *b = quick.data(), *v = noise.data(), *c = activity.data();
   const auto each = [&](std::size_t i) {
     level = std::copy(d.levels().begin(), d.levels().end(), level);
     value = std::copy(d.statistics().begin(), d.statistics().end(), value);
     if (i % every != 0) return;
     for (std::size_t r = 0; r < rows; ++r) {
-      *a++ = d.sample(r).known ? d.sample(r).residual - d.sample(r).offset : tl::kNaN;
-      *b++ = d.sample(r).known ? d.sample(r).residual - d.sample(r).reference : tl::kNaN;
-      *v++ = d.noise_variance(r);
+      const int segment = d.rows()[r].segment;
+      const tl::SegmentTests& tests = d.tests(segment);
+      const std::size_t own = r - d.first_row(segment);
+      const bool known = d.sample(r).known;
+      *x++ = known ? d.sample(r).residual - d.sample(r).offset : tl::kNaN;
+      *a++ = known ? tests.slow(own) : tl::kNaN;
+      *b++ = known ? tests.quick(own) : tl::kNaN;
+      *v++ = tests.noise_variance(own);
     }
     *c++ = d.activity().speed2;
     *c++ = d.activity().acceleration;
   };
   for (std::size_t from = 0; from < in.rows; from += kBlock)
     detect_all(o, d, in, from, std::min(from + kBlock, in.rows), scratch.data(), each);
-  return nb::make_tuple(levels.release(), statistics.release(), slow.release(), quick.release(),
-                        noise.release(), activity.release());
+  return nb::make_tuple(levels.release(), statistics.release(), residual.release(),
+                        slow.release(), quick.release(), noise.release(), activity.release());
 }
 
 inline void check_detector(const tl::Observer& o, const std::vector<tl::DetectionRow>& rows,

@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 
 import touchline as tl
-from touchline.bench import detection_classical
-from touchline.bench.detection import Outcome, alarm_table, delay_table
+from touchline.bench import detection_classical, detection_files
 from touchline.bench.detection_classical import FastClassical, less_baseline
+from touchline.bench.detection_drawing import draw
+from touchline.bench.detection_outcome import Outcome
+from touchline.bench.detection_tables import alarm_table, delay_table
 from touchline.bench.detection_work import Setting, maker
 from touchline.bench.free_motion import MotionMaker, generator, imperfect, random_trajectory
 from touchline.bench.pushes import AFTER, BEFORE, PushMaker, random_pushes
+from touchline.cli.main import main
 from touchline.contact.calibration import Statistics, watching, with_methods
 from touchline.contact.detector import Detector
 from touchline.contact.tail import Tail
@@ -35,6 +38,8 @@ def test_interpolated_loads_are_those_of_inverse_dynamics(sara):
     exact = inverse_dynamics(arm, *(x[some] for x in trajectory(maker.time)))
     wanted = np.hstack([exact.torque, exact.wrench.reshape(len(exact.torque), -1)])
     np.testing.assert_allclose(loads[some], wanted, atol=1e-5)
+    for found, exact in zip((q, qd), trajectory(maker.time), strict=False):
+        np.testing.assert_allclose(found, exact, atol=1e-9)
     step = 1e-6
     ahead, behind = (trajectory(maker.time[some] + x)[0] for x in (step, -step))
     np.testing.assert_allclose((ahead - behind) / (2 * step), qd[some], atol=1e-6)
@@ -72,6 +77,45 @@ def test_delays_and_alarms_are_counted_against_the_tails():
     assert o.alarms("glrt", 1.0) == 3  # two blocks side by side are one alarm
     assert "3 [0.62, 8.8]" in alarm_table([o])
     assert "33.3 %" in delay_table([o])
+
+
+def test_files_keep_other_settings_and_can_be_drawn(tmp_path):
+    tail = Tail(2.0, 60.0, 1.0, 0.0, 600, 10.0)
+    blocks = np.zeros((9000, 3, 1))
+    blocks[100, 0] = 50.0
+    tested = Statistics(blocks, np.arange(9000) * 0.02, np.zeros(9000, int), 1.0)
+    pushes = {f: np.full((4, 50, 1), f) for f in (2.0, 5.0, 10.0, 20.0, 50.0)}
+    for velocity, hours in ((1e-3, 10.0), (2e-4, 10.0), (1e-3, 20.0)):
+        tails = {n: {"glrt": replace(tail, hours=hours)} for n in ("base", "wrist", "handle")}
+        setting = Setting("sara", 1000.0, velocity)
+        o = Outcome(setting, ("glrt",), tails, tested, pushes, hours)
+        detection_files.write(o, tmp_path)
+    lines = detection_files.read(tmp_path / "tails.csv")
+    found = [(x["velocity_noise"], x["hours"]) for x in lines if x["segment"] == "base"]
+    assert found == [("0.0002", "10"), ("0.001", "20")]
+    lines = detection_files.read(tmp_path / "roc.csv")
+    at = [x for x in lines if float(x["alarms_wanted_per_hour"]) == 1.0]
+    assert len(at) == 2 * 5 and {x["alarms_measured_per_hour"] for x in at} == {"1"}
+    pytest.importorskip("matplotlib")
+    draw(lines, tmp_path)
+    assert (tmp_path / "roc.svg").read_text().count("legend_") >= 2
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--hours", "-1"), "--hours -1: must be at least 0.1"),
+        (("--hours", "nan"), "--hours nan"),
+        (("--pushes", "0"), "--pushes 0"),
+        (("--velocity-noise", "0.5"), "velocity noise 0.5 rad/s; allowed: 0.001"),
+        (("--rates",), "nothing to run"),
+    ],
+)
+def test_impossible_numbers_are_refused_before_the_work(capsys, options, words):
+    assert main(["bench", "detection", *options]) == 2
+    told = capsys.readouterr()
+    assert words in told.err
+    assert not told.out
 
 
 @pytest.fixture(scope="module", params=[1000.0, 8000.0])
@@ -115,12 +159,12 @@ def test_the_baseline_is_the_detectors(sara):
     thresholds = watching(robot, 1e-3, {})
     rows = tuple(replace(row, baseline_limit=1e9) for row in thresholds.rows)
     detector = Detector(Observer(robot), replace(thresholds, rows=rows), 1e-3)
-    slow = detector.details(s.time, s.q, s.qd, s.tau, s.wrench, 1).slow
+    left = detector.details(s.time, s.q, s.qd, s.tau, s.wrench, 1).residual
     estimate = Observer(robot).run(s.time, s.q, s.qd, s.tau, s.wrench)
     row = next(i for i, row in enumerate(thresholds.rows) if row.joint == 2)
     first = int(np.argmax(estimate.joint_settled[:, 2]))
     residual = estimate.segment_torque[first:, 2:3]
-    known = slow[np.isfinite(slow[:, row]), row]
+    known = left[np.isfinite(left[:, row]), row]
     np.testing.assert_allclose(
         less_baseline(residual, 1e-3, robot.description.detection.baseline.time)[:, 0],
         known[-len(residual) :],

@@ -5,7 +5,15 @@ import numpy as np
 import pytest
 from scipy.stats import genpareto
 
-from touchline.contact.tail import Tail, cluster_peaks, fit_excess, fit_tail, poisson_interval
+from touchline.contact.tail import (
+    Tail,
+    alarm_levels,
+    cluster_peaks,
+    count_clusters,
+    fit_excess,
+    fit_tail,
+    poisson_interval,
+)
 
 
 @pytest.mark.parametrize("shape", [-0.2, 0.0, 0.2])
@@ -57,6 +65,36 @@ def test_clusters_count_once():
     assert at.tolist() == [2, 9, 15]
     assert len(cluster_peaks(series, 1.0, 1)[0]) == 4
     assert len(cluster_peaks(series, 9.0, 2)[0]) == 0
+
+
+@pytest.mark.parametrize("gap", [0, 1, 3, 10])
+def test_below_the_kth_level_there_are_k_alarms(gap):
+    rng = np.random.default_rng(2)
+    slow = np.convolve(rng.normal(size=5000), np.ones(40) / 6, "same")  # lasts for many samples
+    series = np.abs(slow + 0.3 * rng.normal(size=5000))
+    series[[700, 2000]] = np.nan
+    levels = alarm_levels(series, gap)
+    assert (np.diff(levels) <= 0).all()
+    for k in range(1, 60):
+        assert count_clusters(series, np.nextafter(levels[k - 1], 0.0), gap) == k
+        assert count_clusters(series, levels[k - 1], gap) < k
+
+
+def test_a_tail_foresees_the_alarms_of_what_lasts():
+    # Excursions of a second with many peaks each: at high levels there are several alarms in one.
+    gap, hours, blocks = 10, 4.0, 50 * 3600
+    decay = np.exp(-0.02 / 1.0)
+    counts, wanted = 0, 20.0
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        from scipy.signal import lfilter
+
+        slow = lfilter([np.sqrt(1 - decay**2)], [1.0, -decay], rng.normal(size=int(hours * blocks)))
+        series = np.abs(slow) + 0.2 * np.abs(rng.normal(size=len(slow)))
+        tail = fit_tail(series, hours, gap)
+        assert tail is not None
+        counts += count_clusters(series, tail.threshold(wanted), gap)
+    assert counts == pytest.approx(6 * hours * wanted, rel=0.08)
 
 
 def test_too_short_a_series_has_no_tail():

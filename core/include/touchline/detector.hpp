@@ -73,11 +73,9 @@ class Detector {
   // Per segment, for each test: what is compared with its limit.
   const std::vector<double>& statistics() const { return statistics_; }
   const RowSample& sample(std::size_t row) const { return samples_[row]; }
-  // Variance of a row's residual by the noise of the signals; 0 as long as no test needs it.
-  double noise_variance(std::size_t row) const {
-    const int g = rows_[row].segment;
-    return tests_[g].noise_variance(row - first_[g]);
-  }
+  // The tests of a segment, and the number of its first row.
+  const SegmentTests& tests(int segment) const { return tests_[segment]; }
+  std::size_t first_row(int segment) const { return first_[segment]; }
   const Activity& activity() const { return activity_.activity(); }
   double baseline(int row) const { return states_[row].baseline; }
   double reference(int row) const { return states_[row].reference; }
@@ -85,7 +83,8 @@ class Detector {
 
  private:
   struct RowState {
-    double baseline = 0.0, reference = 0.0, age = 0.0;
+    double baseline = 0.0, reference = 0.0;
+    double age = 0.0, referred = 0.0;  // over how long they have been averaged [s]
     bool started = false;
   };
   struct Segment {
@@ -160,6 +159,7 @@ class Detector {
     }
     sample.offset = s.baseline;
     sample.reference = s.reference;
+    sample.referred = s.referred;
     const double x = (sample.residual - s.baseline) / row.contact;
     normalized_[i] = x;
     Segment& segment = segments_[row.segment];
@@ -215,9 +215,13 @@ class Detector {
     const DetectionRow& row = rows_[i];
     const double value = samples_[i].residual;
     if (!samples_[i].known) return;
-    if (adapts(row.segment)) s.reference += (value - s.reference) * std::min(1.0, dt / kReference);
+    // Running means first, low-passes once they have seen enough.
+    if (adapts(row.segment)) {
+      s.referred = std::min(s.referred + dt, kReference);
+      if (s.referred > 0.0) s.reference += (value - s.reference) * std::min(1.0, dt / s.referred);
+    }
     if (levels_[row.segment] > 0 || segments_[row.segment].pending) return;
-    quiet_[row.segment] = s.age += dt;  // a running mean first, a low-pass once it has seen enough
+    quiet_[row.segment] = s.age += dt;
     const double tau = std::min(s.age, settings_.times.baseline);
     if (tau <= 0.0) return;
     const double next = s.baseline + (value - s.baseline) * std::min(1.0, dt / tau);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // All rows of one segment together: tests against their covariance. Rows that are not known now
-// are left out; when that changes, what looks back begins anew. No allocation in `step`.
+// are left out; when that changes, what looks back begins anew. `scaled` and `chi2` look at
+// residuals that are low-passed once more: what velocity noise leaves in a residual is nearly
+// white, so that a second pole takes off most of it. No allocation in `step`.
 #pragma once
 
 #include <algorithm>
@@ -22,6 +24,7 @@ struct RowSample {
   double innovation = 0.0;  // mean load over the last interval, not filtered
   double offset = 0.0;      // of the residual: the slow baseline
   double reference = 0.0;   // and the quick one
+  double referred = 0.0;    // time over which the quick one has been averaged [s]
   bool known = false;
 };
 
@@ -44,11 +47,16 @@ class SegmentTests {
     for (auto* m : {&momentum_, &reading_, &factor_, &whitener_}) m->assign(n * n, 0.0);
     for (auto* v : {&slow_, &quick_, &load_, &offset_, &difference_}) v->assign(n, 0.0);
     expected_.assign(n, 0.0);
+    for (auto* v : {&smooth_slow_, &smooth_quick_}) v->assign(n, 0.0);
     active_.reserve(n);
   }
 
   bool used() const { return uses_chi2_ || uses_glrt_ || uses_cusum_ || uses_scaled_; }
 
+  // Of a row, low-passed once more: its residual less the slow offset and less the quick one, and
+  // the variance of both by the noise.
+  double slow(std::size_t row) const { return smooth_slow_[row]; }
+  double quick(std::size_t row) const { return smooth_quick_[row]; }
   double noise_variance(std::size_t row) const { return filtered(row, row); }
 
   // Follows the posture and the robot's activity.
@@ -63,6 +71,7 @@ class SegmentTests {
   // `samples`: one per row; `dt`: since the sample before; `adapt`: nothing is felt now.
   void step(const RowSample* samples, double dt, bool adapt, const Activity& activity,
             double most) {
+    if (dt > 0.0) smoothen(samples);
     if (take(samples)) {
       windows_.restart(active_.size());
       innovations_.restart(active_.size(), load_.data());
@@ -80,7 +89,7 @@ class SegmentTests {
     switch (test) {
       case Test::scaled: return scaled();
       case Test::chi2: return chi2();
-      case Test::glrt: return windows_.statistic(offset_.data());
+      case Test::glrt: return referred_ ? windows_.statistic(offset_.data()) : 0.0;
       case Test::cusum: return innovations_.statistic();
       default: return 0.0;
     }
@@ -91,10 +100,21 @@ class SegmentTests {
     const double K = row.component < 0
                          ? observer.joints()[row.joint].bandwidth
                          : observer.sensors()[observer.layout().segments[row.segment].sensor].bandwidth;
-    const double a = pole(K, dt, Discretization::automatic);
-    // A first-order low-pass of white noise, and of its differences.
-    reading_gain_.push_back(std::sqrt((1.0 - a) / (1.0 + a)));
-    momentum_gain_.push_back((1.0 - a) / dt * std::sqrt(2.0 / (1.0 + a)));
+    const double a = pole(K, dt, Discretization::automatic), b = 1.0 - a, c = 1.0 + a;
+    smoothing_.push_back(b);
+    // Two equal poles, of white noise and of its differences: with g_k = (k + 1) a^k the sums of
+    // g_k^2 and of (g_k - g_k-1)^2.
+    reading_gain_.push_back(b * b * std::sqrt((1.0 + a * a) / (b * b * b * c * c * c)));
+    momentum_gain_.push_back(b * b / dt * std::sqrt(2.0 / (b * c * c * c)));
+  }
+
+  void smoothen(const RowSample* samples) {
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      const RowSample& s = samples[i];
+      if (!s.known) continue;
+      smooth_slow_[i] += smoothing_[i] * (s.residual - s.offset - smooth_slow_[i]);
+      smooth_quick_[i] += smoothing_[i] * (s.residual - s.reference - smooth_quick_[i]);
+    }
   }
 
   double filtered(std::size_t i, std::size_t j) const {
@@ -107,6 +127,7 @@ class SegmentTests {
   bool take(const RowSample* samples) {
     bool changed = false;
     std::size_t count = 0;
+    referred_ = true;
     for (std::size_t i = 0; i < rows_.size(); ++i) {
       if (!samples[i].known) continue;
       changed |= count >= active_.size() || active_[count] != i;
@@ -117,8 +138,9 @@ class SegmentTests {
     for (std::size_t i = 0, k = 0; i < rows_.size(); ++i) {
       if (!samples[i].known) continue;
       if (changed) active_.push_back(i);
-      difference_[k] = samples[i].residual - samples[i].offset;
+      difference_[k] = smooth_slow_[i];
       offset_[k] = samples[i].reference;
+      referred_ = referred_ && samples[i].referred >= kReference;
       if (changed) load_[k] = samples[i].residual;
       ++k;
     }
@@ -164,7 +186,9 @@ class SegmentTests {
   InnovationTest innovations_;
   bool uses_scaled_ = false, uses_chi2_ = false, uses_glrt_ = false, uses_cusum_ = false;
   bool chi2_usable_ = false;
-  std::vector<double> reading_gain_, momentum_gain_;
+  bool referred_ = false;  // have all rows in use been averaged over long enough?
+  std::vector<double> reading_gain_, momentum_gain_, smoothing_;
+  std::vector<double> smooth_slow_, smooth_quick_;  // by row
   std::vector<std::size_t> active_;  // rows that are known
   std::vector<double> expected_;     // variance of each row
   std::vector<double> momentum_, reading_, factor_, whitener_, slow_, quick_;

@@ -6,16 +6,18 @@ physics engine. Thresholds are calibrated on some trajectories; false alarms are
 and sudden pushes on the structure are found or not on others again.
 """
 
-import csv
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from touchline.bench import detection_classical, detection_work
+from touchline.bench.detection_outcome import GOALS, Outcome
+from touchline.bench.detection_tables import alarm_table, delay_table
 from touchline.bench.detection_work import (
     CALIBRATED,
+    LAYOUTS,
     SECONDS,
     TESTED,
     Pool,
@@ -24,71 +26,55 @@ from touchline.bench.detection_work import (
     joined,
     pieces,
 )
-from touchline.bench.request import check_least, check_positive, prepare_results
-from touchline.bench.tables import Row, aligned
-from touchline.contact.calibration import Statistics, count_alarms, fit_tails
-from touchline.contact.tail import Tail, poisson_interval
+from touchline.bench.request import check_least, prepare_results
+from touchline.contact.calibration import fit_tails
+from touchline.errors import InputError
 
-Array = NDArray[np.float64]
-
-SETTINGS = tuple(
-    Setting(layout, rate, velocity)
-    for layout in ("sara", "joints", "classical")
-    for rate in (1000.0, 8000.0)
-    for velocity in (1e-3, 2e-4)
-)
 FORCES = (2.0, 5.0, 10.0, 20.0, 50.0)  # N
-ALARMS = (100.0, 10.0, 1.0)  # per hour
-GOALS = {
-    (1000.0, 1e-3): (20.0, 6e-3),
-    (8000.0, 1e-3): (20.0, 4e-3),
-    (1000.0, 2e-4): (5.0, 15e-3),
-    (8000.0, 2e-4): (5.0, 10e-3),
-}
-RATES = np.geomspace(0.3, 300.0, 31)  # per hour, of the curves
 TRIALS = 200  # pushes of each force
-FIGURES = 10  # recordings that the row figures come from
+LEAST_HOURS = 0.1  # less has no tail
+FIGURES = 30  # recordings that the row figures come from
 PIECE = 10  # recordings, or pushes times five, that a process takes at a time
-LAYOUTS = {"sara": "extended", "joints": "joint torques", "classical": "classical"}
+VELOCITIES = tuple(dict.fromkeys(velocity for _, velocity in GOALS))
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """What was measured in one setting.
+class Plan:
+    """What to measure.
 
     Attributes:
-        setting: what was simulated.
-        methods: of detection, in the order of the statistics.
-        tails: by segment and method, from the calibration.
-        tested: statistics on other trajectories.
-        pushes: force -> statistics (trials, samples, methods) on the structure from its onset on.
-        hours: of calibration.
+        observers: "extended", "joints" (seven joint torques alone), "classical".
+        rates: samples per second [Hz].
+        velocities: noise of the velocities [rad/s].
+        hours: of calibration, and as many of other trajectories for the count of false alarms.
+        trials: pushes of each force.
     """
 
-    setting: Setting
-    methods: tuple[str, ...]
-    tails: dict[str, dict[str, Tail]]
-    tested: Statistics
-    pushes: dict[float, Array]
-    hours: float
+    observers: tuple[str, ...] = ("extended", "joints", "classical")
+    rates: tuple[float, ...] = (1000.0, 8000.0)
+    velocities: tuple[float, ...] = VELOCITIES
+    hours: float = 0.5
+    trials: int = TRIALS
 
-    def limits(self, method: str, rate: float) -> Array:
-        """Thresholds of the segments for a false-alarm rate of the whole robot."""
-        robot = description(self.setting.layout, self.setting.velocity)
-        share = rate / len(robot.segment_names)
-        tails = [self.tails.get(name, {}).get(method) for name in robot.segment_names]
-        return np.array([tail.threshold(share) if tail else np.inf for tail in tails])
+    def settings(self) -> list[Setting]:
+        """Every combination.
 
-    def alarms(self, method: str, rate: float) -> int:
-        """Alarms in the tested hours."""
-        return count_alarms(self.tested, self.limits(method, rate), self.methods.index(method))
-
-    def delays(self, method: str, force: float, rate: float) -> Array:
-        """Time (trials,) from the onset to the detection [s]; infinite where it never came."""
-        over = self.pushes[force][:, :, self.methods.index(method)] > self.limits(method, rate)[0]
-        over &= ~over[:, :1]  # an alarm before the onset finds nothing
-        first = (np.argmax(over, axis=1) - 0.5) / self.setting.rate
-        return np.where(over.any(axis=1), first, np.inf)
+        Raises:
+            InputError: there is none, or no goal is set for one of them.
+        """
+        settings = [
+            Setting("sara" if observer == "extended" else observer, rate, velocity)
+            for observer in self.observers
+            for rate in self.rates
+            for velocity in self.velocities
+        ]
+        if not settings:
+            raise InputError("nothing to run: one of observers, rates, velocity noise is empty")
+        for s in settings:
+            if (s.rate, s.velocity) not in GOALS:
+                allowed = ", ".join(f"{v:g}" for v in VELOCITIES)
+                raise InputError(f"velocity noise {s.velocity:g} rad/s; allowed: {allowed}")
+        return settings
 
 
 def measure(setting: Setting, hours: float, trials: int, pool: Pool) -> Outcome:
@@ -115,187 +101,47 @@ def measure(setting: Setting, hours: float, trials: int, pool: Pool) -> Outcome:
     return Outcome(setting, work.METHODS, tails, parts[1], pushes, parts[0].hours)
 
 
-def alarm_table(outcomes: list[Outcome]) -> str:
-    """False alarms per hour that were asked for and that came, on other trajectories."""
-    head: Row = (
-        "observer",
-        "kHz",
-        "rad/s",
-        "method",
-        "hours",
-        *(f"at {rate:g}/h" for rate in ALARMS),
-        "ratio at 10/h",
-    )
-    rows: list[Row] = [head]
-    for o in outcomes:
-        for method in o.methods:
-            cells = []
-            for rate in ALARMS:
-                count, hours = o.alarms(method, rate), o.tested.hours
-                low, high = (x / hours for x in poisson_interval(count))
-                cells.append(f"{count / hours:.3g} [{low:.2g}, {high:.2g}]")
-            ratio = o.alarms(method, 10.0) / o.tested.hours / 10.0
-            rows.append((*_names(o), method, f"{o.tested.hours:.3g}", *cells, f"{ratio:.2f}"))
-    return aligned(rows, text_columns=(0, 3))
+def run(plan: Plan) -> Iterator[Outcome]:
+    """The outcomes of a plan, as they are done."""
+    with Pool() as pool:
+        for setting in plan.settings():
+            yield measure(setting, plan.hours, plan.trials, pool)
 
 
-def delay_table(outcomes: list[Outcome], rate: float = 1.0) -> str:
-    """Time in which 95 % of the pushes are found [ms], and the goal where there is one."""
-    rows: list[Row] = [
-        (
-            "observer",
-            "kHz",
-            "rad/s",
-            "method",
-            *(f"{f:g} N" for f in FORCES),
-            "goal",
-            "found within",
-        )
-    ]
-    for o in outcomes:
-        force, limit = GOALS[o.setting.rate, o.setting.velocity]
-        for method in o.methods:
-            delays = [_percentile(o.delays(method, f, rate)) for f in FORCES]
-            share = float(np.mean(o.delays(method, force, rate) <= limit))
-            rows.append(
-                (
-                    *_names(o),
-                    method,
-                    *(f"{1e3 * d:.2f}" if np.isfinite(d) else "-" for d in delays),
-                    f"{force:g} N, {1e3 * limit:g} ms",
-                    f"{100 * share:.1f} %",
-                )
-            )
-    return aligned(rows, text_columns=(0, 3))
-
-
-def _percentile(delays: Array) -> float:
-    return float(np.sort(delays)[int(np.ceil(0.95 * len(delays))) - 1])
-
-
-def _names(o: Outcome) -> Row:
-    s = o.setting
-    return LAYOUTS[s.layout], f"{s.rate / 1000:g}", f"{s.velocity:g}"
-
-
-def write_tables(outcomes: list[Outcome], out: Path) -> None:
-    """Writes roc.csv (one line per setting, method, force and rate) and tails.csv."""
-    with (out / "roc.csv").open("w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(
-            [
-                "observer",
-                "rate_hz",
-                "velocity_noise",
-                "method",
-                "force_n",
-                "alarms_wanted_per_hour",
-                "alarms_measured_per_hour",
-                "hours",
-                "found_within_goal",
-                "found",
-                "delay_median_s",
-                "delay_p95_s",
-            ]
-        )
-        for o in outcomes:
-            limit = GOALS[o.setting.rate, o.setting.velocity][1]
-            for method in o.methods:
-                for rate in RATES:
-                    measured = o.alarms(method, rate) / o.tested.hours
-                    for force in FORCES:
-                        d = o.delays(method, force, rate)
-                        writer.writerow(
-                            [
-                                LAYOUTS[o.setting.layout],
-                                f"{o.setting.rate:g}",
-                                f"{o.setting.velocity:g}",
-                                method,
-                                f"{force:g}",
-                                f"{rate:.4g}",
-                                f"{measured:.4g}",
-                                f"{o.tested.hours:.4g}",
-                                f"{np.mean(d <= limit):.4f}",
-                                f"{np.mean(np.isfinite(d)):.4f}",
-                                f"{np.median(d):.6f}",
-                                f"{_percentile(d):.6f}",
-                            ]
-                        )
-    with (out / "tails.csv").open("w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(
-            [
-                "observer",
-                "rate_hz",
-                "velocity_noise",
-                "segment",
-                "method",
-                "level",
-                "per_hour",
-                "scale",
-                "shape",
-                "peaks",
-                "hours",
-                "at_1_per_hour",
-                "low",
-                "high",
-                "extrapolated",
-            ]
-        )
-        for o in outcomes:
-            share = 1.0 / len(description(o.setting.layout, o.setting.velocity).segment_names)
-            for segment, tails in o.tails.items():
-                for method, t in tails.items():
-                    numbers = (
-                        t.level,
-                        t.per_hour,
-                        t.scale,
-                        t.shape,
-                        t.count,
-                        t.hours,
-                        t.threshold(share),
-                        *t.interval(share),
-                    )
-                    writer.writerow(
-                        [
-                            LAYOUTS[o.setting.layout],
-                            f"{o.setting.rate:g}",
-                            f"{o.setting.velocity:g}",
-                            segment,
-                            method,
-                            *(f"{x:.5g}" for x in numbers),
-                            t.extrapolates(share),
-                        ]
-                    )
-
-
-def main(hours: float = 1.0, trials: int = TRIALS, out: Path | None = None) -> None:
-    """Prints the tables.
+def main(plan: Plan, out: Path | None = None) -> None:
+    """Prints the tables of every setting as it is done.
 
     Args:
-        hours: of motion for calibration and as many for the count of false alarms, at 1 kHz; at
-            8 kHz an eighth of it, since that is as many samples.
-        trials: pushes of each force.
-        out: folder for roc.csv, tails.csv and figures.
-    """
-    check_positive(hours=hours)
-    check_least(1, pushes=trials)
-    prepare_results(out)
-    outcomes = []
-    with Pool() as pool:
-        for setting in SETTINGS:
-            share = hours * 1000.0 / setting.rate * (1.0 if setting.layout == "sara" else 0.5)
-            outcomes.append(measure(setting, share, trials, pool))
-    print(f"detection benchmark: sara, inertias 2 % off, up to 3 rad/s, {trials} pushes a force")
-    print("\nfalse alarms per hour of the whole robot, on other trajectories than calibrated on")
-    print("(95 % Poisson interval)\n")
-    print(alarm_table(outcomes))
-    print("\ndelay in which 95 % of sudden pushes on the structure are found [ms], at one false")
-    print("alarm per hour; -: fewer are found within 50 ms\n")
-    print(delay_table(outcomes))
-    if out is not None:
-        from touchline.bench.detection_drawing import draw
+        plan: what to measure.
+        out: folder for roc.csv, tails.csv and figures, which keep what other runs have written.
 
-        write_tables(outcomes, out)
-        draw(outcomes, RATES, GOALS, LAYOUTS, out)
-        print(f"\n{out}: roc.csv, tails.csv, figures")
+    Raises:
+        InputError: the plan is empty or has impossible numbers, or the folder cannot be made.
+        ModuleNotFoundError: figures are wanted and matplotlib is missing.
+    """
+    check_least(LEAST_HOURS, hours=plan.hours)
+    check_least(1, pushes=plan.trials)
+    plan.settings()
+    prepare_results(out)
+    print(
+        f"detection benchmark: sara, inertias 2 % off, up to 3 rad/s, {plan.trials} pushes a force"
+    )
+    print("false alarms per hour of the whole robot, on other trajectories than calibrated on")
+    print(
+        "(95 % Poisson interval); delay in which 95 % of sudden pushes on the structure are found"
+    )
+    print("[ms], at one false alarm per hour; -: fewer are found within 50 ms")
+    done: list[Outcome] = []
+    for outcome in run(plan):
+        done.append(outcome)
+        print(f"\n{alarm_table([outcome])}\n\n{delay_table([outcome])}", flush=True)
+        if out is not None:
+            from touchline.bench import detection_files
+            from touchline.bench.detection_drawing import draw
+
+            detection_files.write(outcome, out)
+            draw(detection_files.read(out / "roc.csv"), out)
+    if len(done) > 1:
+        print(f"\ntogether\n\n{alarm_table(done)}\n\n{delay_table(done)}")
+    if out is not None:
+        print(f"\n{out}: roc.csv, tails.csv, roc.svg, delay.svg")

@@ -31,6 +31,7 @@ METHODS = cal.METHODS
 ERROR = 0.02  # 1 sigma of the inertias
 ARM_SEED = 1  # one arm has one set of errors
 SECONDS = 60.0  # length of a recording
+LAYOUTS = {"sara": "extended", "joints": "joint torques", "classical": "classical"}
 CALIBRATED, TESTED, PUSHED = 1, 2, 3  # seeds of trajectories that never meet
 
 

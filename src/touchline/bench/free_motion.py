@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hours of contact-free motion: prescribed, with exact loads of an arm that is not as modelled.
 
-No physics engine: the loads are those of inverse dynamics with perturbed inertias, computed at a
-low rate and interpolated by polynomials (to 1e-5 N of 500), since they are smooth; positions and
-velocities are exact at every sample. Noise is added per sample.
+No physics engine: the loads are those of inverse dynamics with perturbed inertias. All of it is
+smooth, and is computed at a low rate and interpolated by polynomials: positions and velocities to
+1e-9, loads to 1e-5 N of 500. Noise is added per sample.
 """
 
 from collections.abc import Callable
@@ -116,10 +116,11 @@ class MotionMaker:
 
     def loads(self, trajectory: Path) -> tuple[Array, Array, Array]:
         """Positions, velocities and what ideal sensors read (N, n + 6 k): torques, wrenches."""
-        needed = inverse_dynamics(self.arm, *trajectory(self.coarse))
-        values = np.hstack([needed.torque, needed.wrench.reshape(len(self.coarse), -1)])
-        q, qd, _ = trajectory(self.time)
-        return q, qd, self.interpolated(values, slice(0, len(self.time)))
+        q, qd, qdd = trajectory(self.coarse)
+        needed, n = inverse_dynamics(self.arm, q, qd, qdd), q.shape[1]
+        values = np.hstack([q, qd, needed.torque, needed.wrench.reshape(len(q), -1)])
+        fine = self.interpolated(values, slice(0, len(self.time)))
+        return fine[:, :n], fine[:, n : 2 * n], fine[:, 2 * n :]
 
     def interpolated(self, values: Array, rows: slice) -> Array:
         """Smooth values, given at the times `coarse` (C, c), at some samples (N, c).

@@ -119,19 +119,35 @@ def wrench(*, seed: int = 0, out: Directory = None) -> int:
     return 0
 
 
-def detection(*, hours: float = 0.5, pushes: int = 100, out: Directory = None) -> int:
+def detection(
+    *,
+    observers: tuple[Literal["extended", "joints", "classical"], ...] = (
+        "extended",
+        "joints",
+        "classical",
+    ),
+    rates: tuple[Literal[1000, 8000], ...] = (1000, 8000),
+    velocity_noise: tuple[float, ...] = (1e-3, 2e-4),
+    hours: float = 0.5,
+    pushes: int = 100,
+    out: Directory = None,
+) -> int:
     """How soon pushes are found, at which rate of false alarms.
 
-    Example: touchline bench detection --hours 10 --out figures
+    Example: touchline bench detection --observers extended --rates 1000 --hours 10 --out figures
 
     Args:
-        hours: Simulated at 1 kHz for calibration, and as many for false alarms.
+        observers: The extended one, the joint torques alone, the classical one.
+        rates: Samples per second [Hz].
+        velocity_noise: 1 sigma per sample [rad/s]: 1e-3, 2e-4 or both.
+        hours: Simulated for calibration, and as many for false alarms. Ten hours take some ten
+            minutes of computing at 1000 Hz and an hour at 8000 Hz, for each noise.
         pushes: Of each force.
-        out: Folder for tables and figures.
+        out: Folder for tables and figures, which keep what other runs have written there.
     """
-    from touchline.bench.detection import main
+    from touchline.bench.detection import Plan, main
 
-    main(hours, pushes, out)
+    main(Plan(observers, rates, velocity_noise, hours, pushes), out)
     return 0
 
 

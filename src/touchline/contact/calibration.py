@@ -41,11 +41,13 @@ class Residuals:
     """What contact-free motion left in the rows, thinned out.
 
     Attributes:
-        slow, quick: (N, r) residuals less baseline, less reference [N or Nm].
-        noise: (N, r) their variance by the noise of the signals.
+        residual: (N, r) residuals less baseline [N or Nm].
+        slow, quick: (N, r) residuals less baseline, less reference, low-passed once more.
+        noise: (N, r) the variance of these two by the noise of the signals.
         activity: (N, 2) squared speed, acceleration.
     """
 
+    residual: Array
     slow: Array
     quick: Array
     noise: Array
@@ -99,7 +101,7 @@ def collect_residuals(
         detector = Detector(Observer(robot), thresholds, period)
         for s in recording:
             d = detector.details(s.time, s.q, s.qd, s.tau, s.wrench, every)
-            parts.append((d.slow, d.quick, d.noise, d.activity))
+            parts.append((d.residual, d.slow, d.quick, d.noise, d.activity))
     return Residuals(*(np.concatenate(x) for x in zip(*parts, strict=True)))
 
 
@@ -112,7 +114,7 @@ def fit_rows(robot: Robot, period: float, found: Residuals) -> dict[str, RowCali
             continue
         activity, noise = found.activity[known], found.noise[known, i]
         slow, quick = found.slow[known, i], found.quick[known, i]
-        typical = float(np.sqrt(np.mean(_tamed(slow) ** 2)))
+        typical = float(np.sqrt(np.mean(_tamed(found.residual[known, i]) ** 2)))
         rows[row_name(robot, row)] = RowCalibration(
             _digits(max(typical, 1e-6)),
             fit_growth(_tamed(slow), noise, activity),

@@ -55,14 +55,16 @@ class Details:
     Attributes:
         levels: (N, m) the `Level` of each segment.
         statistics: (N, m, t) each test's statistic, in the order of `Thresholds.limits`.
-        slow: (N / every, r) residuals less their baseline [N or Nm]; NaN where not known.
-        quick: (N / every, r) the same less the mean of the last 0.2 s.
-        noise: (N / every, r) their variances by the noise of the signals.
+        residual: (N / every, r) residuals less their baseline [N or Nm]; NaN where not known.
+        slow: (N / every, r) the same, low-passed once more.
+        quick: (N / every, r) residuals less the mean of the last 0.2 s, low-passed once more.
+        noise: (N / every, r) the variance of these two by the noise of the signals.
         activity: (N / every, 2) squared speed [rad2/s2], acceleration [rad/s2].
     """
 
     levels: Array
     statistics: Array
+    residual: Array
     slow: Array
     quick: Array
     noise: Array
@@ -131,7 +133,7 @@ class Detector:
         stamps = np.ascontiguousarray(time, dtype=float)
         signals = self.observer.arrays(stamps.shape, q, qd, tau, wrench)
         q, qd, tau, wrench = signals
-        levels, statistics, slow, quick, noise, activity = core.detect_details(
+        found = core.detect_details(
             self.observer.kernel, self._core, stamps, q, qd, tau, wrench, every
         )
-        return Details(levels, statistics, slow, quick, noise, activity)
+        return Details(*found)

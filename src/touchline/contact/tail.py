@@ -2,7 +2,7 @@
 """Extreme values: how often a statistic exceeds what, also beyond what has been seen.
 
 Peaks over a threshold (Davison and Smith 1990): clusters of exceedances are rare and independent,
-and the excess of their peaks has a generalized Pareto distribution.
+and their excesses have a generalized Pareto distribution.
 """
 
 from dataclasses import dataclass
@@ -112,6 +112,38 @@ def count_clusters(series: Array, level: float, gap: int) -> int:
     return int((np.diff(above) > gap).sum()) + 1 if len(above) else 0
 
 
+def alarm_levels(series: Array, gap: int) -> Array:
+    """The thresholds (L,) below which there is one more alarm, the largest first.
+
+    The first k of them take the place of the k largest peaks: below the k-th of them
+    `count_clusters` finds k. Peaks of clusters at any one level would not do, since a cluster that
+    lasts has several peaks that are alarms of their own further up.
+
+    Args:
+        series: (N,) a statistic; NaN where it is not known.
+        gap: see `cluster_peaks`.
+    """
+    known = np.isfinite(series)
+    if not known.any():
+        return np.zeros(0)
+    if gap == 0:
+        return np.sort(series[known])[::-1]
+    from scipy.ndimage import grey_closing
+
+    least = float(series[known].min())
+    # Valleys that are too short to part two alarms are filled.
+    x = grey_closing(np.where(known, series, least), size=gap)
+    x = np.concatenate([[least], x[np.flatnonzero(np.diff(x, prepend=least))], [least]])
+    rises = np.diff(x) > 0
+    peaks, valleys = x[1:-1][rises[:-1] & ~rises[1:]], x[1:-1][~rises[:-1] & rises[1:]]
+    # Above u there are as many parts as peaks, less the valleys between them.
+    values = np.concatenate([valleys, peaks])
+    steps = np.repeat([-1, 1], [len(valleys), len(peaks)])
+    order = np.argsort(-values, kind="stable")
+    alarms = np.maximum.accumulate(np.cumsum(steps[order]))
+    return values[order][np.flatnonzero(np.diff(alarms, prepend=0) > 0)]
+
+
 def fit_tail(series: Array, hours: float, gap: int) -> Tail | None:
     """The tail of a statistic.
 
@@ -121,32 +153,15 @@ def fit_tail(series: Array, hours: float, gap: int) -> Tail | None:
         gap: see `cluster_peaks`.
 
     Returns:
-        None where there are too few peaks for any statement.
+        None where there are too few alarms for any statement.
     """
-    wanted = max(LEAST_PEAKS, PEAKS_PER_HOUR * hours)
-    level = _level(series[np.isfinite(series)], wanted, gap)
-    if level is None:
+    levels = alarm_levels(series, gap)
+    levels = levels[levels > np.nanmedian(series)] if len(levels) else levels
+    count = min(round(max(LEAST_PEAKS, PEAKS_PER_HOUR * hours)), len(levels) - 1)
+    if count < 0.4 * LEAST_PEAKS or levels[0] <= levels[count]:
         return None
-    peaks, _ = cluster_peaks(series, level, gap)
-    excess = peaks - level
-    scale, shape = fit_excess(excess)
-    return Tail(level, len(peaks) / hours, scale, shape, len(peaks), hours)
-
-
-def _level(series: Array, wanted: float, gap: int) -> float | None:
-    """The level that about `wanted` clusters exceed."""
-    if len(series) < 2 * LEAST_PEAKS:
-        return None
-    low, high = float(np.median(series)), float(series.max())
-    for _ in range(25):
-        middle = 0.5 * (low + high)
-        # Below the level of most clusters they run into one another: their number grows no more.
-        if count_clusters(series, middle, gap) >= wanted:
-            low = middle
-        else:
-            high = middle
-    found = count_clusters(series, low, gap)
-    return low if found >= 0.4 * LEAST_PEAKS else None
+    scale, shape = fit_excess(levels[:count] - levels[count])
+    return Tail(float(levels[count]), count / hours, scale, shape, count, hours)
 
 
 def fit_excess(excess: Array) -> tuple[float, float]:
