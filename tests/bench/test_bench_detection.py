@@ -15,7 +15,6 @@ from touchline.bench.detection_tables import alarm_table, delay_table
 from touchline.bench.detection_work import Setting, maker
 from touchline.bench.free_motion import MotionMaker, generator, imperfect, random_trajectory
 from touchline.bench.pushes import AFTER, BEFORE, PushMaker, random_pushes
-from touchline.cli.main import main
 from touchline.contact.calibration import Statistics, watching, with_methods
 from touchline.contact.detector import Detector
 from touchline.contact.tail import Tail
@@ -99,23 +98,6 @@ def test_files_keep_other_settings_and_can_be_drawn(tmp_path):
     pytest.importorskip("matplotlib")
     draw(lines, tmp_path)
     assert (tmp_path / "roc.svg").read_text().count("legend_") >= 2
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (("--hours", "-1"), "--hours -1: must be at least 0.1"),
-        (("--hours", "nan"), "--hours nan"),
-        (("--pushes", "0"), "--pushes 0"),
-        (("--velocity-noise", "0.5"), "velocity noise 0.5 rad/s; allowed: 0.001"),
-        (("--rates",), "nothing to run"),
-    ],
-)
-def test_impossible_numbers_are_refused_before_the_work(capsys, options, words):
-    assert main(["bench", "detection", *options]) == 2
-    told = capsys.readouterr()
-    assert words in told.err
-    assert not told.out
 
 
 @pytest.fixture(scope="module", params=[1000.0, 8000.0])

@@ -349,9 +349,11 @@ def test_gzip_that_is_none(capsys, tmp_path):
         ("reaction --encounters 0", "--encounters 0: must be at least 1"),
         ("reaction --guiding nan", "--guiding nan: must be at least 0"),
         ("wrench --seed -1", "--seed -1: must be at least 0"),
-        ("detection --hours -1", "--hours -1: must be a positive number"),
-        ("detection --hours inf", "--hours inf: must be a positive number"),
+        ("detection --hours -1", "--hours -1: must be at least 0.1"),
+        ("detection --hours inf", "--hours inf: must be at least 0.1"),
         ("detection --pushes 0", "--pushes 0: must be at least 1"),
+        ("detection --rates", "nothing to run"),
+        ("detection --velocity-noise 0.5", "velocity noise 0.5 rad/s; allowed: 0.001, 0.0002"),
     ],
 )
 def test_a_benchmark_is_told_what_it_cannot_do(arguments, message, capsys):

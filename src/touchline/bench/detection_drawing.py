@@ -33,7 +33,7 @@ def draw(lines: list[Line], out: Path) -> None:
 
 def _roc(axes: Any, lines: list[Line], goal: tuple[float, float]) -> None:
     force, limit = goal
-    for method, own in _by(lines, "method").items():
+    for (method,), own in _by(lines, "method").items():
         at = [line for line in own if float(line["force_n"]) == force]
         rates = [float(line["alarms_wanted_per_hour"]) for line in at]
         found = [100 * float(line["found_within_goal"]) for line in at]
@@ -45,7 +45,7 @@ def _roc(axes: Any, lines: list[Line], goal: tuple[float, float]) -> None:
 
 
 def _delay(axes: Any, lines: list[Line], goal: tuple[float, float]) -> None:
-    for method, own in _by(lines, "method").items():
+    for (method,), own in _by(lines, "method").items():
         at = [line for line in own if float(line["alarms_wanted_per_hour"]) == 1.0]
         forces = [float(line["force_n"]) for line in at]
         median = [1e3 * float(line["delay_median_s"]) for line in at]
@@ -88,9 +88,8 @@ def _place(setting: tuple[tuple[str, ...], list[Line]]) -> tuple[Any, ...]:
     return observer != "extended", observer, float(rate), -float(velocity)
 
 
-def _by(lines: list[Line], *names: str) -> dict[Any, list[Line]]:
-    parts: dict[Any, list[Line]] = {}
+def _by(lines: list[Line], *names: str) -> dict[tuple[str, ...], list[Line]]:
+    parts: dict[tuple[str, ...], list[Line]] = {}
     for line in lines:
-        key = tuple(line[name] for name in names)
-        parts.setdefault(key if len(key) > 1 else key[0], []).append(line)
+        parts.setdefault(tuple(line[name] for name in names), []).append(line)
     return parts
