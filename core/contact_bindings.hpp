@@ -202,7 +202,7 @@ inline void write(const tl::Localizer& l, const tl::Classifier& c, std::size_t i
                                static_cast<double>(l.reports()[k].serial),
                                share,
                                static_cast<double>(c.kind(g, share)),
-                               c.clamped(g) ? 1.0 : open ? std::nan("") : 0.0,
+                               c.clamped(g, k) ? 1.0 : open ? std::nan("") : 0.0,
                                c.rate(g)};
   std::copy(head, head + kClass, out);
   write(l, answer, out + kClass);
@@ -223,7 +223,9 @@ inline void follow(tl::Localizer& l, tl::Classifier& c, std::size_t i, const Fol
       push_event(l, i, g, *memory, ended);
       memory->serial = -1;
     }
-    for (int k = 0; touched && k < l.reports().count(); ++k) {
+    if (!touched) continue;
+    c.consider(static_cast<int>(g), l.reports());
+    for (int k = 0; k < l.reports().count(); ++k) {
       answers.resize(answers.size() + kClass + kWidth);
       write(l, c, i, static_cast<int>(g), k, &*answers.end() - kClass - kWidth);
     }

@@ -68,12 +68,16 @@ class Classifier {
     for (std::size_t g = 0; g < limits_.size(); ++g) decide(static_cast<int>(g), levels[g] > 0.0);
   }
 
+  // What is said of the contacts on segment g in that sample.
+  void consider(int g, const Reports& reports) { clamping_.consider(g, reports); }
+
   Kind kind(int g) const { return touches_[g].kind; }
   // Of a contact that carries this share of the load on segment g.
   Kind kind(int g, double share) const {
     return share >= kLeading ? kind(g) : std::min(kind(g), Kind::contact);
   }
-  bool clamped(int g) const { return clamping_.between(g); }
+  // Contact k on segment g.
+  bool clamped(int g, int k) const { return clamping_(g, k); }
   // Of the segment's force [N/s]; NaN where it is not touched.
   double rate(int g) const { return touches_[g].rate; }
 
