@@ -51,6 +51,36 @@ def test_forces_on_two_segments_that_oppose_each_other_clamp(sara, skin):
     assert all(event.clamped for event in events)
 
 
+def test_forces_on_one_segment_that_can_be_told_apart_clamp_it(sara, skin):
+    drawn = interaction(sara, skin, [0, 8, 37], "collision", clamped=True)
+    assert [touch.patch.link for touch in drawn.touches] == ["link1", "link5"]  # rank 10 of 10
+    events = events_of(sara, skin, drawn.signals)
+    assert [event.segment for event in events] == ["base", "base"]
+    for touch in drawn.touches:
+        event = next(e for e in events if e.link == touch.patch.link)
+        assert event.clamped is True
+        place = sara.poses(drawn.touches[0].q)[touch.patch.node] @ touch.patch.T_node_link
+        local = place[:3, :3].T @ (touch.position - place[:3, 3])
+        np.testing.assert_allclose(event.position_link, local, atol=0.03)
+        assert event.force @ touch.force > 0.95 * np.linalg.norm(event.force)
+
+
+def test_clamped_is_unknown_where_contacts_cannot_be_told_apart(sara, skin):
+    drawn = interaction(sara, skin, [0, 8, 18], "contact", clamped=True)
+    assert [touch.patch.link for touch in drawn.touches] == ["link4", "link3"]  # rank 7 of 10
+    (event,) = events_of(sara, skin, drawn.signals)
+    assert event.status == "not_separable" and event.clamped is None
+    assert event.rank is not None and event.rank < event.unknowns == 10
+
+
+def test_what_lets_go_of_a_blow_is_no_second_contact(sara, skin):
+    # The force falls with the filter: as if something pressed against it from the other side.
+    for number in (85, 121):
+        drawn = interaction(sara, skin, [0, 8, number], "collision")
+        events = events_of(sara, skin, drawn.signals)
+        assert events and all(event.clamped is False for event in events)
+
+
 def test_a_blow_makes_a_contact_a_collision(sara, skin):
     drawn = interaction(sara, skin, 3, "contact", "handle")
     sampler = InteractionSampler(sara, TouchSampler(skin, None), np.random.default_rng(0))

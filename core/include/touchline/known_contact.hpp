@@ -184,4 +184,17 @@ inline bool within_reach(const KnownContact& known, const Answer& a, const LinkS
          norm(best.point - surfaces.to_world(known.point, known.node)) < way + 3.0 * sigma;
 }
 
+// Does what is said beside a known contact take its force back, along its own line if it has one
+// (within `least` [m])? What would hold against a contact there, and no harder, cannot be told from
+// its letting go.
+inline bool takes_back(const KnownContact& known, const Answer& a, const LinkSurfaces& surfaces,
+                       double least) {
+  constexpr double kStraight = 0.95, kMost = 1.1;  // cosine, part of the known force
+  const double size = norm(known.force), back = norm(a.force);
+  if (!(dot(known.force, a.force) < -kStraight * size * back && back < kMost * size)) return false;
+  const Vec3 way = a.candidates[0].point - surfaces.to_world(known.point, known.node);
+  const double along = dot(way, known.force) / size;
+  return !placed(a) || norm(way - (along / size) * known.force) < std::max(least, 3.0 * a.spread);
+}
+
 }  // namespace touchline

@@ -34,6 +34,9 @@ class Reports {
     report(k, surfaces_, reports_[count_++].answer);
   }
   void doubt_last() { reports_[count_ - 1].answer.status = Status::ambiguous; }
+  void change_force(int i, const Vec3& force) {
+    reports_[i].answer.force = reports_[i].answer.candidates[0].fit.force = force;
+  }
   void end(int serial) {
     if (serial >= 0 && ended_ < kMost) endings_[ended_++] = serial;
   }

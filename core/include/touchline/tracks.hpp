@@ -184,6 +184,7 @@ class Tracks {
     Answer& a = remainder(s, read);
     const bool found = placed(a);
     if (!found && changed(s, read)) return;
+    if (lets_go(s, a)) return;
     if (found && !s.is_placed) s.placed = time_;
     s.is_placed = found;
     if (found && time_ - s.placed >= brief() && time_ - s.since >= young() && s.count < kMost) {
@@ -222,6 +223,21 @@ class Tracks {
     if (!known_.explain_freely(s.before.known, s.count)) return false;
     resume(s);
     return true;
+  }
+
+  // Is what is left a known contact that lets go?
+  bool lets_go(SegmentContacts& s, const Answer& a) {
+    for (int c = 0; c < s.count; ++c) {
+      const KnownContact& k = s.before.known[c];
+      if (!takes_back(k, a, single_.surfaces(), settings_.place_radius)) continue;
+      for (int i = 0; i < s.count; ++i) report(s.before.known[i]);
+      reports_.change_force(c, k.force + a.force);
+      end(s.newcomer);
+      s.newcomer = -1;
+      s.is_placed = false;
+      return true;
+    }
+    return false;
   }
 
   // The known contacts explain all, with the forces of the last fit.
