@@ -176,10 +176,13 @@ def test_credibility_of_truths_from_the_posterior_is_uniform():
 
 def test_regions_of_contacts_on_one_segment_hold_what_they_say():
     panda()
-    trials = [run_trial(Cell("panda", contacts=2, tier=3), run) for run in range(30)]
+    cells = [Cell("panda", contacts, tier=tier) for contacts, tier in ((2, 3), (3, 2), (3, 3))]
+    trials = [run_trial(cell, run) for cell in cells for run in range(30)]
     levels = np.array([touch.level for trial in trials for touch in trial.touches])
-    assert 0.8 < np.mean(levels < 0.9) < 0.98
-    assert 0.36 < np.mean(levels < 0.5) < 0.64
+    levels = levels[np.isfinite(levels)]
+    assert len(levels) > 230
+    assert 0.84 < np.mean(levels < 0.9) < 0.96
+    assert 0.4 < np.mean(levels < 0.5) < 0.6
 
 
 def test_wilson_interval():

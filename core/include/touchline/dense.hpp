@@ -64,6 +64,21 @@ inline void solve_cholesky(const double* l, int n, double* x) {
   }
 }
 
+// The inverse of a symmetric positive definite (n, n) matrix, of which the lower triangle is given,
+// in its place; false if it is not positive definite. `work` (n, n).
+inline bool invert(double* a, int n, double* work) {
+  if (!cholesky(a, n, 1e-15)) return false;
+  invert_lower(a, n, work);
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      double s = 0.0;
+      for (int k = i; k < n; ++k) s += work[k * n + i] * work[k * n + j];
+      a[i * n + j] = a[j * n + i] = s;
+    }
+  }
+  return true;
+}
+
 // log det of L L^T.
 inline double log_determinant(const double* l, int n) {
   double sum = 0.0;

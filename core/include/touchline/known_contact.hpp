@@ -38,30 +38,24 @@ class Age {
 // Symmetric, of the two tangent coordinates of a place [m2].
 struct Spread {
   double a = 0.0, b = 0.0, c = 0.0;  // 00, 01, 11
-  double determinant() const { return a * c - b * b; }
-  Spread inverse() const {
-    const double d = 1.0 / determinant();
-    return {d * c, -d * b, d * a};
-  }
-  Spread plus(const Spread& o, double factor = 1.0) const {
-    return {a + factor * o.a, b + factor * o.b, c + factor * o.c};
-  }
   double trace() const { return a + c; }
 };
 
 struct KnownContact {
-  static constexpr int kOthers = 3;  // contacts beside it on its segment at most
   int serial = -1, surface = -1, node = -1;
   Vec3 point, normal;  // in the frame of the node
   Vec3 force;          // in world [N]
   Spread place;        // in the tangents of `normal`
-  // Covariances of its two coordinates (rows) with those of contacts beside it [m2].
-  struct Shared {
-    int serial = -1;
-    double with[2][2];
-  } shared[kOthers];
   double lag = 0.0;    // how old that is which the force speaks of [s]
   Age age;
+  // How much of a force that has changed the filter does not show yet [N]. After a step at x = K t
+  // what is still to come is exp(-x), and the age falls short of 1 / K by x times that.
+  double coming(double bandwidth) const {
+    const double y = std::fabs(1.0 - bandwidth * lag);
+    if (!(y > 1e-9)) return 0.0;
+    const double least = std::max(0.0, -std::log(y));
+    return norm(force) * y / std::max(1.0, least + std::log(least + 1.2));
+  }
   double gone = 0.0;   // since when there is no force [s]; 0: there is
   // What was said when it was found: its other explanations keep their places on their links.
   Status status = Status::located;
@@ -73,17 +67,6 @@ struct KnownContact {
     double weight;
   } others[Answer::kCandidates];
 };
-
-// What two places have in common: null unless both know of it.
-inline const KnownContact::Shared* shared(const KnownContact& a, const KnownContact& b) {
-  const auto find = [](const KnownContact& k, int serial) -> const KnownContact::Shared* {
-    for (const KnownContact::Shared& s : k.shared) {
-      if (serial >= 0 && s.serial == serial) return &s;
-    }
-    return nullptr;
-  };
-  return find(b, a.serial) != nullptr ? find(a, b.serial) : nullptr;
-}
 
 // Takes over what was said of a contact at one instant.
 inline void keep(const Answer& answer, const LinkSurfaces& surfaces, KnownContact& known) {
@@ -115,7 +98,6 @@ inline void keep(const Answer& answer, const LinkSurfaces& surfaces, KnownContac
            turn[i][1] * (best.along[1] * turn[k][0] + best.along[2] * turn[k][1]);
   };
   known.place = {element(0, 0), element(0, 1), element(1, 1)};
-  for (KnownContact::Shared& s : known.shared) s.serial = -1;
 }
 
 // What is said of a known contact now.

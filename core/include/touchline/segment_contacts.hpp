@@ -2,35 +2,32 @@
 // What is remembered of the contacts on one segment from sample to sample.
 #pragma once
 
-#include <algorithm>
-
-#include "touchline/joint_fit.hpp"
+#include "touchline/joint_estimate.hpp"
 
 namespace touchline {
 
 struct SegmentContacts {
-  static constexpr int kMost = JointFit::kMost;
+  static constexpr int kMost = JointEstimate::kMost;
   static constexpr double kYoung = 3.0;  // times 1 / K, until a contact counts as known
   static constexpr double kRefit = 0.5;  // times 1 / K, between fits of a sole contact
 
   // Contacts at a time before anything new could have been felt.
   struct Reference {
-    int count = 0;
-    KnownContact known[kMost];
-    JointFit::Uncertainty uncertainty;
+    JointEstimate contacts;
+    double time = 0.0;
   };
 
   bool touched = false;
   int first = -1;  // number of the contact that stands for the segment while none is known
-  int count = 0;
-  KnownContact known[kMost];
+  JointEstimate contacts;
   Age age;               // of the segment's wrench
   double explained = 0;  // since when one contact has explained all [s]
   bool explains = false;
-  // Time of the last fit of the places [s]. That which a contact was found by lies ahead: the noise
-  // of a filtered sample tells nothing new for 1 / K.
+  // Time of the last fit [s]. That which a contact was found by lies ahead: the noise of a filtered
+  // sample tells nothing new for 1 / K.
   double updated = 0.0;
-  double referred = 0.0; // and of the last reference [s]
+  double crept = 0.0;     // up to when the contacts may have crept [s]
+  double restless = 0.0;  // when a force changed last [s]
   Reference now, before;
 
   // Two contacts that began at the same instant, until they count as known.
@@ -38,7 +35,7 @@ struct SegmentContacts {
   double searched = -1.0, next_search = 0.0;
   int twin = -1;        // number of the second, once it is reported
   bool paired = false;
-  KnownContact pair[2];
+  JointEstimate pair;
   Answer inseparable;
 
   bool arriving = false;  // is there something that the known contacts do not explain?
@@ -47,26 +44,29 @@ struct SegmentContacts {
   bool is_calm = false, is_placed = false;
   Age new_age;
 
-  // Notes where the contacts were found by a fit, every `interval` [s].
-  void refer(const JointFit& fit, double time, double interval) {
-    if (time - referred < interval && now.count == count) return;
-    referred = time;
-    if (now.count == count) before = now;
-    now.count = count;
-    std::copy(known, known + count, now.known);
-    fit.uncertainty(now.uncertainty);
-    if (before.count != count) before = now;
+  // One contact that slides, as it is known from where it seems to have come to rest.
+  int slider = -1;
+  double rests = 0.0;  // since when [s]
+  JointEstimate rested;
+
+  // Notes what is known, every `interval` [s].
+  void refer(double time, double interval) {
+    const bool same = now.contacts.count == contacts.count;
+    if (time - now.time < interval && same) return;
+    if (same) before = now;
+    now.contacts = contacts;
+    now.time = time;
+    if (before.contacts.count != contacts.count) before = now;
   }
 
-  // Without a fit to go back to, what is known now must do: forces to `sigma` [N].
-  void refer(double sigma) {
-    if (before.count == count) return;
-    before.count = count;
-    std::copy(known, known + count, before.known);
-    JointFit::independent(known, count, sigma, before.uncertainty);
+  // Without anything to go back to, what is known now must do.
+  void refer_at_last(double time) {
+    if (before.contacts.count == contacts.count) return;
+    before.contacts = contacts;
+    before.time = time;
   }
 
-  void forget_references() { now.count = before.count = 0; }
+  void forget_references() { now.contacts.count = before.contacts.count = 0; }
 };
 
 }  // namespace touchline

@@ -13,14 +13,13 @@
 #include "touchline/reports.hpp"
 #include "touchline/segment_contacts.hpp"
 #include "touchline/single_contact.hpp"
+#include "touchline/slides.hpp"
 #include "touchline/twins.hpp"
 
 namespace touchline {
 
 class Tracks {
  public:
-  static constexpr int kMost = SegmentContacts::kMost;
-
   Tracks(SingleContact& single, Measurement& measurement, const LocalizerSettings& settings,
          std::size_t rows, int segments, double period)
       : single_(single),
@@ -31,6 +30,7 @@ class Tracks {
         known_(measurement, fit_, settings.force_scale),
         reports_(single.surfaces()),
         pasts_(segments, Past(measurement.posture().nodes().size())),
+        slides_(single, measurement, settings, fit_, known_, reports_),
         twins_(single.surfaces(), measurement, settings, fit_, known_, reports_, rows, segments) {}
 
   // One sample of segment g: fills the reports. `read()` takes the measurement anew.
@@ -41,7 +41,7 @@ class Tracks {
     bandwidth_ = bandwidth;
     time_ = time;
     if (!read()) {
-      report(s.count > 0 ? s.known[0].serial : s.first, single_.clear());
+      report(s.contacts.count > 0 ? s.contacts.known[0].serial : s.first, single_.clear());
       return;
     }
     if (!measurement_.has_wrench() || settings_.first_entry) {
@@ -52,13 +52,10 @@ class Tracks {
     const double age = s.age.follow(total_, bandwidth, time);
     lag_ = age / bandwidth;
     pasts_[g].follow(total_, bandwidth, time, measurement_.posture());
-    for (int c = 0; c < s.count; ++c) {
-      if (!s.arriving || s.count > 1)
-        s.known[c].lag = s.known[c].age.follow(s.known[c].force, bandwidth, time) / bandwidth;
-    }
+    if (!s.arriving || s.contacts.count > 1) age_all(s.contacts);
     if (s.arriving) {
       arrive(s, read);
-    } else if (s.count < 2) {
+    } else if (s.contacts.count < 2) {
       sole(s, read);
     } else {
       several(s, read);
@@ -76,9 +73,7 @@ class Tracks {
 
  private:
   static constexpr double kNear = 2e-3;        // places that differ by less are the same [m]
-  static constexpr double kSlide = 0.5;        // contacts slide no faster [m/s]
-  static constexpr double kAnywhere = 1e-2;    // variance of a place before it is known [m2]
-  static constexpr double kDrift = 1e-8;       // of a place's variance [m2/s]
+  static constexpr double kLasting = 2.0;      // times 1 / K: the age of a reference in calm
 
   double young() const { return SegmentContacts::kYoung / bandwidth_; }
   double brief() const { return 1.0 / bandwidth_; }
@@ -86,6 +81,13 @@ class Tracks {
   Vec3 force() const {
     const double* w = measurement_.wrench();
     return {w[0], w[1], w[2]};
+  }
+
+  void age_all(JointEstimate& contacts) const {
+    for (int c = 0; c < contacts.count; ++c) {
+      KnownContact& k = contacts.known[c];
+      k.lag = k.age.follow(k.force, bandwidth_, time_) / bandwidth_;
+    }
   }
 
   void report(int serial, const Answer& answer) { reports_.add(serial, answer); }
@@ -98,7 +100,7 @@ class Tracks {
     const Past& past = pasts_[g_];
     const Answer& a = past.known() ? single_.locate(g_, past, measurement_)
                                    : single_.locate(g_, lag_, measurement_);
-    if (s.count == 0) {
+    if (s.contacts.count == 0) {
       if (a.status == Status::not_separable) {
         s.explains = false;
         twins_.follow(s, g_, a, lag_, bandwidth_, time_);
@@ -112,18 +114,20 @@ class Tracks {
         s.explains = true;
         s.explained = time_;
       } else if (time_ - s.explained >= young()) {
-        settle(s, s.first, a);
+        settle(s, a);
       }
       return;
     }
-    if (agrees(s.known[0], a, single_.surfaces(), kNear)) {
-      report(s.known[0].serial, a);
-      const bool due = time_ - s.updated >= SegmentContacts::kRefit / bandwidth_;
-      if (due && explains(s.known[0])) accept(s);
+    const KnownContact& known = s.contacts.known[0];
+    if (agrees(known, a, single_.surfaces(), kNear)) {
+      report(known.serial, a);
+      if (time_ - s.updated < SegmentContacts::kRefit / bandwidth_) return;
+      creep(s.contacts, s.crept);
+      if (explains(s.contacts)) accept(s);
       return;
     }
-    if (explains(s.known[0])) {
-      report(s.known[0].serial, a);
+    if (explains(s.contacts)) {
+      report(known.serial, a);
       return;
     }
     begin_arrival(s);
@@ -132,35 +136,51 @@ class Tracks {
   }
 
   // Does a sole contact explain all, with its force free?
-  bool explains(const KnownContact& k) {
+  bool explains(const JointEstimate& one) {
     const Past& past = pasts_[g_];
-    return past.known() ? known_.explain_alone(k, measurement_.quadratic(k.node), past.mean(k.node))
-                        : known_.explain_freely(&k, 1);
+    const int node = one.known[0].node;
+    return past.known() ? known_.explain_alone(one, measurement_.quadratic(node), past.mean(node))
+                        : known_.explain_freely(one);
   }
 
-  // A contact has become known.
-  void settle(SegmentContacts& s, int serial, const Answer& a) {
-    KnownContact& k = s.known[s.count++];
-    k = KnownContact{};
+  // The first contact has become known.
+  void settle(SegmentContacts& s, const Answer& a) {
+    s.contacts.count = 0;
+    add(s.contacts, s.first, a, s.age);
+    if (explains(s.contacts)) fit_.judge(s.contacts);
+    known_as_of_now(s);
+  }
+
+  // A contact at the place where it has been found.
+  void add(JointEstimate& contacts, int serial, const Answer& a, const Age& age) const {
+    KnownContact k;
     k.serial = serial;
     keep(a, single_.surfaces(), k);
     k.lag = brief();
-    k.age = s.count == 1 ? s.age : s.new_age;
+    k.age = age;
+    contacts.add(k, settings_.force_scale);
+  }
+
+  // All that this sample tells has been taken over.
+  void known_as_of_now(SegmentContacts& s) {
     s.updated = time_ + brief();
+    s.crept = s.restless = time_;
     s.forget_references();
   }
 
-  // Takes the last fit over, and keeps it for when something arrives.
+  // Takes the last explanation over, and keeps what was known for when something arrives.
   void accept(SegmentContacts& s) {
-    fit_.apply_forces(s.known);
-    const double passed = std::min(time_ - s.updated, brief());
-    if (passed > 0.0) {
-      double free[kMost];
-      std::fill(free, free + kMost, settings_.force_scale);
-      fit_.apply_places(s.known, 0.5 * bandwidth_ * passed, free, kDrift * passed);
-      s.updated = time_;
-    }
-    s.refer(fit_, time_, SegmentContacts::kRefit / bandwidth_);
+    const double passed = std::max(0.0, std::min(time_ - s.updated, brief()));
+    if (passed > 0.0) s.updated = time_;
+    if (!known_.held()) s.restless = time_;
+    fit_.accept(s.contacts, known_.change(), 0.5 * bandwidth_ * passed);
+    const bool calm = time_ - s.restless > 2.0 * brief();
+    s.refer(time_, (calm ? kLasting : SegmentContacts::kRefit) / bandwidth_);
+  }
+
+  void creep(JointEstimate& contacts, double& since) const {
+    contacts.creep(std::max(0.0, time_ - since), bandwidth_);
+    since = time_;
   }
 
   // --- something new ---
@@ -168,18 +188,25 @@ class Tracks {
     s.arriving = true;
     s.since = time_;
     s.is_calm = s.is_placed = false;
-    s.newcomer = -1;
+    s.newcomer = s.slider = -1;
     s.new_age.restart(time_ - period_);
-    s.refer(KnownFit::kSteady);
+    s.refer_at_last(time_);
   }
 
   template <class Read>
   void arrive(SegmentContacts& s, Read&& read) {
-    for (int c = 0; c < s.count; ++c)
-      s.before.known[c].lag =
-          s.before.known[c].age.follow(s.before.known[c].force, bandwidth_, time_) / bandwidth_;
+    creep(s.before.contacts, s.before.time);
+    age_all(s.before.contacts);
     if (subsided(s)) return;
-    if (slid(s, read)) return;
+    switch (slides_.follow(s, g_, lag_, bandwidth_, time_, read)) {
+      case Slides::Outcome::none:
+        break;
+      case Slides::Outcome::slides:
+        return;
+      case Slides::Outcome::rests:
+        end_arrival(s);
+        return;
+    }
     read();
     Answer& a = remainder(s, read);
     const bool found = placed(a);
@@ -187,13 +214,15 @@ class Tracks {
     if (lets_go(s, a)) return;
     if (found && !s.is_placed) s.placed = time_;
     s.is_placed = found;
-    if (found && time_ - s.placed >= brief() && time_ - s.since >= young() && s.count < kMost) {
+    const int count = s.contacts.count;
+    if (found && time_ - s.placed >= brief() && time_ - s.since >= young() &&
+        count < SegmentContacts::kMost) {
       commit(s, a, read);
       return;
     }
     const bool lasting = time_ - s.since >= 2.0 * brief();
-    for (int c = 0; c < s.count; ++c) {
-      report(s.before.known[c]);
+    for (int c = 0; c < count; ++c) {
+      report(s.before.contacts.known[c]);
       if (lasting && !found) reports_.doubt_last();
     }
     if (!found && !lasting) return;
@@ -203,9 +232,8 @@ class Tracks {
 
   // Do the known contacts explain all again?
   bool subsided(SegmentContacts& s) {
-    fit_.allow_for_motion(s.before.known, s.count, measurement_);
-    measurement_.spread(nullptr, 0);
-    if (!known_.explain(s.before.known, s.count)) {
+    fit_.weigh(s.before.contacts, measurement_);
+    if (!known_.explain(s.before.contacts)) {
       s.is_calm = false;
       return false;
     }
@@ -216,11 +244,10 @@ class Tracks {
   // Or do they with all their forces changed, where no single contact explains what is left?
   template <class Read>
   bool changed(SegmentContacts& s, Read&& read) {
-    if (s.count == 1) return false;
+    if (s.contacts.count == 1) return false;
     read();
-    fit_.allow_for_motion(s.before.known, s.count, measurement_);
-    measurement_.spread(nullptr, 0);
-    if (!known_.explain_freely(s.before.known, s.count)) return false;
+    fit_.weigh(s.before.contacts, measurement_);
+    if (!known_.explain_freely(s.before.contacts)) return false;
     resume(s);
     return true;
   }
@@ -244,49 +271,16 @@ class Tracks {
   void resume(SegmentContacts& s) {
     if (!s.is_calm) s.calm = time_;
     s.is_calm = true;
-    std::copy(s.before.known, s.before.known + s.count, s.known);
-    fit_.apply_forces(s.known);
-    for (int c = 0; c < s.count; ++c) report(s.known[c]);
-    if (time_ - s.calm >= brief()) {
-      s.arriving = false;
-      s.forget_references();
-      end(s.newcomer);
-    }
+    s.contacts = s.before.contacts;
+    fit_.accept(s.contacts, known_.change(), 0.0);
+    for (int c = 0; c < s.contacts.count; ++c) report(s.contacts.known[c]);
+    if (time_ - s.calm >= brief()) end_arrival(s);
   }
 
-  // Has one contact moved along its body, no faster than contacts slide?
-  template <class Read>
-  bool slid(SegmentContacts& s, Read&& read) {
-    for (int c = 0; c < s.count; ++c) {
-      read();
-      KnownContact others[kMost];
-      std::copy(s.before.known, s.before.known + c, others);
-      std::copy(s.before.known + c + 1, s.before.known + s.count, others + c);
-      if (s.count > 1) {
-        JointFit::independent(others, s.count - 1, KnownFit::kSteady, loosened_);
-        fit_.take_out(others, s.count - 1, loosened_, measurement_);
-      }
-      const KnownContact& k = s.before.known[c];
-      const Answer& a = single_.locate(g_, s.count > 1 ? k.lag : lag_, measurement_);
-      const double way = kSlide * (time_ - s.since + brief());
-      if (within_reach(k, a, single_.surfaces(), way)) {
-        slide(s, c, a);
-        return true;
-      }
-    }
-    return false;
-  }
-
-  // Contact c is where it is found now; after a while that is where it is known to be.
-  void slide(SegmentContacts& s, int c, const Answer& a) {
-    for (int i = 0; i < s.count; ++i) {
-      if (i != c) report(s.before.known[i]);
-    }
-    report(s.before.known[c].serial, a);
-    if (time_ - s.since < young()) return;
-    std::copy(s.before.known, s.before.known + s.count, s.known);
-    keep(a, single_.surfaces(), s.known[c]);
+  void end_arrival(SegmentContacts& s) {
     s.arriving = false;
+    s.crept = s.restless = time_;
+    s.updated = std::max(s.updated, time_);
     s.forget_references();
     end(s.newcomer);
   }
@@ -295,78 +289,67 @@ class Tracks {
   // that explains nothing, free.
   template <class Read>
   Answer& remainder(SegmentContacts& s, Read&& read) {
-    SegmentContacts::Reference& r = s.before;
-    fit_.take_out(r.known, r.count, r.uncertainty, measurement_);
+    const JointEstimate& known = s.before.contacts;
+    fit_.take_out(known, Change::none(), measurement_);
     const double lag = s.new_age.follow(force(), bandwidth_, time_) / bandwidth_;
     answer_ = single_.locate(g_, lag, measurement_);
     freed_ = false;
     if (placed(answer_) || answer_.status == Status::wrench_only) return answer_;
     read();
-    JointFit::independent(r.known, r.count, settings_.force_scale, loosened_);
-    fit_.take_out(r.known, r.count, loosened_, measurement_);
+    fit_.take_out(known, Change::of_forces(known.count, settings_.force_scale), measurement_);
     const Answer& freed = single_.locate(g_, lag, measurement_);
     freed_ = placed(freed);
     if (freed_) answer_ = freed;
     return answer_;
   }
 
+  // The newcomer is known, and with it what its place shares with the others.
   template <class Read>
   void commit(SegmentContacts& s, const Answer& a, Read&& read) {
     if (s.newcomer < 0) s.newcomer = reports_.next();
-    std::copy(s.before.known, s.before.known + s.count, s.known);
-    for (int c = 0; c < s.count; ++c) report(s.known[c]);
+    s.contacts = s.before.contacts;
+    const int old = s.contacts.count;
+    for (int c = 0; c < old; ++c) report(s.contacts.known[c]);
     report(s.newcomer, a);
     read();
-    settle(s, s.newcomer, a);
-    relate(s);
+    Change change;
+    if (freed_) change = Change::of_forces(old, settings_.force_scale);
+    add(s.contacts, s.newcomer, a, s.new_age);
+    fit_.weigh(s.contacts, measurement_);
+    fit_.begin(measurement_, s.contacts);
+    fit_.accept(s.contacts, change, 1.0);
     s.arriving = false;
-  }
-
-  // What the place of the newest contact shares with the others, since it was found without them:
-  // a fit in which it is not known yet.
-  void relate(SegmentContacts& s) {
-    double sigma[kMost];
-    for (int c = 0; c < s.count; ++c)
-      sigma[c] = freed_ || c == s.count - 1 ? settings_.force_scale
-                                            : s.before.uncertainty.force_sigma(c);
-    KnownContact& newest = s.known[s.count - 1];
-    newest.place = {kAnywhere, 0.0, kAnywhere};
-    fit_.allow_for_motion(s.known, s.count, measurement_);
-    measurement_.spread(nullptr, 0);
-    fit_.fit(measurement_, s.known, s.count, sigma);
-    fit_.apply_places(s.known, 1.0, sigma, 0.0);
+    known_as_of_now(s);
   }
 
   // --- several contacts, all known ---
   template <class Read>
   void several(SegmentContacts& s, Read&& read) {
-    fit_.allow_for_motion(s.known, s.count, measurement_);
-    measurement_.spread(nullptr, 0);
-    if (!known_.explain(s.known, s.count)) {
+    creep(s.contacts, s.crept);
+    fit_.weigh(s.contacts, measurement_);
+    if (!known_.explain(s.contacts)) {
       begin_arrival(s);
       read();
       arrive(s, read);
       return;
     }
-    double sigma[kMost];
-    for (int c = 0; c < s.count; ++c) sigma[c] = fit_.force_sigma(c);
     accept(s);
-    for (int c = 0; c < s.count; ++c) report(s.known[c]);
-    release(s, sigma);
+    for (int c = 0; c < s.contacts.count; ++c) report(s.contacts.known[c]);
+    release(s);
   }
 
   // Contacts without force have gone; the last one stays until the segment is quiet.
-  void release(SegmentContacts& s, const double* sigma) {
-    for (int c = s.count - 1; c >= 0 && s.count > 1; --c) {
-      KnownContact& k = s.known[c];
-      const bool gone = norm(k.force) < std::max(settings_.least_force, 4.0 * sigma[c]) &&
-                        sigma[c] < KnownFit::kSteady * 3.0;
+  void release(SegmentContacts& s) {
+    for (int c = s.contacts.count - 1; c >= 0 && s.contacts.count > 1; --c) {
+      KnownContact& k = s.contacts.known[c];
+      const double sigma = s.contacts.force_sigma(c);
+      const bool gone = norm(k.force) < std::max(settings_.least_force, 4.0 * sigma) &&
+                        sigma < settings_.least_force;
       if (!gone) k.gone = 0.0;
       if (gone && k.gone == 0.0) k.gone = time_;
       if (!gone || time_ - k.gone < brief()) continue;
       end(k.serial);
-      std::copy(s.known + c + 1, s.known + s.count, s.known + c);
-      --s.count;
+      s.contacts.remove(c);
       s.forget_references();
     }
   }
@@ -377,11 +360,11 @@ class Tracks {
   double period_;
   JointFit fit_;
   KnownFit known_;
-  JointFit::Uncertainty loosened_;
   Answer answer_;
   bool freed_ = false;  // was it found with the forces of the known contacts free?
   Reports reports_;
   std::vector<Past> pasts_;  // per segment: of its whole wrench
+  Slides slides_;
   Twins twins_;
   int g_ = 0;
   double bandwidth_ = 0.0, time_ = 0.0, lag_ = 0.0;

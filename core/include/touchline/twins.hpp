@@ -17,6 +17,7 @@ class Twins {
         JointFit& fit, KnownFit& known, Reports& reports, std::size_t rows, int segments)
       : surfaces_(surfaces),
         measurement_(measurement),
+        settings_(settings),
         fit_(fit),
         known_(known),
         reports_(reports),
@@ -37,8 +38,7 @@ class Twins {
       s.searched = time;
       s.next_search = time + std::max(SegmentContacts::kRefit / bandwidth, 0.5 * (time - s.apart));
     } else if (s.paired) {
-      known_.explain_freely(s.pair, 2);
-      fit_.apply_forces(s.pair);
+      if (known_.explain_freely(s.pair)) fit_.accept(s.pair, known_.change(), 0.0);
     }
     if (!s.paired) {
       reports_.end(s.twin);
@@ -48,16 +48,16 @@ class Twins {
       return;
     }
     if (s.twin < 0) s.twin = reports_.next();
-    s.pair[0].serial = s.first;
-    s.pair[1].serial = s.twin;
-    for (const KnownContact& k : s.pair) reports_.add(k);
+    s.pair.known[0].serial = s.first;
+    s.pair.known[1].serial = s.twin;
+    for (int k = 0; k < 2; ++k) reports_.add(s.pair.known[k]);
     if (s.searched - s.apart < SegmentContacts::kYoung / bandwidth) return;
-    std::copy(s.pair, s.pair + 2, s.known);
-    s.count = 2;
+    s.contacts = s.pair;
     s.twin = -1;
     s.paired = false;
     s.apart = -1.0;
     s.updated = time + 1.0 / bandwidth;
+    s.crept = time;
     s.forget_references();
   }
 
@@ -74,16 +74,22 @@ class Twins {
     s.inseparable = one;
     s.paired = said_.separable(pairs_, measurement_.size());
     if (!s.paired) return said_.name_all(pairs_, s.inseparable);
+    s.pair.count = 0;
     for (int k = 0; k < 2; ++k) {
+      KnownContact contact;
       said_.name(pairs_, k, measurement_.size(), answer_);
-      keep(answer_, surfaces_, s.pair[k]);
-      s.pair[k].lag = lag;
-      s.pair[k].age = s.age;
+      keep(answer_, surfaces_, contact);
+      contact.lag = lag;
+      contact.age = s.age;
+      s.pair.add(contact, settings_.force_scale);
     }
+    fit_.begin(measurement_, s.pair);
+    fit_.judge(s.pair);
   }
 
   const LinkSurfaces& surfaces_;
   Measurement& measurement_;
+  const LocalizerSettings& settings_;
   JointFit& fit_;
   KnownFit& known_;
   Reports& reports_;

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+// One of the contacts on a segment slides while the others are held: it is located anew in every
+// sample, with what is known of the others taken out, from where all of them were known before it
+// began to. No allocation per sample.
+#pragma once
+
+#include "touchline/known_fit.hpp"
+#include "touchline/reports.hpp"
+#include "touchline/segment_contacts.hpp"
+#include "touchline/single_contact.hpp"
+
+namespace touchline {
+
+class Slides {
+ public:
+  enum class Outcome { none, slides, rests };
+
+  Slides(SingleContact& single, Measurement& measurement, const LocalizerSettings& settings,
+         JointFit& fit, KnownFit& known, Reports& reports)
+      : single_(single),
+        measurement_(measurement),
+        settings_(settings),
+        fit_(fit),
+        known_(known),
+        reports_(reports) {}
+
+  // Has one contact moved along its body, no faster than contacts slide? Of several the one that
+  // explains best. Then all are reported; once it rests they are known from where it does.
+  template <class Read>
+  Outcome follow(SegmentContacts& s, int g, double lag, double bandwidth, double time,
+                 Read&& read) {
+    const JointEstimate& before = s.before.contacts;
+    const double brief = 1.0 / bandwidth, way = kFastest * (time - s.since + brief);
+    int slider = -1;
+    for (int c = 0; c < before.count; ++c) {
+      read();
+      if (before.count > 1) {
+        before.copy_without(c, others_);
+        fit_.take_out(others_, Change::none(), measurement_);
+      }
+      const Answer& a = single_.locate(g, before.count > 1 ? before.known[c].lag : lag, measurement_);
+      if (!within_reach(before.known[c], a, single_.surfaces(), way)) continue;
+      if (slider >= 0 && a.chi2 > answer_.chi2) continue;
+      slider = c;
+      answer_ = a;
+    }
+    if (slider < 0) return Outcome::none;
+    for (int i = 0; i < before.count; ++i) {
+      if (i != slider) reports_.add(before.known[i]);
+    }
+    reports_.add(before.known[slider].serial, answer_);
+    if (time - s.since < SegmentContacts::kYoung * brief) return Outcome::slides;
+    read();
+    if (s.slider != slider || !stays(s)) {
+      s.slider = slider;
+      s.rests = time;
+      rest(s.rested = before, slider);
+    } else if (time - s.rests >= brief) {
+      s.contacts = s.rested;
+      return Outcome::rests;
+    }
+    return Outcome::slides;
+  }
+
+ private:
+  static constexpr double kFastest = 0.5;  // contacts slide no faster [m/s]
+
+  bool stays(const SegmentContacts& s) {
+    fit_.weigh(s.rested, measurement_);
+    return known_.explain(s.rested) && known_.held();
+  }
+
+  // Contact c is where it was found now.
+  void rest(JointEstimate& contacts, int c) {
+    KnownContact& k = contacts.known[c];
+    const Age age = k.age;
+    const double lag = k.lag;
+    keep(answer_, single_.surfaces(), k);
+    k.age = age;
+    k.lag = lag;
+    contacts.forget(c, settings_.force_scale);
+    fit_.weigh(contacts, measurement_);
+    fit_.begin(measurement_, contacts);
+    fit_.judge(contacts);
+  }
+
+  SingleContact& single_;
+  Measurement& measurement_;
+  const LocalizerSettings& settings_;
+  JointFit& fit_;
+  KnownFit& known_;
+  Reports& reports_;
+  Answer answer_;
+  JointEstimate others_;
+};
+
+}  // namespace touchline
