@@ -254,10 +254,11 @@ class Tracks {
 
   // Is what is left a known contact that lets go?
   bool lets_go(SegmentContacts& s, const Answer& a) {
-    for (int c = 0; c < s.count; ++c) {
-      const KnownContact& k = s.before.known[c];
+    const JointEstimate& before = s.before.contacts;
+    for (int c = 0; c < before.count; ++c) {
+      const KnownContact& k = before.known[c];
       if (!takes_back(k, a, single_.surfaces(), settings_.place_radius)) continue;
-      for (int i = 0; i < s.count; ++i) report(s.before.known[i]);
+      for (int i = 0; i < before.count; ++i) report(before.known[i]);
       reports_.change_force(c, k.force + a.force);
       end(s.newcomer);
       s.newcomer = -1;
