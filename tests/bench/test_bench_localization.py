@@ -41,6 +41,15 @@ def test_an_entry_hidden_in_another_link_is_no_explanation():
     assert trial.found and trial.statuses == ("located",)
 
 
+@pytest.mark.parametrize(("arm", "tier", "run"), [("panda", 3, 242), ("panda", 3, 358), ("sara", 2, 59)])
+def test_faces_that_the_line_just_misses_are_looked_at(arm, tier, run):
+    """The noisy line grazes a neighbouring face, or goes on to another place of the body."""
+    if arm == "panda":
+        panda()
+    trial = run_trial(Cell(arm, tier=tier), run)
+    assert trial.found and trial.statuses == ("located",)
+
+
 def test_statics_are_pinocchios():
     """Weight and touches at rest, against rnea and Jacobians of a tree with free joints."""
     robot = panda()

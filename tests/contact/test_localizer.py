@@ -103,6 +103,19 @@ def test_two_entries_into_one_body_stay_ambiguous(entry):
     assert min(distances) < 1e-9 and max(distances) > 0.2
 
 
+@pytest.mark.parametrize("beyond", [-2e-4, 2e-4])
+def test_a_line_that_passes_an_edge_within_the_noise_may_have_met_it(beyond):
+    """A small block before a wall, pushed near its edge: the line may just miss it."""
+    shapes = (box(0.1, 0.1, 0.1), box(0.1, 0.4, 0.4, at=(0.3, 0.0, 0.0)))
+    mechanism = Mechanism("wall", "body", {"body": Link("body", BODY, shapes)}, {}, np.zeros(3))
+    robot = describe(mechanism, [("base", "body")])
+    point = np.array([-0.05, 0.05 + beyond, 0.0])
+    answer = locate(robot, [], [("body", point, [20.0, 0.0, 0.0])])
+    assert answer.status == "ambiguous"
+    assert min(np.linalg.norm(c.position - point) for c in answer.candidates) < 5e-4
+    assert max(c.position[0] for c in answer.candidates) == pytest.approx(0.25)
+
+
 def test_joint_rows_tell_which_of_two_links_is_touched():
     robot = chain((0.3, 0.3, 0.3))
     q = np.array([0.0, 2.6, 2.6])  # folded: the outer links lie beside the inner ones

@@ -127,44 +127,9 @@ class CredibleRegion {
     }
   }
 
-  // What is known of a displacement of the point, the force being free.
   bool metric(const View& view, const Candidate& k, Metric& out) const {
-    const Vec3 unit[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    const Vec3 point = view.earlier(k.point);
-    double D[6][6], H[36];
-    for (int c = 0; c < 3; ++c) {
-      wrench_of(point, unit[c], D[c]);
-      store(Spatial{{}, cross(unit[c], k.fit.force)}, D[3 + c]);
-    }
-    for (int a = 0; a < 6; ++a) {
-      double L[6];
-      for (int r = 0; r < 6; ++r) {
-        L[r] = 0.0;
-        for (int i = 0; i < 6; ++i) L[r] += view.q.information[6 * r + i] * D[a][i];
-      }
-      for (int b = 0; b < 6; ++b) {
-        H[6 * a + b] = 0.0;
-        for (int r = 0; r < 6; ++r) H[6 * a + b] += D[b][r] * L[r];
-      }
-      if (a < 3) H[7 * a] += 1.0 / (settings_.force_scale * settings_.force_scale);
-    }
-    double F[9], x[3][3];
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) {
-        F[3 * i + j] = H[6 * i + j];
-        x[i][j] = H[6 * i + 3 + j];
-      }
-    }
-    if (!cholesky(F, 3)) return false;
-    for (int j = 0; j < 3; ++j) solve_lower(F, 3, &x[0][j], 3);
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) {
-        out.G[3 * i + j] = H[6 * (3 + i) + 3 + j];
-        for (int r = 0; r < 3; ++r) out.G[3 * i + j] -= x[r][i] * x[r][j];
-      }
-    }
     out.origin = k.point;
-    return true;
+    return found_.fitter().place_metric(view.q, view.earlier(k.point), k.fit.force, out.G);
   }
 
   void weigh() {

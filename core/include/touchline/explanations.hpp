@@ -69,7 +69,7 @@ class Explanations {
     for (int i = 0; i < used_; ++i) {
       View& view = views_[i];
       if (!(view.floor < best_ + kRelevant)) continue;
-      if (view.line && !view.steep) beside(view);
+      if (view.line) beside(view);
       if (!measurement.has_wrench()) search(view);
     }
   }
@@ -97,13 +97,16 @@ class Explanations {
   }
 
  private:
-  static constexpr int kMost = 192, kStarts = 2;
+  static constexpr int kMost = 192, kStarts = 2, kPassed = 4;
   static constexpr double kRelevant = 25.0;  // of chi2: where a search is worth while
   static constexpr double kRough = 400.0;    // of chi2: where a start may lead to something
   static constexpr double kFar = 0.15;       // from the line: not what it speaks of [m]
   static constexpr double kGrazing = 4.0;  // cost of the cone beyond which a point is moved
   static constexpr double kCoarse = 6e-3;  // joint torques alone tell no place better [m]
   static constexpr double kSame = 5e-3;    // points nearer than this are one [m]
+  static constexpr double kFine = 1e-3;    // what a place is worth knowing to [m]
+  static constexpr double kSigmas = 4.0;   // of a place, within which faces are looked for
+  static constexpr double kApart = 0.015;  // faces farther apart are looked at for themselves [m]
 
   // All entries of the line into the body.
   void enter(View& view) {
@@ -124,10 +127,13 @@ class Explanations {
     }
   }
 
-  // The line misses the body or only grazes it: the best points nearby.
+  // What the line misses by no more than the noise may be touched as well as what it enters; and
+  // where it only grazes the body, better points are nearby.
   void beside(View& view) {
-    if (!view.met) return miss(view);
-    const int own = static_cast<int>(&view - views_.data()), found = count_;
+    const int found = count_, own = index(view);
+    const bool passed = pass(view);
+    if (!view.met && !passed) miss(view);
+    if (view.steep) return;
     for (int i = 0; i < found && count_ < kMost; ++i) {
       if (candidates_[i].view != own) continue;
       candidates_[count_] = candidates_[i];
@@ -141,9 +147,74 @@ class Explanations {
     Candidate& k = candidates_[count_];
     k = Candidate{};
     k.surface = surface;
-    k.view = static_cast<int>(&view - views_.data());
+    k.view = index(view);
     return k;
   }
+
+  // The faces that the line passes within the noise and at no grazing angle, apart from its entries
+  // and from each other: the best point on each. Returns whether there are any.
+  bool pass(View& view) {
+    const ForceLine line = view.later_line();
+    const auto nearest = [&](const Vec3& p) {
+      return line.at(dot(p - line.origin, line.direction));
+    };
+    double G[9];
+    const Vec3 middle = view.earlier(nearest(posture_.pose(view.node).p));
+    if (!fitter_.place_metric(view.q, middle, view.wrench.linear, G)) return false;
+    Candidate starts[kPassed];
+    int found = 0;
+    const double limit = std::min(kFar, kSigmas * widest(G, line.direction));
+    for (int s : *view.surfaces) {
+      surfaces_.around(s, line, limit, fitter_.steepest(), [&](const SurfacePoint& p) {
+        Candidate k;
+        k.surface = s;
+        k.view = index(view);
+        k.point = p.point;
+        k.normal = p.normal;
+        k.fit.cone = fitter_.cone_cost(-dot(p.normal, line.direction));
+        k.fit.chi2 = view.floor + squared(G, p.point - nearest(p.point));
+        if (k.fit.cost() < best_ + kRelevant && !entered(k))
+          found = insert(starts, kPassed, found, k, kApart);
+      });
+    }
+    for (int i = 0; i < found && count_ < kMost; ++i) {
+      place(view, starts[i].surface, starts[i].point, starts[i].normal);
+      refinement_.improve(view, candidates_[count_], kFine, kApart);
+      if (!known(0, kSame)) keep();
+    }
+    return found > 0;
+  }
+
+  // Is there an entry of the line nearby that explains as well?
+  bool entered(const Candidate& k) const {
+    for (int i = 0; i < count_; ++i) {
+      const Candidate& other = candidates_[i];
+      if (other.view == k.view && norm(other.point - k.point) < kApart &&
+          (other.fit.cone < kGrazing || other.fit.cost() < k.fit.cost()))
+        return true;
+    }
+    return false;
+  }
+
+  // One sigma of a place across a direction, where it is least known [m].
+  static double widest(const double* G, const Vec3& direction) {
+    Vec3 s, t;
+    tangents(direction, s, t);
+    const double a = squared(G, s), c = squared(G, t);
+    const double b = 0.5 * (squared(G, s + t) - a - c);
+    const double least = 0.5 * (a + c - std::sqrt((a - c) * (a - c) + 4.0 * b * b));
+    return 1.0 / std::sqrt(std::max(least, 1e-12));
+  }
+
+  static double squared(const double* G, const Vec3& d) {
+    const double v[3] = {d.x, d.y, d.z};
+    double sum = 0.0;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) sum += v[i] * G[3 * i + j] * v[j];
+    return std::max(0.0, sum);
+  }
+
+  int index(const View& view) const { return static_cast<int>(&view - views_.data()); }
 
   // Is the candidate at hand one of those from `first` on?
   bool known(int first, double distance) const {
@@ -194,7 +265,7 @@ class Explanations {
         place(view, s, surfaces_.to_world(sample.point, view.node),
               surfaces_.turn_to_world(sample.normal, view.node), best_ + kRough);
         if (candidates_[count_].fit.cost() < best_ + kRough)
-          found = insert(starts, found, candidates_[count_]);
+          found = insert(starts, kStarts, found, candidates_[count_], 0.04);
       }
       for (int i = 0; i < found && count_ < kMost; ++i) {
         candidates_[count_] = starts[i];
@@ -205,15 +276,14 @@ class Explanations {
   }
 
   // Keeps the best few, apart from each other.
-  static int insert(Candidate* starts, int found, const Candidate& k) {
-    constexpr double apart = 0.04;
+  static int insert(Candidate* starts, int most, int found, const Candidate& k, double apart) {
     for (int i = 0; i < found; ++i) {
       if (norm(starts[i].point - k.point) < apart) {
         if (k.fit.cost() < starts[i].fit.cost()) starts[i] = k;
         return found;
       }
     }
-    if (found < kStarts) {
+    if (found < most) {
       starts[found] = k;
       return found + 1;
     }

@@ -109,11 +109,52 @@ class ForceFitter {
     return -std::log(volume) - 0.5 * beyond * beyond / (kSlantSigma * kSlantSigma);
   }
 
+  // Cosine between push and inward normal, below which a face is not worth looking at.
+  double steepest() const { return std::cos(cone_ + 4.0 * settings_.cone_softness); }
+
   double cone_cost(double cosine) const {
     if (cosine <= 0.0) return std::numeric_limits<double>::infinity();
     const double beyond = std::acos(std::min(1.0, cosine)) - cone_;
     if (beyond <= 0.0) return 0.0;
     return beyond * beyond / (settings_.cone_softness * settings_.cone_softness);
+  }
+
+  // What is known of a displacement of the point of a force, the force being free: chi2 grows by
+  // d^T G d. False where forces are not known.
+  bool place_metric(const Quadratic& q, const Vec3& point, const Vec3& force, double* G) const {
+    double D[6][6], H[36];
+    for (int c = 0; c < 3; ++c) {
+      wrench_of(point, unit(c), D[c]);
+      store(Spatial{{}, cross(unit(c), force)}, D[3 + c]);
+    }
+    for (int a = 0; a < 6; ++a) {
+      double L[6];
+      for (int r = 0; r < 6; ++r) {
+        L[r] = 0.0;
+        for (int i = 0; i < 6; ++i) L[r] += q.information[6 * r + i] * D[a][i];
+      }
+      for (int b = 0; b < 6; ++b) {
+        H[6 * a + b] = 0.0;
+        for (int r = 0; r < 6; ++r) H[6 * a + b] += D[b][r] * L[r];
+      }
+      if (a < 3) H[7 * a] += 1.0 / (settings_.force_scale * settings_.force_scale);
+    }
+    double F[9], x[3][3];
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        F[3 * i + j] = H[6 * i + j];
+        x[i][j] = H[6 * i + 3 + j];
+      }
+    }
+    if (!cholesky(F, 3)) return false;
+    for (int j = 0; j < 3; ++j) solve_lower(F, 3, &x[0][j], 3);
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        G[3 * i + j] = H[6 * (3 + i) + 3 + j];
+        for (int r = 0; r < 3; ++r) G[3 * i + j] -= x[r][i] * x[r][j];
+      }
+    }
+    return true;
   }
 
   // The information on force and on the two tangent coordinates of the point (5, 5), with what is

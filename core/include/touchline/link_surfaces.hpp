@@ -74,6 +74,17 @@ class LinkSurfaces {
     return in_world(surfaces_[surface].mesh.nearest_to_line(to_node(line, node), limit), node);
   }
 
+  // Calls `visit(SurfacePoint)`, in world, for the point nearest to a line of each triangle that is
+  // nearer to it than `limit` and stands against it: at a cosine above `steep`.
+  template <class Visit>
+  void around(int surface, const ForceLine& line, double limit, double steep, Visit&& visit) const {
+    const int node = surfaces_[surface].node;
+    const ForceLine local = to_node(line, node);
+    const auto against = [&](const Vec3& normal) { return -dot(normal, local.direction) > steep; };
+    surfaces_[surface].mesh.around(local, limit, against,
+                                   [&](const SurfacePoint& p) { visit(in_world(p, node)); });
+  }
+
   // Calls `visit(surface, point, normal, t)` for each entry of a line into a surface; where it is
   // graspable, for each exit too.
   template <class Visit>

@@ -84,13 +84,34 @@ class Mesh {
   SurfacePoint nearest_to_line(const ForceLine& line,
                                double limit = std::numeric_limits<double>::infinity()) const {
     return nearest(
-        limit,
-        [&](const Box& b) {
-          const Vec3 centre = 0.5 * (b.low + b.high) - line.origin;
-          const Vec3 beside = centre - dot(centre, line.direction) * line.direction;
-          return norm(beside) - 0.5 * norm(b.high - b.low);
-        },
+        limit, [&](const Box& b) { return beyond(b, line); },
         [&](const Triangle& tri, SurfacePoint& best) { nearer_to_line(tri, line, best); });
+  }
+
+  // Calls `visit(SurfacePoint)` for the point nearest to the line of each triangle that is nearer
+  // to it than `limit` and whose normal is `wanted(normal)`.
+  template <class Wanted, class Visit>
+  void around(const ForceLine& line, double limit, Wanted&& wanted, Visit&& visit) const {
+    if (empty()) return;
+    int stack[kDepth], size = 0;
+    stack[size++] = 0;
+    while (size > 0) {
+      const int index = stack[--size];
+      const Box& box = boxes_[index];
+      if (!(beyond(box, line) < limit)) continue;
+      if (box.count == 0) {
+        stack[size++] = index + 1;
+        stack[size++] = box.next;
+        continue;
+      }
+      for (int i = box.next; i < box.next + box.count; ++i) {
+        if (!wanted(triangles_[i].normal)) continue;
+        SurfacePoint p;
+        p.distance = limit;
+        nearer_to_line(triangles_[i], line, p);
+        if (p.face >= 0) visit(p);
+      }
+    }
   }
 
   // The point of the surface nearest to `p`, if nearer than `limit`.
@@ -163,6 +184,13 @@ class Mesh {
     box.low = box.low - Vec3{pad, pad, pad};
     box.high = box.high + Vec3{pad, pad, pad};
     return box;
+  }
+
+  // No triangle of a box is nearer to the line.
+  static double beyond(const Box& b, const ForceLine& line) {
+    const Vec3 centre = 0.5 * (b.low + b.high) - line.origin;
+    const Vec3 beside = centre - dot(centre, line.direction) * line.direction;
+    return norm(beside) - 0.5 * norm(b.high - b.low);
   }
 
   static Vec3 invert(const Vec3& d) {

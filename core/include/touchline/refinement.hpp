@@ -17,9 +17,10 @@ class Refinement {
   Refinement(const LinkSurfaces& surfaces, const ForceFitter& fitter)
       : surfaces_(surfaces), fitter_(fitter) {}
 
-  // To the best place nearby, as exactly as `finest` [m].
-  void improve(const View& view, Candidate& k, double finest = 1e-3) const {
-    if (!descend(view, k)) settle(view, k, finest);
+  // To the best place nearby, as exactly as `finest` [m]; where it does not go straight downhill,
+  // within about `around` [m].
+  void improve(const View& view, Candidate& k, double finest = 1e-3, double around = 0.064) const {
+    if (!descend(view, k)) settle(view, k, finest, around);
   }
 
  private:
@@ -46,8 +47,8 @@ class Refinement {
 
   // Where the friction cone or an edge stands in the way: smaller and smaller trials around, down
   // to `finest` [m].
-  void settle(const View& view, Candidate& k, double finest) const {
-    for (double radius = 0.032; radius > finest; radius *= 0.5) {
+  void settle(const View& view, Candidate& k, double finest, double around) const {
+    for (double radius = 0.5 * around; radius > finest; radius *= 0.5) {
       for (int round = 0; round < 3 && better_around(view, k, radius); ++round) {
       }
     }
