@@ -131,7 +131,7 @@ class Explanations {
   // where it only grazes the body, better points are nearby.
   void beside(View& view) {
     const int found = count_, own = index(view);
-    const bool passed = pass(view);
+    const bool passed = view.floor < best_ + kSigmas * kSigmas && pass(view);
     if (!view.met && !passed) miss(view);
     if (view.steep) return;
     for (int i = 0; i < found && count_ < kMost; ++i) {
@@ -173,7 +173,7 @@ class Explanations {
         k.normal = p.normal;
         k.fit.cone = fitter_.cone_cost(-dot(p.normal, line.direction));
         k.fit.chi2 = view.floor + squared(G, p.point - nearest(p.point));
-        if (k.fit.cost() < best_ + kRelevant && !entered(k))
+        if (k.fit.cost() < best_ + kSigmas * kSigmas && !entered(k))
           found = insert(starts, kPassed, found, k, kApart);
       });
     }

@@ -84,7 +84,13 @@ class Mesh {
   SurfacePoint nearest_to_line(const ForceLine& line,
                                double limit = std::numeric_limits<double>::infinity()) const {
     return nearest(
-        limit, [&](const Box& b) { return beyond(b, line); },
+        limit,
+        [&](const Box& b) {
+          const Vec3 low = exact(b.low), high = exact(b.high);
+          const Vec3 centre = 0.5 * (low + high) - line.origin;
+          const Vec3 beside = centre - dot(centre, line.direction) * line.direction;
+          return norm(beside) - 0.5 * norm(high - low);
+        },
         [&](const Triangle& tri, SurfacePoint& best) { nearer_to_line(tri, line, best); });
   }
 
@@ -93,12 +99,13 @@ class Mesh {
   template <class Wanted, class Visit>
   void around(const ForceLine& line, double limit, Wanted&& wanted, Visit&& visit) const {
     if (empty()) return;
+    const Vec3 inverse = invert(line.direction);
     int stack[kDepth], size = 0;
     stack[size++] = 0;
     while (size > 0) {
       const int index = stack[--size];
       const Box& box = boxes_[index];
-      if (!(beyond(box, line) < limit)) continue;
+      if (!crosses(box, line.origin, inverse, limit)) continue;
       if (box.count == 0) {
         stack[size++] = index + 1;
         stack[size++] = box.next;
@@ -131,10 +138,14 @@ class Mesh {
 
  private:
   static constexpr int kLeaf = 4, kDepth = 64;
+  static constexpr float kInfinity = std::numeric_limits<float>::infinity();
   static constexpr double kEdge = 1e-9;  // of barycentric coordinates: edges belong to both sides
 
-  struct Box {
+  struct Bounds {
     Vec3 low, high;
+  };
+  struct Box {
+    BasicVec3<float> low, high;  // rounded outwards: half of the memory, where time goes
     int next;   // a leaf's first triangle, or an inner box's second child (the first follows it)
     int count;  // triangles of a leaf; 0: an inner box
   };
@@ -142,11 +153,10 @@ class Mesh {
   int build(int begin, int end) {
     const int index = static_cast<int>(boxes_.size());
     boxes_.push_back({});
-    Box box = bounds(begin, end);
-    box.next = begin;
-    box.count = end - begin;
+    const Bounds exact = bounds(begin, end);
+    Box box{rounded(exact.low, -kInfinity), rounded(exact.high, kInfinity), begin, end - begin};
     if (box.count > kLeaf) {
-      split(begin, end, box);
+      split(begin, end, exact);
       boxes_[index] = box;
       build(begin, (begin + end) / 2);
       box.next = build((begin + end) / 2, end);
@@ -156,7 +166,15 @@ class Mesh {
     return index;
   }
 
-  void split(int begin, int end, const Box& box) {
+  static BasicVec3<float> rounded(const Vec3& v, float towards) {
+    const auto round = [towards](double x) {
+      return std::nextafter(static_cast<float>(x), towards);
+    };
+    return {round(v.x), round(v.y), round(v.z)};
+  }
+  static Vec3 exact(const BasicVec3<float>& v) { return {v.x, v.y, v.z}; }
+
+  void split(int begin, int end, const Bounds& box) {
     const Vec3 size = box.high - box.low;
     const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
     const auto centre = [axis](const Triangle& t) {
@@ -169,9 +187,9 @@ class Mesh {
                      });
   }
 
-  Box bounds(int begin, int end) const {
+  Bounds bounds(int begin, int end) const {
     constexpr double inf = std::numeric_limits<double>::infinity();
-    Box box{{inf, inf, inf}, {-inf, -inf, -inf}, 0, 0};
+    Bounds box{{inf, inf, inf}, {-inf, -inf, -inf}};
     for (int i = begin; i < end; ++i) {
       const Triangle& t = triangles_[i];
       for (const Vec3& p : {t.a, t.a + t.ab, t.a + t.ac}) {
@@ -186,22 +204,18 @@ class Mesh {
     return box;
   }
 
-  // No triangle of a box is nearer to the line.
-  static double beyond(const Box& b, const ForceLine& line) {
-    const Vec3 centre = 0.5 * (b.low + b.high) - line.origin;
-    const Vec3 beside = centre - dot(centre, line.direction) * line.direction;
-    return norm(beside) - 0.5 * norm(b.high - b.low);
-  }
-
   static Vec3 invert(const Vec3& d) {
     const auto inverse = [](double x) { return 1.0 / (std::fabs(x) > 1e-200 ? x : 1e-200); };
     return {inverse(d.x), inverse(d.y), inverse(d.z)};
   }
 
-  static bool crosses(const Box& box, const Vec3& o, const Vec3& inverse) {
-    const double x0 = (box.low.x - o.x) * inverse.x, x1 = (box.high.x - o.x) * inverse.x;
-    const double y0 = (box.low.y - o.y) * inverse.y, y1 = (box.high.y - o.y) * inverse.y;
-    const double z0 = (box.low.z - o.z) * inverse.z, z1 = (box.high.z - o.z) * inverse.z;
+  // Does the line through `o` cross the box, or one that is wider by `pad`?
+  static bool crosses(const Box& box, const Vec3& o, const Vec3& inverse, double pad = 0.0) {
+    const Vec3 wide{pad, pad, pad};
+    const Vec3 low = exact(box.low) - wide - o, high = exact(box.high) + wide - o;
+    const double x0 = low.x * inverse.x, x1 = high.x * inverse.x;
+    const double y0 = low.y * inverse.y, y1 = high.y * inverse.y;
+    const double z0 = low.z * inverse.z, z1 = high.z * inverse.z;
     const double enter = std::max({std::min(x0, x1), std::min(y0, y1), std::min(z0, z1)});
     const double leave = std::min({std::max(x0, x1), std::max(y0, y1), std::max(z0, z1)});
     return enter <= leave;
