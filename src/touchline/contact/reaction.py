@@ -30,6 +30,7 @@ CALM_TIME = 0.05  # s over which what is no collision is answered: a jerk looks 
 SIDE_TIME = 0.05  # s in which a stopping robot that is pushed away loses its other motion
 NEW_TIME = 0.03  # s for which a contact presses whatever the external joint torques say
 YIELD_TIME = 0.1  # s after which a stopping robot does not let itself be pushed away any more
+STRONG, YIELD_MOST = 100.0, 3.0  # N from which it does so for longer, and how many times at most
 YIELD_EASE = 0.03  # s before that over which it takes on the brake, without a jerk either
 HOLD_TIME = 0.2  # s after which it holds its pose even if it is pushed on: brakes alone creep
 REST = 0.02  # rad/s: slower than that the robot stands
@@ -37,7 +38,8 @@ FLOAT_TIME = 0.5  # s in which a floating robot loses its velocity to friction
 RETRACT_EASE = 0.05  # s over which the retraction slows down at its end
 PRESSING = 5.0  # N: with less a contact does not press any more
 LEAST_LEVER = 0.02  # m: below it no joint moves the point along the force to speak of
-STRAIGHT = 0.5  # cosine between force and motion below which the point would slide, not leave
+REST_SHARE = 0.5  # of a segment's force: with more besides, a contact does not stand for it
+STRAIGHT = 0.5  # cosine between force and motion below which the point would rather slide
 
 
 def ignore(contact: Contact, state: State) -> Array:
@@ -59,7 +61,7 @@ def stop(contact: Contact, state: State) -> Array:
         return state.bias_torque + within_effort(state, push)
     escape = yielding(contact, state)
     if escape is not None and (leaving := float(escape[0] @ state.qd)) > 0.0:
-        spared = min((YIELD_TIME - state.age) / YIELD_EASE, 1.0)
+        spared = min((_yield_time(escape[1], state) - state.age) / YIELD_EASE, 1.0)
         brake_time = SERVO_TIME + spared * (SIDE_TIME - SERVO_TIME)
         push = -state.inertia @ (state.qd - spared * leaving * escape[1]) / brake_time
     else:
@@ -86,10 +88,18 @@ def yielding(contact: Contact, state: State) -> tuple[Array, Array] | None:
 
     A new contact is taken to press: the external joint torques come through a filter, later.
     """
-    escape = escape_motion(contact, state) if state.age < YIELD_TIME else None
-    if escape is None or state.age < NEW_TIME or pressing(escape[1], state) > PRESSING:
+    if state.age > YIELD_MOST * YIELD_TIME:
+        return None
+    escape = escape_motion(contact, state)
+    if escape is None or state.age < NEW_TIME:
         return escape
-    return None
+    presses = pressing(escape[1], state) > PRESSING and state.age < _yield_time(escape[1], state)
+    return escape if presses else None
+
+
+def _yield_time(direction: Array, state: State) -> float:
+    """For how long `stop` yields: a soft and heavy body presses on for longer than a hard one."""
+    return YIELD_TIME * min(max(pressing(direction, state) / STRONG, 1.0), YIELD_MOST)
 
 
 def settled(contact: Contact, state: State) -> bool:
@@ -122,26 +132,38 @@ class Retract:
 
     def __call__(self, contact: Contact, state: State) -> Array:
         """Joint torques (n,) [Nm or N]."""
-        escape = escape_motion(contact, state)
+        escape = escape_motion(contact, state, STRAIGHT)
         if escape is None:
             return stop(contact, state)
         lever, direction = escape
-        left = self.way - state.advance(lever)
-        goal = direction * np.clip(left / RETRACT_EASE, 0.0, self.speed)
-        goal = goal / max(1.0, float(np.max(np.abs(goal) / state.speed_limit)))
-        push = state.inertia @ (goal - state.qd) / SERVO_TIME
+        left, leaving = self.way - state.advance(lever), float(lever @ state.qd)
+        speed = min(
+            self.speed, float(np.min(state.speed_limit / np.maximum(np.abs(direction), 1e-9)))
+        )
+        speed, brake_time = min(max(left / RETRACT_EASE, 0.0), speed), SERVO_TIME
+        if yielding(contact, state) is not None:  # pushed away faster than it would go by itself
+            speed, brake_time = max(speed, leaving), SIDE_TIME
+        rest = state.qd - leaving * direction
+        push = state.inertia @ ((speed - leaving) * direction / SERVO_TIME - rest / brake_time)
         return state.bias_torque + within_effort(state, urgency(contact, state) * push)
 
 
-def escape_motion(contact: Contact, state: State) -> tuple[Array, Array] | None:
+def escape_motion(
+    contact: Contact, state: State, straight: float = 0.0
+) -> tuple[Array, Array] | None:
     """The joint motion of least kinetic energy that moves the touched point along the force.
+
+    Args:
+        contact: that presses.
+        state: of the robot.
+        straight: least cosine between the force and the way of the point, if it is known.
 
     Returns:
         How far each joint (n,) moves the point along the force, and the joint motion (n,) that
         moves it by one metre; None where no joint can, where the point would rather slide along
         the surface, or where nothing is known.
     """
-    place = _place(contact)
+    place = _place(contact, guess=state.tau_ext is None)
     if place is None:
         return _yielding(contact, state)
     link, point, force = place
@@ -150,20 +172,24 @@ def escape_motion(contact: Contact, state: State) -> tuple[Array, Array] | None:
     if np.linalg.norm(lever) < LEAST_LEVER:
         return None
     direction = _least_energy(state, lever)
-    straight = 1.0 / float(np.linalg.norm(jacobian @ direction))  # cosine with the force
-    return (lever, direction) if straight > STRAIGHT else None
+    cosine = 1.0 / float(np.linalg.norm(jacobian @ direction))
+    return (lever, direction) if cosine > straight else None
 
 
-def _place(contact: Contact) -> tuple[str, Array, Array] | None:
-    """Link, point and force, if need be those of the best candidate and of the segment."""
-    force = contact.force
-    if force is None and contact.wrench is not None:
-        force = contact.wrench[:3]
+def _place(contact: Contact, guess: bool) -> tuple[str, Array, Array] | None:
+    """Link, point and force of what presses; with `guess` those of the best candidate too.
+
+    None as well where the force is not most of what the segment feels: a blow beside a contact that
+    was there before is felt some time before its own place is known.
+    """
+    whole = None if contact.wrench is None else contact.wrench[:3]
+    force = whole if contact.force is None else contact.force
     if force is None or not np.any(force):
         return None
-    if contact.link is not None and contact.position is not None:
+    most = whole is None or np.linalg.norm(whole - force) < REST_SHARE * np.linalg.norm(whole)
+    if most and contact.link is not None and contact.position is not None:
         return contact.link, contact.position, force
-    best = next(iter(contact.candidates), None)
+    best = next(iter(contact.candidates), None) if guess else None
     return None if best is None else (best.link, best.position, force)
 
 
@@ -171,7 +197,8 @@ def _yielding(contact: Contact, state: State) -> tuple[Array, Array] | None:
     """Without a place: along the external joint torques, which are J^T f themselves."""
     if state.tau_ext is None:
         return None
-    lever = np.nan_to_num(state.tau_ext) / max(contact.size, 1.0)
+    force = contact.size if contact.wrench is None else float(np.linalg.norm(contact.wrench[:3]))
+    lever = np.nan_to_num(state.tau_ext) / max(force, 1.0)
     if np.linalg.norm(lever) < LEAST_LEVER:
         return None
     return lever, _least_energy(state, lever)
