@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from touchline.bench.guiding import guide, handle_point
-from touchline.bench.reaction_trial import MASS, SPRING, Case, measure, pressing, reactor
+from touchline.bench.reaction_trial import Case, measure, pressing, reactor
 from touchline.contact.pipeline import Pipeline
 from touchline.contact.reactor import Reactor
 from touchline.model.description import PolicyDescription, PolicyRule
@@ -95,7 +95,7 @@ def test_a_led_arm_reacts_to_the_blow_and_not_to_the_hand(scene):
 def test_a_stop_of_a_led_arm_does_not_raise_the_peak(scene, link, index):
     """The point gives way before the filtered torques show it, and the first place is rough."""
     rng = np.random.default_rng([0, 2, index, 500])
-    encounter = scene.draw((link,), 0.5, rng, SPRING, MASS, own_share=0.0)
+    encounter = scene.draw((link,), 0.5, rng, own_share=0.0)
     hand = ("handle", handle_point(scene.plant))
     peaks = {}
     for name in ("ignore", "stop"):
@@ -131,7 +131,7 @@ def test_the_obstacle_is_a_mass_on_a_spring(scene):
 def test_a_body_between_two_links_presses_both(scene):
     """It touches link7 and the tool at once; forces of both compress its spring."""
     rng = np.random.default_rng([0, 0, 5, 1000])
-    encounter = scene.draw(("link7",), 1.0, rng, SPRING, MASS)
+    encounter = scene.draw(("link7",), 1.0, rng)
     outcome = scene.play(encounter, reactor(scene.robot, "ignore"), 0.2)
     first, second = (np.linalg.norm(outcome.truth.force[:, k], axis=1) for k in range(TOUCHES))
     row = int(np.argmax(second))

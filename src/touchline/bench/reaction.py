@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from touchline.bench.guiding import PART, Guided, guide, told
-from touchline.bench.reaction_trial import QUIET, SCENES, Case, Trial, cases, play
+from touchline.bench.reaction_trial import MASSES, QUIET, SCENES, SPRINGS, Case, Trial, cases, play
 from touchline.bench.request import check_least, prepare_results
 from touchline.bench.tables import Row, aligned
 from touchline.contact.reaction import REACTIONS
@@ -108,8 +108,9 @@ def summary(trials: Sequence[Trial]) -> str:
 
 def _name(trial: Trial, without: dict[tuple, float]) -> str:
     return (
-        f"{trial.scene}, {trial.link} at {trial.speed:g} m/s, {trial.reaction}: {trial.peak:.1f} N,"
-        f" {without[_key(trial)]:.1f} N without; below 20 N after {trial.quiet:.3f} s"
+        f"{trial.scene}, {trial.link} at {trial.speed:g} m/s, {trial.spring / 1e3:.0f} kN/m, "
+        f"{trial.mass:.1f} kg, {trial.reaction}: {trial.peak:.1f} N, {without[_key(trial)]:.1f} N "
+        f"without; below 20 N after {trial.quiet:.3f} s"
     )
 
 
@@ -127,7 +128,9 @@ def main(encounters: int = 2, hours: float = 1.0, out: Path | None = None) -> No
     todo = list(cases(encounters))
     trials = run_trials(todo)
     print(f"reaction benchmark: sara, {len(todo)} encounters, each with every reaction; medians")
-    print("spring 25 kN/m; free and guided: a body of 4 kg, wall: one that cannot give way\n")
+    (soft, hard), (light, heavy) = np.array(SPRINGS) / 1e3, MASSES
+    bodies = f"bodies of {light:g} to {heavy:g} kg, wall: one that cannot give way"
+    print(f"springs of {soft:g} to {hard:g} kN/m; free and guided: {bodies}\n")
     print(f"{table(trials)}\n\n{summary(trials)}")
     parts = run_guiding(hours)
     if parts:

@@ -21,12 +21,12 @@ Array = NDArray[np.float64]
 
 SCENES = ("free", "wall", "guided")
 LINKS = {
-    "free": ("link0", "link1", "link2", "link3", "link5", "link7", "tool", "handle"),
-    "wall": ("link2", "link3", "link5", "link7", "tool", "handle"),
+    "free": (*(f"link{i}" for i in range(8)), "tool", "handle"),
+    "wall": (*(f"link{i}" for i in range(2, 8)), "tool", "handle"),
     "guided": ("link1", "link3", "link5", "link7"),
 }
 SPEEDS = {"free": (0.25, 0.5, 1.0, 1.5), "wall": (0.25, 0.5), "guided": (0.5, 1.0)}  # m/s
-SPRING, MASS = 2.5e4, 4.0  # N/m, kg
+SPRINGS, MASSES = (5e3, 7.5e4), (1.0, 16.0)  # N/m, kg
 SECONDS = 0.8
 QUIET = 20.0  # N
 MODEL_ERROR = 0.02
@@ -57,6 +57,7 @@ class Trial:
     Attributes:
         scene, link, speed, seed: of the case.
         reaction: of the robot.
+        spring, mass: of the body [N/m, kg].
         peak: largest contact force along the body's way [N]: what presses its spring.
         impulse: of that force [N s].
         quiet: time after which it stays below 20 N [s].
@@ -72,6 +73,8 @@ class Trial:
     speed: float
     seed: int
     reaction: str
+    spring: float
+    mass: float
     peak: float
     impulse: float
     quiet: float
@@ -100,9 +103,10 @@ def encounter_of(case: Case) -> Encounter:
     """The encounter of a case; the same for every reaction."""
     key = [case.seed, SCENES.index(case.scene), LINKS["free"].index(case.link)]
     rng = np.random.default_rng([*key, round(1000 * case.speed)])
-    mass = np.inf if case.scene == "wall" else MASS
+    spring, mass = (float(np.exp(rng.uniform(*np.log(span)))) for span in (SPRINGS, MASSES))
+    mass = np.inf if case.scene == "wall" else mass
     own_share = 0.0 if case.scene == "guided" else 1.0
-    return arm_scene().draw((case.link,), case.speed, rng, SPRING, mass, own_share)
+    return arm_scene().draw((case.link,), case.speed, rng, spring, mass, own_share)
 
 
 def outcome_of(case: Case, encounter: Encounter, reaction: str) -> Outcome:
@@ -145,6 +149,8 @@ def measure(outcome: Outcome, case: Case, reaction: str, robot: Robot) -> Trial:
     return Trial(
         **asdict(case),
         reaction=reaction,
+        spring=outcome.encounter.body.spring,
+        mass=outcome.encounter.body.mass,
         peak=float(force.max()),
         impulse=float(force.sum() * (time[1] - time[0])),
         quiet=_quiet(time[force > QUIET], time, begin),

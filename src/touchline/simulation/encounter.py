@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 HIT_TIME = 0.15  # s: the observer has settled by then
 PUSH_ON = 0.15  # s that the robot's own motion goes on at full speed after that
 SLOW_DOWN = 0.2  # s in which it then comes to rest
+CLEAR_TIMES = np.linspace(0.0, HIT_TIME - 0.01, 11)  # s at which nothing may touch yet
 SPEED_SHARE = 0.8  # of the joints' speed limits
 TRIES = 5000
 
@@ -155,7 +156,9 @@ class EncounterScene:
                 continue
             if self._in_range(q, qd):
                 body = Body(point, -normal, HIT_TIME, speed - own, spring, mass)
-                return Encounter(q, qd, at.link, body)
+                encounter = Encounter(q, qd, at.link, body)
+                if self._clear(encounter):
+                    return encounter
         raise InputError(
             f"robot {self.robot.name}: no encounter with {', '.join(links)} at {speed:g} m/s"
         )
@@ -178,6 +181,18 @@ class EncounterScene:
     def _in_range(self, q: Array, qd: Array) -> bool:
         ends = q - HIT_TIME * qd, q + (PUSH_ON + SLOW_DOWN / 2) * qd
         return all(bool(np.all((self.setup.lower < e) & (e < self.setup.upper))) for e in ends)
+
+    def _clear(self, encounter: Encounter) -> bool:
+        """Whether nothing is in the body's way before it strikes."""
+        trajectory = encounter.trajectory()
+        for time in CLEAR_TIMES.tolist():
+            goal = trajectory(time)
+            self.plant.reset(goal.q, goal.qd, time)
+            self.obstacle.place(self.plant, encounter.body)
+            self.plant.evaluate()
+            if self.plant.data.ncon > 0:
+                return False
+        return True
 
     def play(
         self,

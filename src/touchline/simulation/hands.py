@@ -32,6 +32,7 @@ class Hand:
         stiffness: of the spring to the target [N/m].
         limit: of its force [N].
         behind: how far behind the grip, against the force, the contact lies [m].
+        pressed: the link on which it lies there; at first `link`.
         began: when the force first exceeded FELT [s].
         released: whether it is on its way off.
         acting: (3,) force in world [N].
@@ -44,10 +45,14 @@ class Hand:
     stiffness: float = 200.0
     limit: float = 30.0
     behind: float = 0.0
+    pressed: str = field(default="", init=False)
     began: float | None = field(default=None, init=False)
     released: bool = field(default=False, init=False)
     acting: Array = field(default_factory=lambda: np.zeros(3), init=False)
     _last: Array | None = field(default=None, init=False)
+
+    def __post_init__(self) -> None:
+        self.pressed = self.link
 
     def wanted(self, T_world_link: Array) -> Array:
         """Force (3,) in world [N] at which it aims."""
@@ -109,7 +114,7 @@ class Hands(Forces):
             self.slots[slot] = None
             return None
         point = place(T, hand.grip) - hand.behind / max(size, 1e-9) * hand.acting
-        return Touch(True, hand.link, point, hand.acting.copy(), np.zeros(3))
+        return Touch(True, hand.pressed, point, hand.acting.copy(), np.zeros(3))
 
 
 def place(T: Array, point: Array) -> Array:

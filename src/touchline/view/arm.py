@@ -22,6 +22,7 @@ from touchline.simulation.touchable import TouchableSurface, structure_links, to
 from touchline.simulation.truth import Truth
 from touchline.view.faults import SensorFault
 from touchline.view.motion import Switched
+from touchline.view.reach import pressed
 from touchline.view.reacting import ReactingImpedance
 
 Array = NDArray[np.float64]
@@ -121,7 +122,7 @@ class LiveArm:
     def advance(self, rows: int) -> tuple[Samples, Truth]:
         """What the sensors log in the next `rows` samples, and what touches the arm."""
         for hand in self.hands.active():
-            hand.behind = self._behind(hand)
+            self._press(hand)
         readings, truth = self._simulation.advance(rows)
         samples = sense(self.robot, readings, self._noise, self._rng)
         return self._fault.apply(samples), truth
@@ -202,15 +203,10 @@ class LiveArm:
         hands = self.hands.active()
         return [(self.grip(h), h.target) for h in hands if h.target is not None]
 
-    def _behind(self, hand: Hand) -> float:
-        """How far behind its grip the line of a pull enters the link, where a push would act."""
+    def _press(self, hand: Hand) -> None:
+        """Finds what a pull presses: the place where a push along its line would act."""
         size = float(np.linalg.norm(hand.acting))
         if hand.target is None or size < 0.1:
-            return hand.behind
-        unit = hand.acting / size
-        found = [
-            -c.distance
-            for c in self.skin.crossings(self.q, self.grip(hand), unit)
-            if c.link == hand.link and c.entry and c.distance < 1e-4
-        ]
-        return min(found, default=0.0)
+            return
+        crossings = self.skin.crossings(self.q, self.grip(hand), hand.acting / size)
+        hand.pressed, hand.behind = pressed(crossings, hand.link) or (hand.link, 0.0)

@@ -81,7 +81,7 @@ class Judge:
                 hand.began
                 for hand in hands
                 if hand.began is not None
-                and (segment == "root" or self._segment[hand.link] == segment)
+                and (segment == "root" or self._segment[hand.pressed] == segment)
             ]
             delay = self._delay(segment, felt.time, felt.levels[:, g] > 0, began)
             contact = next((c for c in felt.contacts if c.segment == segment), None)
