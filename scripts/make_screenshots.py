@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Makes the pictures of pages in the README, in a headless Chromium.
 
-Run `.venv/bin/python scripts/make_screenshots.py` from the repository after `make test` has set it
-up. The pages are the real ones: `touchline demo`, pushed at three places while it simulates; the
-report and the replay of `touchline demo --headless`.
+Run `.venv/bin/python scripts/make_screenshots.py [demo] [report] [view]` from the repository after
+`make test` has set it up; without a name it makes all. The pages are the real ones: `touchline
+demo`, pushed at three places while it simulates; the report and the replay of `touchline demo
+--headless`.
 """
 
 import sys
@@ -49,8 +50,9 @@ def push(page: LivePage) -> None:
             print(f"the push on {link} meets {hand.link if hand else 'nothing'}", file=sys.stderr)
 
 
-def take_demo(browser: Browser) -> None:
+def take_demo(browser: Browser, _: Path) -> Path:
     """Opens the page, pushes the arm, and keeps what the window shows."""
+    browser.resize(*SIZE)
     with PageServer("Touchline", port=0) as server:
         page = LivePage(server)
         thread = threading.Thread(target=page.run)
@@ -66,19 +68,20 @@ def take_demo(browser: Browser) -> None:
         finally:
             page.stop()
             thread.join()
+    return TARGET / "demo.png"
 
 
-def take_report(browser: Browser, results: Path) -> None:
+def take_report(browser: Browser, results: Path) -> Path:
     """The report at an event."""
     browser.resize(1140, 860)
     browser.open((results / "report.html").as_uri())
     browser.wait_for("Against the truth")
     browser.run("document.querySelector('#event-1').scrollIntoView()")
     browser.rest(1.5)
-    save(browser.picture(), TARGET / "report.webp")
+    return save(browser.picture(), TARGET / "report.webp")
 
 
-def take_replay(browser: Browser, results: Path) -> None:
+def take_replay(browser: Browser, results: Path) -> Path:
     """The replay while three places are touched."""
     browser.resize(*SIZE)
     with PageServer("Touchline: demo", port=0) as server:
@@ -97,28 +100,34 @@ def take_replay(browser: Browser, results: Path) -> None:
         until(lambda: "event 1: " in browser.text(), pause=rest)
         for _ in range(30):
             rest(0.2)
-        save(browser.picture(), TARGET / "view.webp")
+        return save(browser.picture(), TARGET / "view.webp")
 
 
-def save(image: np.ndarray, path: Path) -> None:
-    """Writes an image as WebP."""
+def save(image: np.ndarray, path: Path) -> Path:
+    """Writes an image as WebP, and says where."""
     from PIL import Image
 
     Image.fromarray(image).save(path, "WEBP", quality=82, method=6)
+    return path
 
 
-def main() -> None:
-    """Takes all of them."""
+def main(names: list[str]) -> None:
+    """Takes those that are named, or all."""
+    unknown = [name for name in names if name not in PICTURES]
+    if unknown:
+        raise SystemExit(
+            f"no picture is called {', '.join(unknown)}; there are {', '.join(PICTURES)}"
+        )
+    names = names or list(PICTURES)
     with tempfile.TemporaryDirectory() as folder, Browser(*SIZE) as browser:
-        take_demo(browser)
         results = Path(folder) / "demo"
-        if touchline(["demo", "--headless", "--out", str(results)]) != 0:
+        if set(names) - {"demo"} and touchline(["demo", "--headless", "--out", str(results)]) != 0:
             raise SystemExit("the demo failed")
-        take_report(browser, results)
-        take_replay(browser, results)
-    for name in ("demo.png", "report.webp", "view.webp"):
-        print(TARGET / name)
+        for name in names:
+            print(PICTURES[name](browser, results))
 
+
+PICTURES = {"demo": take_demo, "report": take_report, "view": take_replay}
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

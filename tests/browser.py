@@ -69,7 +69,9 @@ class Browser:
             "Runtime.exceptionThrown": lambda p: self._complain(p["exceptionDetails"]),
             "Runtime.consoleAPICalled": self._on_console,
             "Log.entryAdded": self._on_entry,
+            "Page.frameNavigated": lambda p: self._arrived.add(p["frame"]["loaderId"]),
         }
+        self._arrived: set[str] = set()
         self._handlers["Target.attachedToTarget"] = self._on_worker
         self._count = 0
         try:
@@ -149,10 +151,12 @@ class Browser:
         self.call("Emulation.setDeviceMetricsOverride", **size)
 
     def open(self, url: str) -> None:
-        """Goes to an address."""
+        """Goes to an address; before the page is there it can be neither seen nor asked."""
         self.requests.clear()
         self.complaints.clear()
-        self.call("Page.navigate", url=url)
+        answer = self.call("Page.navigate", url=url)
+        assert "errorText" not in answer, f"{url}: {answer['errorText']}"
+        until(lambda: answer["loaderId"] in self._arrived, pause=self.rest, what=url)
 
     def offline(self) -> None:
         """Cuts the network."""
@@ -201,10 +205,19 @@ class Browser:
         self.press(option)
 
     def check(self, label: str) -> None:
-        """Clicks on the box with a label."""
-        found = self.run(FIND_INPUT % (json.dumps("input[type=checkbox]"), *self.place(label)))
+        """Clicks on the box with a label, until that changes it: a list may still be closing."""
+        box = json.dumps("input[type=checkbox]")
+        find = FIND_INPUT % (box, *self.place(label))
+        found = self.run(find)
         assert found, f"no box beside '{label}'"
-        self.click(*found)
+        state = f"document.elementFromPoint({found[0]}, {found[1]})?.checked"
+        before = self.run(state)
+        for _ in range(5):
+            self.click(*found)
+            self.draw()
+            if self.run(state) != before:
+                return
+        raise AssertionError(f"the box beside '{label}' does not change")
 
     def click(self, x: float, y: float) -> None:
         """Moves there and clicks [pixels]."""

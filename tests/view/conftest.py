@@ -33,7 +33,10 @@ def touched(tmp_path_factory):
     robot = tl.load_robot("sara")
     simulated = scripted(robot, touches(robot), 2.5, speed=0.5)
     folder = tmp_path_factory.mktemp("touched")
-    write_table(folder / "log.parquet", simulated.samples, robot.description)
+    truth = simulated.truth
+    links = {"truth.links": list(truth.links)}
+    log = folder / "log.parquet"
+    write_table(log, simulated.samples, robot.description, links, truth.columns())
     analysis = analyze(folder / "log.parquet", "sara", folder / "results", report=False)
     return SimpleNamespace(
         samples=simulated.samples,

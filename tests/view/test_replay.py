@@ -59,6 +59,27 @@ def test_nothing_is_shown_between_events(replay, touched):
     assert replay.contacts(last + 1e-4) == []
 
 
+def test_the_truth_of_a_simulated_log_is_shown_while_it_lasts(replay, touched):
+    truth = touched.truth
+    links = {truth.links[i] for i in np.unique(truth.link) if i >= 0}
+    assert len(replay.truth) == 3 and {contact.link for contact in replay.truth} == links
+    for row in range(0, len(touched.samples.time), 97):
+        slots = np.flatnonzero(truth.link[row] >= 0)
+        shown = replay.true_contacts(float(touched.samples.time[row]))
+        assert len(shown) == len(slots)
+        for slot, (point, force) in zip(slots, shown, strict=True):
+            np.testing.assert_array_equal(point, truth.point[row, slot])
+            np.testing.assert_array_equal(force, truth.force[row, slot])
+
+
+def test_a_replay_does_without_the_log(touched, tmp_path):
+    for path in touched.out.iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    known = json.loads((tmp_path / "analysis.json").read_text())
+    (tmp_path / "analysis.json").write_text(json.dumps(known | {"log": "/gone/log.parquet"}))
+    assert Replay(tmp_path).truth == []
+
+
 def test_a_curve_holds_the_extremes_of_its_pieces(replay, touched):
     table = pq.read_table(touched.out / "estimates.parquet")
     time = table["time"].to_numpy()

@@ -13,6 +13,8 @@ from touchline.view.scene import ALARM, TINT
 from touchline.view.server import PageServer
 from touchline.view.signals import JOINTS
 
+BLUE = COLOURS["truth"]
+
 
 class Visitor:
     """A browser on the page, which is drawn while the browser waits."""
@@ -80,6 +82,11 @@ def test_a_replay_is_seen_played_and_jumped_in(browser, touched):
             place = visitor.pixel(contact.position)
             return count_near(browser.picture(), *place, COLOURS["estimate"]) > 15
 
+        assert "the truth of the simulation" in browser.text()
+        visitor.until(
+            lambda: count_near(browser.picture(), *visitor.pixel(contact.position), BLUE, 25) > 15,
+            "the true point around it",
+        )
         visitor.until(point_is_shown, "the contact's point")
         assert visitor.arm_stands(time)
         tint = ALARM if event.level == "collision" else TINT
@@ -111,8 +118,8 @@ def test_a_replay_is_seen_played_and_jumped_in(browser, touched):
         drawn = browser.run(f"{charts}.map((c) => [c.scales.x.min, c.scales.x.max])")
         assert len(drawn) == 3 and all(low < high for low, high in drawn)
         series = f"{charts}.map((c) => c.series.map((s) => s.label).join(' '))"
-        assert "s fx fy fz now" in browser.run(series)
+        assert "s fx fy fz no data now" in browser.run(series)
         page.plots[0].choose(JOINTS)
-        curves = " ".join(["s", *replay.robot.joint_names, "now"])
+        curves = " ".join(["s", *replay.robot.joint_names, "no data now"])
         visitor.until(lambda: browser.run(series).count(curves) == 2, "other curves")
         assert browser.complaints == []

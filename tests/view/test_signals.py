@@ -13,6 +13,7 @@ from touchline.view.signals import (
     JOINTS,
     Box,
     force_on,
+    gaps,
     nice_range,
     signal_groups,
     window_around,
@@ -43,6 +44,17 @@ def test_the_window_stays_in_the_recording(touched):
     assert window_around(replay, replay.end, 1.0)[1] == pytest.approx(replay.end)
     begin, end = window_around(replay, 1.3, 1.0)
     assert begin < 1.3 < end and end - begin == pytest.approx(1.0)
+
+
+def test_a_gap_is_where_no_curve_has_a_value_for_long():
+    times = np.arange(12.0)
+    values = np.zeros((2, 12))
+    values[0, 3:] = np.nan
+    values[1, [1, 4, 5, 6, 7, 9, 10]] = np.nan
+    assert np.flatnonzero(gaps(times, values, 2.0)).tolist() == [4, 5, 6, 7]
+    assert np.flatnonzero(gaps(times, values, 0.5)).tolist() == [4, 5, 6, 7, 9, 10]
+    values[:, 8:] = np.nan
+    assert np.flatnonzero(gaps(times, values, 2.0)).tolist() == list(range(4, 12))
 
 
 @settings(max_examples=40, deadline=None)

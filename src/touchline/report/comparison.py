@@ -9,39 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.contact.event import Event
+from touchline.logs.truth import TrueContact, read_truth
 
 Array = NDArray[np.float64]
 MATCH = 0.3  # s; a test may fire this long after the contact began
-
-
-@dataclass(frozen=True)
-class TrueContact:
-    """One contact of the truth, from beginning to end.
-
-    Attributes:
-        link: that is touched.
-        time: (N,) [s]; `point` (N, 3) [m] and `force` (N, 3) [N], world.
-    """
-
-    link: str
-    time: Array
-    point: Array
-    force: Array
-
-    @property
-    def strength(self) -> float:
-        """Largest force [N]."""
-        return float(np.linalg.norm(self.force, axis=1).max())
-
-    @property
-    def mean_force(self) -> Array:
-        """Force (3,) [N], mean over the samples near the peak."""
-        norms = np.linalg.norm(self.force, axis=1)
-        return self.force[norms >= 0.9 * norms.max()].mean(axis=0)
-
-    def point_at(self, time: float) -> Array:
-        """Point (3,) [m] at a time [s] of the contact."""
-        return self.point[min(int(np.searchsorted(self.time, time)), len(self.time) - 1)]
 
 
 @dataclass(frozen=True)
@@ -56,47 +27,6 @@ class Comparison:
     event: Event | None
     position_error: float
     force_error: float
-
-
-def read_truth(log: Path) -> list[TrueContact]:
-    """The true contacts of a simulated Parquet log, in the order of their beginning.
-
-    Empty for a log without truth, as those of real robots are.
-    """
-    import json
-
-    import pyarrow.parquet as pq
-
-    if log.suffix != ".parquet":
-        return []
-    schema = pq.read_schema(log)
-    columns = [name for name in schema.names if name.startswith("truth.contact.")]
-    if not columns:
-        return []
-    table = pq.read_table(log, columns=["time", *columns])
-    data = {name: np.asarray(table.column(name)) for name in table.column_names}
-    links: list[str] = next(
-        value["truth.links"]
-        for value in map(json.loads, (schema.metadata or {}).values())
-        if isinstance(value, dict) and "truth.links" in value
-    )
-    slots = sorted({int(name.split(".")[2]) for name in columns})
-    contacts = [contact for slot in slots for contact in _contacts(data, slot, links)]
-    return sorted(contacts, key=lambda contact: contact.time[0])
-
-
-def _contacts(data: dict[str, Array], slot: int, links: Sequence[str]) -> list[TrueContact]:
-    prefix = f"truth.contact.{slot}"
-    link = np.nan_to_num(data[f"{prefix}.link"], nan=-1.0).astype(int)
-    edges = np.flatnonzero(np.diff(link, prepend=-1, append=-1))
-    found = []
-    for start, stop in zip(edges[:-1], edges[1:], strict=True):
-        if link[start] >= 0:
-            part = slice(start, stop)
-            point = np.stack([data[f"{prefix}.{axis}"][part] for axis in "xyz"], axis=1)
-            force = np.stack([data[f"{prefix}.f{axis}"][part] for axis in "xyz"], axis=1)
-            found.append(TrueContact(links[int(link[start])], data["time"][part], point, force))
-    return found
 
 
 def compare_log(events: Sequence[Event], log: Path) -> list[Comparison]:

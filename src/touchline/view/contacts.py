@@ -2,25 +2,21 @@
 """All contacts of one instant on the page, felt and true."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from touchline.contact.contact import Contact
+from touchline.contact.contact import Candidate, Contact
 from touchline.contact.line import line_point
 from touchline.model.robot import Robot
 from touchline.view.markers import ContactMarker
 from touchline.view.scene import RobotScene
 
-if TYPE_CHECKING:  # a replay needs no simulation, which takes a while to import
-    from touchline.view.judge import Touched, Verdict
-
 Array = NDArray[np.float64]
 
 PULL = (120, 124, 130)
-LIKELY = 0.02  # candidates less probable are not shown
+LIKELY, MOST_CANDIDATES = 0.03, 12  # candidates less probable, or more, are not shown
 
 
 class ContactScene:
@@ -45,34 +41,45 @@ class ContactScene:
         if ends:
             self._pulls.points = np.array(ends, np.float32)
 
-    def show(self, verdicts: "Sequence[Verdict]", true: "Sequence[Touched]", q: Array) -> None:
-        """Shows one instant, at joint positions `q` (n,) [rad]."""
+    def show(
+        self, contacts: Sequence[Contact], true: Sequence[tuple[Array, Array]], q: Array
+    ) -> None:
+        """Shows one instant.
+
+        Args:
+            contacts: that are felt.
+            true: points (3,) [m] and forces (3,) [N] of those that there are, in world.
+            q: (n,) joint positions [rad or m].
+        """
         self._used = {}
-        links: dict[int, set[str]] = {0: set(), 1: set(), 2: set()}
-        for contact in true:
-            self._next("truth").show(contact.point, contact.force)
-        for verdict in verdicts:
-            if verdict.contact is not None:
-                self._show(verdict.contact, q)
-                if verdict.contact.link is not None:
-                    links[verdict.level].add(verdict.contact.link)
-        self._arm.tint(frozenset(links[1]), frozenset(links[2]))
+        links: dict[str, set[str]] = {"contact": set(), "collision": set()}
+        for point, force in true:
+            self._next("truth").show(point, force)
+        for contact in contacts:
+            if contact.position is not None and contact.link is not None:
+                links[contact.level].add(contact.link)
+                self._next("estimate").show(
+                    contact.position, contact.force, contact.covariance, line=True
+                )
+            else:
+                links[contact.level] |= self._show_doubt(contact, q)
+        self._arm.tint(frozenset(links["contact"]), frozenset(links["collision"]))
         for kind, markers in self._markers.items():
             for marker in markers[self._used.get(kind, 0) :]:
                 marker.hide()
 
-    def _show(self, contact: Contact, q: Array) -> None:
-        if contact.position is not None:
-            self._next("estimate").show(
-                contact.position, contact.force, contact.covariance, line=True
-            )
-        elif contact.wrench is not None:
+    def _show_doubt(self, contact: Contact, q: Array) -> set[str]:
+        """Candidates where there are some, else all that could have been touched; its links."""
+        likely = candidates(contact)
+        for candidate in likely:
+            self._next("candidate").show(candidate.position)
+        if contact.wrench is not None and np.linalg.norm(contact.wrench[:3]) > 0:
             at = stand_in(self._arm.robot, contact, q)
             self._next("estimate").show(at, contact.wrench[:3], is_point=False, line=True)
-        if contact.status in ("ambiguous", "not_separable"):
-            for candidate in contact.candidates:
-                if candidate.probability > LIKELY:
-                    self._next("candidate").show(candidate.position)
+        if likely:
+            return {candidate.link for candidate in likely}
+        bodies = [body for body in self._arm.robot.bodies if body.segment == contact.segment]
+        return {link for body in bodies for link in body.links}
 
     def _next(self, kind: str) -> ContactMarker:
         """A marker that has not been used at this instant."""
@@ -82,6 +89,11 @@ class ContactScene:
         if number == len(markers):
             markers.append(ContactMarker(self._scene, f"/contacts/{kind}{number}", kind))
         return markers[number]
+
+
+def candidates(contact: Contact) -> list[Candidate]:
+    """Those that are worth showing."""
+    return [c for c in contact.candidates if c.probability >= LIKELY][:MOST_CANDIDATES]
 
 
 def stand_in(robot: Robot, contact: Contact, q: Array) -> Array:

@@ -158,7 +158,8 @@ class LivePage:
     def _show(self, q: Array, true: list[Touched]) -> None:
         with self._page.atomic():
             self._robot.place(q)
-            self._contacts.show(self.verdicts, true, q)
+            felt = [verdict.contact for verdict in self.verdicts if verdict.contact is not None]
+            self._contacts.show(felt, [(t.point, t.force) for t in true], q)
             self._contacts.show_pulls(self.arm.springs())
         if self._is_due(READOUT) and self.felt is not None:
             self._controls.readout.content = readout(self.verdicts, self.felt.health, self._speed)

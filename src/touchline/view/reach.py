@@ -5,8 +5,11 @@ from collections.abc import Sequence
 
 from touchline.contact.skin import Crossing
 
-FINGER = 0.012  # m; between two links that are closer no finger fits
+FINGER = 0.008  # m; between two links that are closer no finger fits
+EDGE = 0.03  # m; a link of which a line cuts off less does not bar its way
 NEAR = 1e-4  # m
+
+Span = tuple[str, float, float]  # a link, and how far behind the grip the line enters and leaves it
 
 
 def pressed(crossings: Sequence[Crossing], link: str) -> tuple[str, float] | None:
@@ -22,16 +25,23 @@ def pressed(crossings: Sequence[Crossing], link: str) -> tuple[str, float] | Non
     Returns:
         The link that is pressed, and how far behind the grip [m]; None if there is no such place.
     """
-    backwards = sorted(crossings, key=lambda crossing: -crossing.distance)
-    inside: set[str] = set()
-    passed = False
-    for i, crossing in enumerate(backwards):
-        if not crossing.entry:
-            inside.add(crossing.link)
-            continue
-        inside.discard(crossing.link)
-        passed = passed or (crossing.link == link and crossing.distance < NEAR)
-        room = crossing.distance - backwards[i + 1].distance if i + 1 < len(backwards) else FINGER
-        if passed and not inside and room >= FINGER:
-            return crossing.link, max(-crossing.distance, 0.0)
-    return None
+    spans = sorted(_spans(crossings), key=lambda span: span[1])
+    place = None
+    for name, enters, leaves in spans:
+        if place is None:
+            if name == link and enters > -NEAR:
+                place = name, max(enters, 0.0)
+        elif leaves < place[1] + FINGER and enters - leaves > EDGE:
+            place = name, enters
+    return place
+
+
+def _spans(crossings: Sequence[Crossing]) -> list[Span]:
+    """The pieces of the line inside of links."""
+    found, inside = [], {}
+    for crossing in sorted(crossings, key=lambda crossing: crossing.distance):
+        if crossing.entry:
+            inside[crossing.link] = -crossing.distance
+        elif crossing.link in inside:
+            found.append((crossing.link, inside.pop(crossing.link), -crossing.distance))
+    return found

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from touchline.contact.contact import Candidate, Contact
 from touchline.contact.event import Event
 from touchline.errors import InputError
+from touchline.logs.truth import TrueContact, read_truth
 from touchline.model.description import AXES
 from touchline.model.robot import load_robot
 from touchline.view.tables import TimedTable
@@ -110,6 +111,19 @@ class Replay:
     def end(self) -> float:
         """The last time stamp [s]."""
         return self.origin.end
+
+    @cached_property
+    def truth(self) -> list[TrueContact]:
+        """What really touched, if the log is a simulated one and still there."""
+        try:
+            return read_truth(self.origin.log)
+        except (OSError, ValueError, KeyError):  # moved, or no such log any more
+            return []
+
+    def true_contacts(self, time: float) -> list[tuple[Array, Array]]:
+        """Points (3,) [m] and forces (3,) [N] of the truth at a time [s], in world."""
+        lasting = [contact for contact in self.truth if contact.lasts_at(time)]
+        return [(contact.point_at(time), contact.force_at(time)) for contact in lasting]
 
     @cached_property
     def _stood(self) -> tuple[Array, Array]:

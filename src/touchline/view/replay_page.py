@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from touchline.contact.contact import Contact
 from touchline.contact.event import Event
-from touchline.view.contacts import stand_in
-from touchline.view.markers import ContactMarker
+from touchline.view.contacts import ContactScene, candidates
 from touchline.view.player import Player
 from touchline.view.replay import Replay
 from touchline.view.scene import RobotScene, dress
@@ -29,11 +28,12 @@ SPEEDS = {"1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "1": 1.0, "2": 2.0, "5": 5.0, "2
 WINDOWS = {"1 s": 1.0, "5 s": 5.0, "20 s": 20.0, "60 s": 60.0, "whole recording": None}
 VIEW = (0.78, 0.58, 0.33)  # from the middle to the camera, in sizes of the space that the arm uses
 CURVES_WIDTH = 440  # pixels
-WORTH_DRAWING, MOST_CANDIDATES = 0.03, 3
+NAMED = 3  # candidates in words
 HELP = (
     "Move **time**, press **Play**, or choose an event. Drag over the arm to look around it. "
     "Orange: what was felt; pale orange: places that cannot be told apart."
 )
+TRUTH = " Blue outlines: the truth of the simulation."
 
 
 class ReplayPage:
@@ -56,14 +56,14 @@ class ReplayPage:
         dress(self._page)
         look_from(self._page.initial_camera, replay)
         self._arm = RobotScene(self._page.scene, replay.robot)
-        self._marks: dict[tuple[str, int], ContactMarker] = {}
+        self._contacts = ContactScene(self._page.scene, self._arm)
         self._build(self._page.gui)
         self._drawn: tuple = ()
         self._plotted = -np.inf
         self.draw()
 
     def _build(self, gui: viser.GuiApi) -> None:
-        gui.add_markdown(HELP)
+        gui.add_markdown(HELP + TRUTH * bool(self.replay.truth))
         self._timeline = Timeline(gui, self.replay, self._origin)
         first, last = (round(t - self._origin, 3) for t in (self.replay.start, self.replay.end))
         self._slider = gui.add_slider("time [s]", first, max(last, first + 1e-3), 1e-3, first)
@@ -160,7 +160,7 @@ class ReplayPage:
             contacts = self.replay.contacts(time)
             q = self.replay.posture(time)
             self._arm.place(q)
-            self._draw_contacts(contacts, q)
+            self._contacts.show(contacts, self.replay.true_contacts(time), q)
             self._slider.value = round(time - self._origin, 3)
             label = "Pause" if playing else "Play"
             if self._play.label != label:
@@ -175,45 +175,6 @@ class ReplayPage:
                 self._timeline.update(time)
                 for plot in self.plots:
                     plot.update(time, length)
-
-    def _draw_contacts(self, contacts: list[Contact], q: Array) -> None:
-        used: set[tuple[str, int]] = set()
-        tinted: dict[str, set[str]] = {"contact": set(), "collision": set()}
-        for contact in contacts:
-            if contact.position is not None and contact.link is not None:
-                tinted[contact.level].add(contact.link)
-                self._mark(used, contact.segment, 0, "estimate").show(
-                    contact.position, contact.force, contact.covariance, line=True
-                )
-            else:
-                tinted[contact.level] |= self._show_doubt(contact, q, used)
-        for key, mark in self._marks.items():
-            if key not in used:
-                mark.hide()
-        self._arm.tint(frozenset(tinted["contact"]), frozenset(tinted["collision"]))
-
-    def _show_doubt(self, contact: Contact, q: Array, used: set[tuple[str, int]]) -> set[str]:
-        """Candidates where there are some, else all that could have been touched; its links."""
-        likely = [c for c in contact.candidates if c.probability >= WORTH_DRAWING]
-        likely = likely[:MOST_CANDIDATES]
-        for i, candidate in enumerate(likely, start=1):
-            self._mark(used, contact.segment, i, "candidate").show(candidate.position)
-        if contact.wrench is not None and np.linalg.norm(contact.wrench[:3]) > 0:
-            at = stand_in(self.replay.robot, contact, q)
-            mark = self._mark(used, contact.segment, 0, "estimate")
-            mark.show(at, contact.wrench[:3], is_point=False, line=True)
-        if likely:
-            return {candidate.link for candidate in likely}
-        bodies = [b for b in self.replay.robot.bodies if b.segment == contact.segment]
-        return {link for body in bodies for link in body.links}
-
-    def _mark(self, used: set, segment: str, number: int, kind: str) -> ContactMarker:
-        key = (segment, number)
-        used.add(key)
-        if key not in self._marks:
-            name = f"/contacts/{segment}/{number}"
-            self._marks[key] = ContactMarker(self._page.scene, name, kind)
-        return self._marks[key]
 
     def _words(self, contacts: list[Contact], time: float) -> str:
         lines = [f"**{time - self._origin:.3f} s**"]
@@ -244,7 +205,7 @@ def _sentence(contact: Contact) -> str:
         parts.append(f"\N{PLUS-MINUS SIGN} {1e3 * contact.position_std:.1f} mm")
     if contact.status != "located":
         parts.append(contact.status.replace("_", " "))
-    likely = [c for c in contact.candidates if c.probability >= WORTH_DRAWING]
+    likely = candidates(contact)
     if len(likely) > 1:
-        parts += [f"{100 * c.probability:.0f} % {c.link}" for c in likely[:MOST_CANDIDATES]]
+        parts += [f"{100 * c.probability:.0f} % {c.link}" for c in likely[:NAMED]]
     return ", ".join(parts)

@@ -19,6 +19,8 @@ ON_SEGMENT = "{}: wrench on the segment"
 JOINTS = "external joint torques"
 PIECES = 240  # of time in a plot
 PADDING = (10, 24, 0, 0)  # pixels: top, right, bottom, left
+NO_DATA = "#d9dce1"  # of gaps
+GAP = 5.0  # periods without a value that are shown as a gap
 LEFT_OF_NOW = 0.7  # part of the window
 
 
@@ -85,6 +87,16 @@ def window_around(replay: Replay, time: float, length: float | None) -> tuple[fl
         return replay.start, max(replay.end, replay.start + 1e-3)
     begin = min(max(time - LEFT_OF_NOW * length, replay.start), replay.end - length)
     return begin, begin + length
+
+
+def gaps(times: Array, values: Array, least: float) -> Array:
+    """Where (N,) no value of any row (R, N) is known for longer than `least`, in `times` (N,)."""
+    known = np.append(np.isfinite(values).any(axis=0), True)
+    edges = np.flatnonzero(np.diff(known, prepend=True))
+    found = np.zeros(len(times), dtype=bool)
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        found[begin:end] = times[end - 1] - times[begin] > least
+    return found
 
 
 def with_now(times: Array, values: Array, now: float, box: Box) -> tuple[Array, ...]:
@@ -165,7 +177,7 @@ class SignalPlot:
         self._place = gui.add_folder("")
         self._handle: viser.GuiUplotHandle | None = None
         self._group: SignalGroup | None = None
-        self._heights: tuple[float, float] | None = None
+        self._range: tuple[float, float] | None = None
         self._shown: tuple = ()
 
     @property
@@ -202,14 +214,17 @@ class SignalPlot:
         same = self._handle is not None and group is self._group
         low, high = nice_range(values, self._range if same else None)
         box = Box(times[0], times[-1], low, high)
-        data = with_now(times, values, now - self._origin, box)
+        heights = np.where(gaps(times, values, GAP * self._replay.origin.period), high, low)
+        data = with_now(times, np.vstack([values, heights]), now - self._origin, box)
         if self._handle is not None and same:
+            if self._range != (low, high):
+                self._handle.series = _series(group, low)
             self._handle.data = data
         else:
-            self._make(group, data)
+            self._make(group, data, low)
         self._group, self._range = group, (low, high)
 
-    def _make(self, group: SignalGroup, data: tuple[Array, ...]) -> None:
+    def _make(self, group: SignalGroup, data: tuple[Array, ...], low: float) -> None:
         """A new plot: one that changed its curves would keep the time that it showed."""
         if self._handle is not None:
             self._handle.remove()
@@ -217,7 +232,7 @@ class SignalPlot:
         with self._place:
             self._handle = self._gui.add_uplot(
                 data,
-                _series(group),
+                _series(group, low),
                 scales={"x": uplot.Scale(time=False)},
                 axes=axes,
                 height=self.HEIGHT,
@@ -225,10 +240,12 @@ class SignalPlot:
             )
 
 
-def _series(group: SignalGroup) -> tuple[uplot.Series, ...]:
+def _series(group: SignalGroup, low: float) -> tuple[uplot.Series, ...]:
+    """Of the curves, of what fills gaps from the lower border `low` on, and of the time shown."""
     points = uplot.Series_Points(show=False)
     curves = [
         uplot.Series(label=name, stroke=COLOURS[i % len(COLOURS)], width=1.5, points=points)
         for i, name in enumerate(group.names)
     ]
-    return (uplot.Series(label="s"), *curves, now_series())
+    nothing = uplot.Series(label="no data", width=0, fill=NO_DATA, fillTo=low, points=points)
+    return (uplot.Series(label="s"), *curves, nothing, now_series())
