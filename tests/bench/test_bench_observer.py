@@ -12,9 +12,8 @@ from robots import describe, random_mechanism, random_robot
 from touchline.bench import observer as bench
 from touchline.bench.discretization import discretization_errors, filtered, fixed_sensor
 from touchline.bench.motion import fast_motion, pushed_link
-from touchline.bench.observer import main, plain, run_benchmark
+from touchline.bench.observer import main, plain, run_benchmark, two_sensor_arm
 from touchline.bench.pinocchio_peer import PinocchioObserver
-from touchline.bench.robots import sara_like
 from touchline.bench.timing import Candidate, measure
 from touchline.bench.urdf import robot_urdf, sensor_link
 from touchline.errors import InputError
@@ -61,7 +60,7 @@ def test_a_robot_with_mimics_keeps_our_own_rows():
     rows = tuple(JointDescription(f"joint{i}") for i in range(1, 8))
     robot = Robot(describe(mechanism, [("base", "link0")], joints=rows), mechanism)
     robot.nodes[-1].multiplier = 2.0
-    assert bench._has_mimics(robot) and not bench._has_mimics(sara_like())
+    assert bench._has_mimics(robot) and not bench._has_mimics(two_sensor_arm())
 
 
 def test_results_are_written(result, tmp_path):
@@ -88,7 +87,7 @@ def test_the_command_prints_and_writes(tmp_path, capsys):
 
 
 def test_trapezoid_forms_are_second_order_and_the_others_first():
-    errors = {(e.name, e.rate): e.force for e in discretization_errors(sara_like())}
+    errors = {(e.name, e.rate): e.force for e in discretization_errors(two_sensor_arm())}
     gain = {name: errors[name, 1000.0] / errors[name, 8000.0] for name, _ in errors}
     assert gain["Euler"] == pytest.approx(8.0, rel=0.1)
     assert gain["rectangle"] == pytest.approx(8.0, rel=0.1)
@@ -106,14 +105,14 @@ def test_the_exact_filter_answers_a_step_and_a_ramp():
 
 
 def test_the_sensor_that_stands_still_is_found():
-    assert fixed_sensor(sara_like()) == 0
+    assert fixed_sensor(two_sensor_arm()) == 0
     mechanism = random_mechanism(np.random.default_rng(1), chain=True)
     robot = Robot(describe(mechanism, [("tip", "link7")]), mechanism)
     assert fixed_sensor(robot) is None and discretization_errors(robot) == []
 
 
 def test_plain_leaves_the_mechanism_and_drops_the_settings():
-    arm = sara_like()
+    arm = two_sensor_arm()
     sensors = (SensorDescription("base", "link0", axes=("fz",), polarity="inboard"),)
     rows = (JointDescription("joint1", "none"), *arm.description.joints[1:])
     robot = plain(Robot(describe(arm.mechanism, sensors, joints=rows), arm.mechanism))
@@ -168,7 +167,7 @@ def test_idyntree_recovers_the_push():
     pytest.importorskip("idyntree", reason="idyntree is not installed: pip install idyntree")
     from touchline.bench.idyntree_peer import IdyntreeEstimator
 
-    robot = sara_like()
+    robot = two_sensor_arm()
     motion = fast_motion(robot, 100.0)
     peer = IdyntreeEstimator(robot)
     states = zip(motion.q, motion.qd, motion.qdd, motion.wrench, strict=True)

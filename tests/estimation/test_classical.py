@@ -7,7 +7,7 @@ from motion import Recording, ramp
 from robots import describe, random_mechanism
 
 from touchline.bench.motion import fast_motion
-from touchline.bench.robots import sara_like
+from touchline.bench.observer import two_sensor_arm
 from touchline.errors import InputError
 from touchline.estimation.classical import (
     ClassicalObserver,
@@ -111,7 +111,7 @@ def test_the_error_of_the_classical_route_is_its_closed_form(robot, speed):
 
 def test_an_unmeasured_joint_torque_disturbs_the_classical_wrenches_only():
     """The paper's figure 4: a couple inside the arm, which no sensor's row feels from outside."""
-    arm = sara_like(K)
+    arm = two_sensor_arm(K)
     motion = fast_motion(arm, 1000.0, 1.0)
     needed = inverse_dynamics(arm, motion.q, motion.qd, motion.qdd)
     tau = needed.torque.copy()
@@ -310,10 +310,11 @@ def test_an_unmeasured_joint_lowers_the_rank(robot):
 
 
 def test_a_singular_posture_costs_rank_and_its_neighbourhood_condition():
-    arm = sara_like()
+    arm = two_sensor_arm()
     straight, bent = np.zeros(7), np.full(7, 0.6)
     near = straight + 1e-4 * bent
-    results = [tool_wrench(arm, q, np.ones(7), "tool") for q in (straight, near, bent)]
+    torque = np.arange(1.0, 8.0)
+    results = [tool_wrench(arm, q, torque, "tool") for q in (straight, near, bent)]
     # Straight up, four axes coincide and the other three are parallel in one plane: 1 + 2.
     assert [int(result.rank) for result in results] == [3, 6, 6]
     assert results[1].condition > 1e3 * results[2].condition

@@ -17,13 +17,12 @@ import numpy as np
 from touchline.bench.discretization import DiscretizationError, discretization_errors
 from touchline.bench.motion import Motion, fast_motion, pushed_link
 from touchline.bench.request import check_least
-from touchline.bench.robots import sara_like
 from touchline.bench.tables import error_table, timing_table
 from touchline.bench.timing import Candidate, Timing, measure
 from touchline.errors import InputError
 from touchline.estimation.observer import Observer
 from touchline.model.description import JointDescription, SensorDescription
-from touchline.model.robot import Robot
+from touchline.model.robot import Robot, load_robot
 
 BANDWIDTH = 100.0  # [rad/s]
 RUN_SAMPLES, SAMPLES = 8000, 250  # per round: of `run`, and of what takes one at a time
@@ -81,6 +80,23 @@ class ObserverBenchmark:
         path.write_text(text, encoding="utf-8")
 
 
+def two_sensor_arm(bandwidth: float = BANDWIDTH) -> Robot:
+    """`sara-full` with the sensors at base and wrist alone.
+
+    Args:
+        bandwidth: K [rad/s] of all rows.
+    """
+    full = load_robot("sara-full")
+    sensors = full.description.sensors[:2]
+    description = replace(
+        full.description,
+        sensors=sensors,
+        bandwidth_joints=(bandwidth,) * len(full.joint_names),
+        bandwidth_sensors={sensor.name: bandwidth for sensor in sensors},
+    )
+    return Robot(description, full.mechanism)
+
+
 def run_benchmark(
     robot: Robot | None = None, rounds: int = 40, accuracy: bool = True
 ) -> ObserverBenchmark:
@@ -92,7 +108,7 @@ def run_benchmark(
         rounds: how often each candidate is timed, at least 1.
         accuracy: also find what the discretizations cost.
     """
-    robot = plain(robot or sara_like())
+    robot = plain(robot or two_sensor_arm())
     result = ObserverBenchmark(_title(robot), _machine(), rounds)
     motion = fast_motion(robot, 1000.0, RUN_SAMPLES / 1000.0)
     candidates = own_candidates(robot, motion)
