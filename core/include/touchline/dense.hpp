@@ -86,10 +86,9 @@ inline double log_determinant(const double* l, int n) {
   return 2.0 * sum;
 }
 
-// Jacobi's rotations: the eigenvalues of a symmetric (n, n) matrix end up on its diagonal, the
-// eigenvectors in the columns of v.
+// Jacobi's rotations: the eigenvalues of a symmetric (n, n) matrix end up on its diagonal; the columns
+// of v are turned along, so that from the identity on they end up as the eigenvectors.
 inline void diagonalize(double* a, double* v, int n) {
-  for (int i = 0; i < n * n; ++i) v[i] = i % (n + 1) == 0 ? 1.0 : 0.0;
   constexpr int kSweeps = 12;
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
     double off = 0.0, diagonal = 0.0;
@@ -97,10 +96,10 @@ inline void diagonalize(double* a, double* v, int n) {
       diagonal += a[i * n + i] * a[i * n + i];
       for (int j = 0; j < i; ++j) off += a[i * n + j] * a[i * n + j];
     }
-    if (!(off > 1e-20 * diagonal)) return;
+    if (!(off > 1e-16 * diagonal)) return;
     for (int p = 0; p < n; ++p) {
       for (int q = p + 1; q < n; ++q) {
-        if (a[p * n + q] == 0.0) continue;
+        if (a[p * n + q] * a[p * n + q] <= 1e-18 * std::fabs(a[p * n + p] * a[q * n + q])) continue;
         const double theta = 0.5 * (a[q * n + q] - a[p * n + p]) / a[p * n + q];
         const double t = std::copysign(1.0, theta) / (std::fabs(theta) + std::sqrt(theta * theta + 1.0));
         const double c = 1.0 / std::sqrt(t * t + 1.0), s = t * c;

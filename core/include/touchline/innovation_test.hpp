@@ -41,7 +41,7 @@ inline SteadyGains steady_gains(double r, double q) {
 class InnovationTest {
  public:
   InnovationTest(std::size_t rows, double period) : period_(period) {
-    for (auto* m : {&to_white_, &from_white_, &factor_, &turned_, &vectors_})
+    for (auto* m : {&to_white_, &from_white_, &factor_, &turned_, &scratch_, &vectors_})
       m->assign(rows * rows, 0.0);
     for (auto* v : {&load_, &gap_, &white_, &up_, &down_}) v->assign(rows, 0.0);
     gains_.assign(rows, SteadyGains{0.0, 0.0, 1.0});
@@ -54,6 +54,7 @@ class InnovationTest {
     std::copy_n(w, size, load_.begin());
     count_ = 0.0;
     age_ = 0.0;
+    turned_before_ = false;
   }
 
   // Covariances (size, size) of one sample; `model` (size): variances of the model's errors over
@@ -67,7 +68,11 @@ class InnovationTest {
     std::copy_n(momentum, size_ * size_, turned_.begin());
     for (int j = 0; j < n; ++j) solve_lower(factor_.data(), n, turned_.data() + j, n);
     for (int i = 0; i < n; ++i) solve_lower(factor_.data(), n, turned_.data() + i * n);
+    // From the axes of before, which are nearly right: a row goes on as the same row.
+    if (!turned_before_) set_identity();
+    turn(n);
     diagonalize(turned_.data(), vectors_.data(), n);
+    turned_before_ = true;
     // to_white = U^T L^-1 by rows; from_white = L U.
     for (int i = 0; i < n; ++i) {
       for (int k = 0; k < n; ++k) to_white_[i * n + k] = vectors_[k * n + i];
@@ -127,6 +132,28 @@ class InnovationTest {
  private:
   static double square(double x) { return x * x; }
 
+  void set_identity() {
+    for (std::size_t i = 0; i < size_ * size_; ++i) vectors_[i] = i % (size_ + 1) == 0 ? 1.0 : 0.0;
+  }
+
+  // turned = V^T turned V.
+  void turn(int n) {
+    for (int i = 0; i < n; ++i) {
+      for (int k = 0; k < n; ++k) {
+        double sum = 0.0;
+        for (int c = 0; c < n; ++c) sum += turned_[i * n + c] * vectors_[c * n + k];
+        scratch_[i * n + k] = sum;
+      }
+    }
+    for (int i = 0; i < n; ++i) {
+      for (int k = 0; k <= i; ++k) {
+        double sum = 0.0;
+        for (int c = 0; c < n; ++c) sum += vectors_[c * n + i] * scratch_[c * n + k];
+        turned_[i * n + k] = turned_[k * n + i] = sum;
+      }
+    }
+  }
+
   // x = L^-T x.
   void solve_transposed(double* x, int n) const {
     for (int i = n - 1; i >= 0; --i) {
@@ -140,8 +167,8 @@ class InnovationTest {
   static constexpr double kWarm = 0.1;  // nothing is summed up before [s]
 
   double period_, count_ = 0.0, age_ = 0.0;  // samples and time since the beginning
-  bool usable_ = false;
-  std::vector<double> to_white_, from_white_, factor_, turned_, vectors_;
+  bool usable_ = false, turned_before_ = false;
+  std::vector<double> to_white_, from_white_, factor_, turned_, scratch_, vectors_;
   std::vector<double> load_, gap_, white_, up_, down_;  // gap: measured less estimated momentum
   std::vector<SteadyGains> gains_;
 };
