@@ -9,8 +9,9 @@ import pytest
 import touchline as tl
 from touchline.bench.touches import TouchSampler, resting_signals
 from touchline.contact.detector import Detector
+from touchline.contact.limits import siegmund
 from touchline.contact.skin import Skin
-from touchline.contact.thresholds import make_thresholds, siegmund, without_limits
+from touchline.contact.thresholds import make_thresholds, without_limits
 from touchline.model.robot import Robot
 
 METHODS = ("rows", "scaled", "chi2", "glrt", "cusum")

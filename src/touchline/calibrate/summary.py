@@ -2,7 +2,7 @@
 """What a calibration found, as text."""
 
 from touchline.calibrate.run import Calibration
-from touchline.contact.thresholds import threshold
+from touchline.contact.limits import threshold
 from touchline.model.values import METHODS
 
 
