@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`touchline calibrate`: from contact-free recordings to a description, and what it refuses."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +11,12 @@ import touchline as tl
 from touchline.bench.free_motion import MotionMaker, generator, imperfect, random_trajectory
 from touchline.calibrate.noise import NoiseMeter
 from touchline.calibrate.robot_file import write_description
-from touchline.calibrate.run import calibrate
+from touchline.calibrate.run import _check_tails, calibrate
 from touchline.cli.main import main
 from touchline.contact.calibration import fit_growth
 from touchline.contact.detector import Detector
-from touchline.contact.thresholds import make_thresholds
+from touchline.contact.tail import Tail
+from touchline.contact.thresholds import make_thresholds, row_name
 from touchline.errors import InputError
 from touchline.logs import write_table
 from touchline.model.values import METHODS
@@ -55,6 +57,9 @@ def logs(robot, maker, tmp_path_factory):
         path = folder / f"free{i}.parquet"
         write_table(path, maker.samples(random_trajectory(robot, rng), rng), robot.description)
         paths.append(path)
+    rng = generator(0)
+    s = MotionMaker(robot, robot, RATE, 10.0).samples(random_trajectory(robot, rng), rng)
+    write_table(folder / "short.parquet", s, robot.description)
     return paths
 
 
@@ -125,6 +130,33 @@ def test_the_report_tells_what_was_extrapolated(result):
     assert "extrapolated" in text
     assert "held-out data (every 3rd recording held out, 0.3 min)" in text
     assert {h.method for h in result.held_out} == set(METHODS)
+
+
+def test_the_report_tells_what_every_row_is_like(result):
+    from touchline.calibrate.summary import summary_text
+
+    lines = {line.split()[0]: line.split() for line in summary_text(result).splitlines() if line}
+    thresholds = make_thresholds(tl.load_robot(result.out), 1 / RATE)
+    contacts = {row_name(result.robot, row): row.contact for row in thresholds.rows}
+    for name in ("joint2", "base.fx", "handle.mz"):
+        assert float(lines[name][3]) == pytest.approx(contacts[name], rel=0.01)
+        assert float(lines[name][1]) < float(lines[name][3])
+    # A third of 60 s: 10 alarms are expected at 1800 an hour, if the tails reach so far.
+    most = max(h.rate for h in result.held_out)
+    assert 100 < most <= 1800
+    assert {h.rate for h in result.held_out} == {most, 10.0}
+
+
+def test_a_figure_shows_what_was_seen(result, tmp_path):
+    pytest.importorskip("matplotlib")
+    from touchline.calibrate.figure import check_figure, draw_calibration
+
+    path = tmp_path / "new" / "tails.svg"
+    draw_calibration(result, path)
+    text = path.read_text()
+    assert text.count('id="axes_') == 3 * len(METHODS)
+    with pytest.raises(InputError, match="allowed endings"):
+        check_figure(tmp_path / "tails.txt")
 
 
 def test_comments_and_other_keys_stay(tmp_path):
@@ -198,11 +230,41 @@ def test_recordings_with_contacts_are_refused(robot, maker, tmp_path, capsys):
     rng = generator(1)
     write_table(more, maker.samples(random_trajectory(robot, rng), rng), robot.description)
     out = tmp_path / "out.yaml"
-    status = main(["calibrate", str(more), str(path), "--robot", "sara", "--out", str(out)])
+    arguments = ["calibrate", str(more), str(path), "--robot", "sara", "--out", str(out)]
+    status = main([*arguments, "--method", "cusum"])
     message = capsys.readouterr().err
     assert status == 2
     assert f"{path}: from 8.0" in message and "segment base" in message
+    assert re.search(r"base\.fy is 1\d\.?\d* N off, usually 0\.\d+ N", message)
+    assert "--trust" in message
     assert not out.exists()
+    assert main([*arguments, "--method", "cusum", "--trust"]) == 0
+    assert out.exists()
+
+
+def test_a_joint_that_stands_out_is_named_with_what_it_does(robot, maker, tmp_path):
+    paths = []
+    for i in range(2):
+        rng = generator(i)
+        s = maker.samples(random_trajectory(robot, rng), rng)
+        if i == 1:  # stiction: a burst of torque where joint 3 reverses
+            turns = np.flatnonzero((s.qd[:-1, 2] < 0) != (s.qd[1:, 2] < 0))
+            quick = [k for k in turns if 4000 < k < 9000 and abs(s.qd[k - 50, 2]) > 0.03]
+            s.tau[quick[0] - 30 : quick[0] + 30, 2] += 8.0
+        paths.append(tmp_path / f"{i}.parquet")
+        write_table(paths[-1], s, robot.description)
+    with pytest.raises(InputError, match=r"joint3 is .* Nm off, .*the joint reverses \(friction"):
+        calibrate(paths, "sara", tmp_path / "out.yaml", ("cusum",))
+
+
+def test_a_test_that_could_not_be_set_is_refused(logs, tmp_path):
+    tails = {"base": {"glrt": Tail(1.0, 60.0, 1.0, 0.0, 60, 1.0)}}
+    robot = tl.load_robot("sara")
+    with pytest.raises(InputError) as caught:
+        _check_tails(robot, tails, ("glrt", "rows"), 0.02)
+    words = str(caught.value)
+    assert "72 s" in words and "rows (segment base)" in words and "glrt (segment wrist)" in words
+    assert "--method glrt" in words
 
 
 @pytest.mark.parametrize(
@@ -210,7 +272,7 @@ def test_recordings_with_contacts_are_refused(robot, maker, tmp_path, capsys):
     [
         (lambda p: {"logs": []}, "at least one recording"),
         (lambda p: {"logs": [p[0], p[0]]}, "named twice"),
-        (lambda p: {"logs": [p[0]]}, "at least 30 s are needed"),
+        (lambda p: {"logs": [p[0].with_name("short.parquet")]}, "at least 20 s are needed"),
         (lambda p: {"logs": [p[0].with_name("none.csv")]}, "no such file"),
         (lambda p: {"out": p[0].with_suffix(".txt")}, "ends in .yaml"),
         (lambda p: {"false_alarms": 0.0}, "--false-alarms 0"),

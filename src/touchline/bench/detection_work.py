@@ -107,6 +107,7 @@ def joined(parts: list[cal.Statistics]) -> cal.Statistics:
         np.concatenate([p.time for p in parts]),
         np.concatenate([p.recording + 100_000 * i for i, p in enumerate(parts)]),
         sum(p.hours for p in parts),
+        parts[0].length,
     )
 
 

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Was a recording that shall be free of contacts really free of them?"""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from touchline.contact.calibration import BLOCK, GAP, Statistics
+from touchline.contact.calibration import Statistics
 from touchline.contact.tail import cluster_peaks
 
 SUSPICIOUS = 3.0, 5.0  # excesses beyond 3 (ln n + 5) scales of a tail belong to no such tail
@@ -38,8 +38,7 @@ def find_contacts(found: Statistics, methods: tuple[str, ...]) -> list[Suspicion
     It sees what stands out. A contact that is as weak as the errors of the model, or that lasts for
     most of a recording, does not.
     """
-    gap = round(GAP / BLOCK)
-    suspicions: dict[tuple[int, float], Suspicion] = {}
+    suspicions: list[Suspicion] = []
     for g in range(found.blocks.shape[1]):
         for t, method in enumerate(methods):
             if method not in METHODS:
@@ -48,21 +47,25 @@ def find_contacts(found: Statistics, methods: tuple[str, ...]) -> list[Suspicion
             limit = _limit(series[np.isfinite(series)])
             if limit is None:
                 continue
-            peaks, at = cluster_peaks(series, limit, gap)
+            peaks, at = cluster_peaks(series, limit, found.gap)
             for peak, i in zip(peaks, at.tolist(), strict=True):
-                start, end = _extent(series, i, 0.5 * limit)
-                key = int(found.recording[i]), round(float(found.time[i]), 0)
-                new = Suspicion(
-                    key[0],
-                    float(found.time[start]),
-                    float(found.time[end]) + BLOCK,
-                    g,
-                    float(peak / limit),
-                )
-                old = suspicions.get(key)
-                if old is None or old.factor < new.factor:
-                    suspicions[key] = new
-    return [suspicions[key] for key in sorted(suspicions)]
+                start, end = (float(found.time[k]) for k in _extent(series, i, 0.5 * limit))
+                number, factor = int(found.recording[i]), float(peak / limit)
+                suspicions.append(Suspicion(number, start, end + found.length, g, factor))
+    return _merged(suspicions)
+
+
+def _merged(suspicions: list[Suspicion]) -> list[Suspicion]:
+    """Those that overlap as one, with the segment that stands out most, in order of time."""
+    merged: list[Suspicion] = []
+    for new in sorted(suspicions, key=lambda s: (s.recording, s.start)):
+        old = merged[-1] if merged else None
+        if old is None or old.recording != new.recording or old.end < new.start:
+            merged.append(new)
+            continue
+        worse = max(old, new, key=lambda s: s.factor)
+        merged[-1] = replace(worse, start=old.start, end=max(old.end, new.end))
+    return merged
 
 
 def _limit(series: np.ndarray) -> float | None:

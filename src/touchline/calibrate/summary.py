@@ -1,9 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a calibration found, as text."""
 
+from dataclasses import replace
+
 from touchline.calibrate.run import Calibration
 from touchline.contact.limits import threshold
+from touchline.contact.residual_noise import residual_noise
+from touchline.contact.thresholds import make_thresholds, row_name
+from touchline.model.robot import Robot
 from touchline.model.values import METHODS
+
+ERRORS = 5.0  # times the noise; residuals above it come from the model, or from contacts
 
 
 def summary_text(result: Calibration) -> str:
@@ -13,7 +20,15 @@ def summary_text(result: Calibration) -> str:
         f"{len(result.logs)} recording{'s' * (len(result.logs) > 1)}, "
         f"{60 * description.hours:.1f} min at {1 / description.period:.0f} Hz"
     )
-    lines = [head, "", *_noise_lines(result), "", *_threshold_lines(result)]
+    lines = [
+        head,
+        "",
+        *_noise_lines(result),
+        "",
+        *_row_lines(result),
+        "",
+        *_threshold_lines(result),
+    ]
     return "\n".join([*lines, "", *_held_out_lines(result), "", f"written: {result.out}"])
 
 
@@ -32,11 +47,49 @@ def _range(values: tuple[float, ...]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
+def _row_lines(result: Calibration) -> list[str]:
+    """What is usual in every row, beside noise, and what `rows` would take for a contact."""
+    robot, rows = result.robot, result.description.rows
+    used = robot.description.detection.method
+    methods = used if "rows" in used else (*used[1:], "rows")  # as many as share the rate
+    detection = replace(robot.description.detection, method=methods, calibration=result.description)
+    calibrated = Robot(replace(robot.description, detection=detection), robot.mechanism)
+    period = result.description.period
+    joint_noise, segment_noise = residual_noise(robot, period)
+    lines = ["residuals without contact, 1 sigma, and the thresholds of rows for that rate"]
+    lines.append(f"  {'row':20} {'noise':>8} {'in all':>8} {'threshold':>10}")
+    ratios: dict[str, float] = {}
+    for row in make_thresholds(calibrated, period).rows:
+        name = row_name(robot, row)
+        if name not in rows:
+            continue
+        segment = robot.segment_names[row.segment]
+        is_joint = row.component < 0
+        noise = joint_noise[row.joint] if is_joint else segment_noise[segment][row.component]
+        unit = "N" if 0 <= row.component < 3 else "Nm"
+        usual = rows[name].typical
+        ratios[name] = usual / max(noise, 1e-12)
+        lines.append(f"  {name:20} {noise:8.2g} {usual:8.2g} {row.contact:10.3g} {unit}")
+    worst = max(ratios, key=lambda name: ratios[name])
+    if ratios[worst] > ERRORS:
+        lines.append(
+            f"  {worst} shows {ratios[worst]:.0f} times what its noise explains: inertias, payload "
+            "or friction\n  are not as described (touchline check), or something touched the robot "
+            "throughout"
+        )
+    given = robot.description.detection.contact
+    kinds = [k for k in ("torque", "force", "moment") if getattr(given, k) is not None]
+    if kinds:
+        keys = ", ".join(f"detection.contact.{kind}" for kind in kinds)
+        lines.append(f"  {keys} of the description stay in force, and have no rate: take them out")
+    return lines
+
+
 def _threshold_lines(result: Calibration) -> list[str]:
-    count = len(result.tails)
-    share = result.rate / count
+    share, used = result.share, len(result.robot.description.detection.method)
     lines = [
-        f"thresholds for {result.rate:g} false alarms an hour of the whole robot",
+        f"thresholds for {result.rate:g} an hour of the whole robot"
+        f"{f', shared by {used} methods' * (used > 1)}",
         f"  {'segment':10} {'method':8} {'threshold':>9}  {'95 % interval':>17}  "
         f"{'peaks':>5} {'shape':>6}",
     ]
@@ -63,9 +116,11 @@ def _threshold_lines(result: Calibration) -> list[str]:
 
 
 def _held_out_lines(result: Calibration) -> list[str]:
-    hours = result.held_out[0].hours
+    hours = result.test.hours
+    if not result.held_out:
+        return ["too short for a check on held-out data"]
     lines = [
-        f"on held-out data ({result.split}, {60 * hours:.1f} min): alarms that came",
+        f"on held-out data ({result.parted}, {60 * hours:.1f} min): alarms that came",
         f"  {'method':8} {'at 1/h':>7}  {'came':>5} {'expected':>9}  {'measured 1/h':>12}  95 %",
     ]
     for h in result.held_out:
@@ -73,5 +128,11 @@ def _held_out_lines(result: Calibration) -> list[str]:
         lines.append(
             f"  {h.method:8} {h.rate:7g}  {h.count:5d} {h.rate * hours:9.2f}  {h.measured:12.3g}  "
             f"{low:.3g} to {high:.3g}"
+        )
+    expected = result.rate * hours
+    if expected < 1.0:
+        lines.append(
+            f"  too short to tell whether {result.rate:g} an hour hold: one alarm takes "
+            f"{1.0 / result.rate:.3g} h of held-out data"
         )
     return lines

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.contact.detector import Detector
-from touchline.contact.tail import Tail, count_clusters, fit_tail
+from touchline.contact.tail import LEAST_PEAKS, Tail, count_clusters, fit_tail
 from touchline.contact.thresholds import (
     COLLISION_RATIO,
     Thresholds,
@@ -63,17 +63,24 @@ class Statistics:
         time: (N,) [s] within its recording.
         recording: (N,) its number.
         hours: of motion that was watched.
+        length: of a block [s].
     """
 
     blocks: Array
     time: Array
     recording: NDArray[np.int64]
     hours: float
+    length: float = BLOCK
+
+    @property
+    def gap(self) -> int:
+        """Alarms at most so many blocks apart are one."""
+        return max(1, round(GAP / self.length))
 
     def part(self, use: NDArray[np.bool_]) -> "Statistics":
         """Some of the blocks."""
         hours = self.hours * float(use.mean())
-        return Statistics(self.blocks[use], self.time[use], self.recording[use], hours)
+        return Statistics(self.blocks[use], self.time[use], self.recording[use], hours, self.length)
 
 
 def with_methods(robot: Robot, *methods: str, **settings) -> Robot:
@@ -182,19 +189,29 @@ def collect_statistics(
         times.append(np.full(1, np.nan))
         numbers.append(np.full(1, number))
     hours = count * period / 3600
-    return Statistics(np.concatenate(blocks), np.concatenate(times), np.concatenate(numbers), hours)
+    return Statistics(
+        np.concatenate(blocks),
+        np.concatenate(times),
+        np.concatenate(numbers),
+        hours,
+        per_block * period,
+    )
 
 
 def fit_tails(
-    robot: Robot, found: Statistics, methods: tuple[str, ...] = METHODS
+    robot: Robot,
+    found: Statistics,
+    methods: tuple[str, ...] = METHODS,
+    least: int = LEAST_PEAKS,
 ) -> dict[str, dict[str, Tail]]:
-    """Tails by segment and method, as far as there are peaks enough."""
-    gap = round(GAP / BLOCK)
+    """Tails by segment and method, as far as there are `least` alarms to fit them to."""
     tails: dict[str, dict[str, Tail]] = {}
     for g, segment in enumerate(robot.segment_names):
         for t, method in enumerate(methods):
             series = found.blocks[:, g, t]
-            tail = fit_tail(series, found.hours, gap) if np.nanmax(series) > 0 else None
+            tail = (
+                fit_tail(series, found.hours, found.gap, least) if np.nanmax(series) > 0 else None
+            )
             if tail is not None:
                 tails.setdefault(segment, {})[method] = tail
     return tails
@@ -214,9 +231,8 @@ def describe(
 
 def count_alarms(found: Statistics, limits: Array, t: int) -> int:
     """How many alarms a method would have given, with its limits (m,) of the segments."""
-    gap = round(GAP / BLOCK)
     return sum(
-        count_clusters(found.blocks[:, g, t], limit, gap)
+        count_clusters(found.blocks[:, g, t], limit, found.gap)
         for g, limit in enumerate(limits)
         if np.isfinite(limit)
     )

@@ -14,7 +14,8 @@ from touchline.model.description import TailDescription
 
 Array = NDArray[np.float64]
 
-LEAST_PEAKS, PEAKS_PER_HOUR = 50, 60.0  # the tail begins where there are so many
+PEAKS, PEAKS_PER_HOUR = 50, 60.0  # the tail begins where there are so many
+LEAST_PEAKS = 20
 SHAPES = -0.5, 0.5  # allowed; beyond them estimates make no sense
 SHAPE_SIGMA = 0.2  # of the prior: shapes of noise and of sums of many errors are near 0
 Z95 = 1.96
@@ -144,21 +145,22 @@ def alarm_levels(series: Array, gap: int) -> Array:
     return values[order][np.flatnonzero(np.diff(alarms, prepend=0) > 0)]
 
 
-def fit_tail(series: Array, hours: float, gap: int) -> Tail | None:
+def fit_tail(series: Array, hours: float, gap: int, least: int = LEAST_PEAKS) -> Tail | None:
     """The tail of a statistic.
 
     Args:
         series: (N,) the statistic, or its maxima over short blocks.
         hours: that it covers.
         gap: see `cluster_peaks`.
+        least: alarms that it takes.
 
     Returns:
-        None where there are too few alarms for any statement.
+        None where there are fewer.
     """
     levels = alarm_levels(series, gap)
     levels = levels[levels > np.nanmedian(series)] if len(levels) else levels
-    count = min(round(max(LEAST_PEAKS, PEAKS_PER_HOUR * hours)), len(levels) - 1)
-    if count < 0.4 * LEAST_PEAKS or levels[0] <= levels[count]:
+    count = min(round(max(PEAKS, PEAKS_PER_HOUR * hours)), len(levels) - 1)
+    if count < least or levels[0] <= levels[count]:
         return None
     scale, shape = fit_excess(levels[:count] - levels[count])
     return Tail(float(levels[count]), count / hours, scale, shape, count, hours)

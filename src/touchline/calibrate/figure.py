@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A figure of a calibration: how often which statistic was exceeded, and the thresholds."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.calibrate.run import Calibration
+from touchline.contact.calibration import Statistics
+from touchline.contact.tail import Tail, alarm_levels
+from touchline.errors import InputError
+from touchline.model.values import METHODS
+
+Array = NDArray[np.float64]
+
+ENDINGS = ".svg", ".png", ".pdf"
+LEFT_OUT = 0.3  # of the tail's range, below its beginning, that is shown as well
+
+
+def check_figure(path: Path) -> None:
+    """Sees that a figure can be drawn, before the work.
+
+    Raises:
+        InputError: the ending is none of `ENDINGS`.
+        ModuleNotFoundError: matplotlib is missing.
+    """
+    from importlib import import_module
+
+    if path.suffix not in ENDINGS:
+        raise InputError(f"--figure {path}: allowed endings: {', '.join(ENDINGS)}")
+    import_module("matplotlib")
+
+
+def draw_calibration(result: Calibration, path: Path) -> None:
+    """Draws one panel for each segment and method.
+
+    Steps: alarms an hour against the threshold, on the data held out and on the others. Line: the
+    tail that was fitted to all of them. Dashed: the threshold for the rate that is asked for, with
+    its 95 % interval.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    matplotlib.rcParams["svg.hashsalt"] = "touchline"
+    names = [name for name in result.robot.segment_names if name in result.tails]
+    figure = Figure(figsize=(2.9 * len(METHODS), 2.6 * len(names)), layout="constrained")
+    grid = figure.subplots(len(names), len(METHODS), squeeze=False)
+    for line, name in zip(grid, names, strict=True):
+        for t, (axes, method) in enumerate(zip(line, METHODS, strict=True)):
+            tail = result.tails[name].get(method)
+            if tail is None:
+                axes.axis("off")
+                continue
+            g = result.robot.segment_names.index(name)
+            _panel(axes, result, tail, (g, t))
+            used = method in result.robot.description.detection.method
+            axes.set_title(f"{name}: {method}{' (in use)' if used else ''}", fontsize=9)
+    drawn = [axes for axes in grid.flat if axes.lines]
+    drawn[0].legend(fontsize=7)
+    for axes in grid[:, 0]:
+        axes.set_ylabel("alarms an hour")
+    for axes in grid[-1]:
+        axes.set_xlabel("threshold")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
+    except OSError as error:
+        raise InputError(f"--figure {path}: cannot be written: {error.strerror}") from None
+
+
+def _panel(axes: Any, result: Calibration, tail: Tail, at: tuple[int, int]) -> None:
+    share = result.share
+    limit, (low, high) = tail.threshold(share), tail.interval(share)
+    most = 1.15 * max(limit, tail.level)
+    for part, colour, label in (
+        (result.train, "#1f77b4", "the others"),
+        (result.test, "#ff7f0e", "held out"),
+    ):
+        levels, rates = _seen(part, at)
+        axes.step(levels, rates, where="pre", color=colour, lw=1.2, label=label)
+        most = max(most, 1.02 * float(levels.max(initial=0.0)))
+    least = tail.level - LEFT_OUT * (most - tail.level)
+    x = np.linspace(tail.level, most, 200)
+    axes.plot(x, tail.rate(x), color="k", lw=1.0, label="tail, of all")
+    axes.axvline(limit, color="k", lw=1.0, ls="--")
+    axes.axvspan(low, high, color="k", alpha=0.08, lw=0)
+    axes.axhline(share, color="k", lw=0.5, ls=":")
+    axes.set_yscale("log")
+    axes.set_xlim(max(least, 0.0), most)
+    axes.set_ylim(0.2 * min(share, 1.0 / tail.hours), 2.0 * tail.per_hour)
+    axes.grid(alpha=0.3)
+
+
+def _seen(found: Statistics, at: tuple[int, int]) -> tuple[Array, Array]:
+    """Thresholds and the alarms an hour that they give."""
+    levels = alarm_levels(found.blocks[:, at[0], at[1]], found.gap)
+    return levels, np.arange(1, len(levels) + 1) / found.hours
