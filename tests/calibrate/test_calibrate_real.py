@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Calibration on half a minute of a real UR10: what is left over is friction, not noise."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import touchline as tl
+from touchline.calibrate.run import calibrate
+from touchline.calibrate.summary import summary_text
+from touchline.contact.thresholds import make_thresholds
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+DATA = Path(os.environ.get("TOUCHLINE_DATA", REPOSITORY.parent / "shared" / "data"))
+
+
+def test_a_real_ur10_gets_thresholds_that_its_own_motion_keeps_below(tmp_path):
+    log = DATA / "panda_ur10_rosbag2" / "ur10_exciting_trajectory.db3"
+    if not log.exists():
+        pytest.skip(f"no recordings at {DATA}: set TOUCHLINE_DATA")
+    text = (REPOSITORY / "examples" / "robots" / "ur10.yaml").read_text()
+    robot = tmp_path / "ur10.yaml"
+    robot.write_text("\n".join(x for x in text.splitlines() if not x.startswith("  contact:")))
+    result = calibrate([log], robot, robot)
+
+    thresholds = make_thresholds(tl.load_robot(robot), result.description.period)
+    assert thresholds.calibrated
+    contact = np.array([row.contact for row in thresholds.rows])
+    usual = np.array([row.typical for row in result.description.rows.values()])
+    assert (contact > 5 * usual).all() and (contact < 60).all()
+
+    # Two thirds foresee what the last third does, within chance.
+    telling = [h for h in result.held_out if h.rate * h.hours > 3]
+    assert {h.method for h in telling} == {"rows", "scaled", "chi2", "glrt", "cusum"}
+    for h in telling:
+        low, high = h.interval
+        assert low < 1.5 * h.rate and high > h.rate / 1.5
+
+    told = summary_text(result)
+    assert "times what its noise explains" in told
+    assert "extrapolated" in told and "too short to tell whether 1 an hour hold" in told
