@@ -142,7 +142,7 @@ class MotionMaker:
         sigma = [*noise.tau, *(x for s in self.robot.sensor_names for x in noise.sensors[s])]
         loads = loads + rng.standard_normal(loads.shape) * np.array(sigma)
         qd = qd + rng.standard_normal(qd.shape) * np.array(noise.qd)
-        measured = [j.torque in ("sensor", "motor") for j in self.robot.description.joints]
+        measured = [j.measured for j in self.robot.description.joints]
         tau = np.where(measured, loads[:, :n], np.nan)
         wrench = np.ascontiguousarray(loads[:, n:]).reshape(len(q), -1, 6)
         return Samples(self.time[: len(q)], q, qd, tau, wrench)

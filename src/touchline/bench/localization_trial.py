@@ -222,7 +222,7 @@ def pair_rank(robot: Robot, bodies: list[str]) -> int:
     if first.segment != second.segment:
         return 0
     between = set(robot.joints_inboard_of(first)) ^ set(robot.joints_inboard_of(second))
-    own = {j.name for j in robot.description.joints if j.torque in ("sensor", "motor")}
+    own = {j.name for j in robot.description.joints if j.measured}
     return 6 + len(between & own)
 
 

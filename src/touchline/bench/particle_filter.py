@@ -252,7 +252,7 @@ def _rows_and_noise(skin: Skin, period: float) -> tuple[NDArray[np.int64], Array
     """The measured rows, and the standard deviation of each after the observer's filter."""
     description = skin.robot.description
     force, moment, torque = LEAST_NOISE
-    own = [joint.torque in ("sensor", "motor") for joint in description.joints]
+    own = [joint.measured for joint in description.joints]
     sigma = [max(s, torque) for s in description.noise.tau]
     bandwidth = list(description.bandwidth_joints)
     for sensor in description.sensors:

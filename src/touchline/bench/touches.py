@@ -215,4 +215,4 @@ def touch_loads(robot: Robot, q: Array, node: int, position: Array, force: Array
 
 
 def _measured(robot: Robot) -> NDArray[np.bool_]:
-    return np.array([joint.torque in ("sensor", "motor") for joint in robot.description.joints])
+    return np.array([joint.measured for joint in robot.description.joints])

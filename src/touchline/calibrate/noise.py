@@ -69,7 +69,7 @@ def measure_noise(robot: Robot, recordings: Iterable[Iterable[Samples]]) -> Nois
 def noise_keys(robot: Robot, noise: Noise) -> dict:
     """As it stands in `robot.yaml`, key `noise`."""
     keys: dict = {"q": _short(noise.q), "qd": _short(noise.qd)}
-    if any(joint.torque in ("sensor", "motor") for joint in robot.description.joints):
+    if any(joint.measured for joint in robot.description.joints):
         keys["tau"] = _short(noise.tau)
     for sensor in robot.description.sensors:
         six = noise.sensors[sensor.name]

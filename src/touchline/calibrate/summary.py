@@ -35,7 +35,7 @@ def summary_text(result: Calibration) -> str:
 def _noise_lines(result: Calibration) -> list[str]:
     noise = result.noise
     lines = ["noise, 1 sigma per sample", f"  qd   {_range(noise.qd)} rad/s"]
-    if any(joint.torque in ("sensor", "motor") for joint in result.robot.description.joints):
+    if any(joint.measured for joint in result.robot.description.joints):
         lines.append(f"  tau  {_range(noise.tau)} Nm")
     for name, six in noise.sensors.items():
         lines.append(f"  {name}: force {_range(six[:3])} N, moment {_range(six[3:])} Nm")

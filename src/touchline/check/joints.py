@@ -81,7 +81,7 @@ def check_torques(
     measured = [
         j
         for j, joint in enumerate(robot.description.joints)
-        if joint.torque in ("sensor", "motor")
+        if joint.measured
         and joint.compensated != "model"
         and joint.name not in dead
         and np.isfinite(windows.torque[:, j]).any()

@@ -86,7 +86,7 @@ def response(robot: Robot, q: Array) -> Array:
 
 def _measured(robot: Robot) -> list[int]:
     joints = robot.description.joints
-    return [j for j, joint in enumerate(joints) if joint.torque in ("sensor", "motor")]
+    return [j for j, joint in enumerate(joints) if joint.measured]
 
 
 def _signal_names(robot: Robot) -> list[str]:

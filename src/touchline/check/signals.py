@@ -35,7 +35,7 @@ def signals_of(robot: Robot) -> list[Signal]:
     signals = []
     for kind in ("q", "qd", "tau"):
         for j, joint in enumerate(description.joints):
-            if kind != "tau" or joint.torque in ("sensor", "motor"):
+            if kind != "tau" or joint.measured:
                 reach = joint.range / joint.gain if kind == "tau" else np.inf
                 signals.append(Signal(kind, joint.name, (j,), reach))
     for k, sensor in enumerate(description.sensors):

@@ -188,7 +188,7 @@ def _joint_rows(
 ) -> list[RowThreshold]:
     rows = []
     for j, joint in enumerate(robot.description.joints):
-        if joint.torque not in ("sensor", "motor") or robot.joint_segments[j] != segment:
+        if not joint.measured or robot.joint_segments[j] != segment:
             continue
         safe = max(SIGMAS * sigma[j], TORQUE_FLOOR)
         contact = _given(detection.contact, "torque", j)

@@ -169,7 +169,7 @@ def _require_torques(robot: Robot) -> None:
     """Eq. (6) needs the whole torque of every joint."""
     problems = []
     for joint in robot.description.joints:
-        if joint.torque not in ("sensor", "motor"):
+        if not joint.measured:
             problems.append(
                 f"joints.{joint.name}.torque is '{joint.torque}': the classical route needs a "
                 "measured torque at every joint (sensor, motor)"

@@ -22,7 +22,7 @@ def read_torque(robot: Robot, qd: Array, tau: Array) -> Array:
     """
     read = np.full(tau.shape, np.nan)
     for j, joint in enumerate(robot.description.joints):
-        if joint.torque not in ("sensor", "motor"):
+        if not joint.measured:
             continue
         law, speed = joint.friction, qd[:, j]
         friction = law.coulomb * np.tanh(speed / law.coulomb_width) + law.viscous * speed

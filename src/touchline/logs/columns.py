@@ -12,8 +12,6 @@ from touchline.logs.naming import Column, Naming
 from touchline.model.description import AXES, RobotDescription
 from touchline.suggest import did_you_mean, listing
 
-MEASURED = ("sensor", "motor")
-
 
 @dataclass(frozen=True)
 class Pick:
@@ -63,7 +61,7 @@ def wanted_picks(description: RobotDescription, naming: Naming) -> list[Pick]:
     picks = [Pick(naming.time, "time", ())]
     for signal, columns in naming.joints.items():
         for j, (joint, column) in enumerate(zip(description.joints, columns, strict=True)):
-            if signal != "tau" or joint.torque in MEASURED:
+            if signal != "tau" or joint.measured:
                 picks.append(Pick(column, signal, (j,)))
     for k, sensor in enumerate(description.sensors):
         for axis, column in naming.sensors[sensor.name].items():

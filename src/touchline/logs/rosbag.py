@@ -56,7 +56,7 @@ class RosbagSource:
             for signal in _SIGNALS
         }
         self._axis_factors = _axis_factors(description, naming)
-        self._unused = [j for j, x in enumerate(description.joints) if x.torque in ("none", "from")]
+        self._unused = [j for j, x in enumerate(description.joints) if not x.measured]
         survey = Survey(bag, self._joints, self._wrenches)
         survey.check(path, description)
         self.without_velocity = survey.without_velocity

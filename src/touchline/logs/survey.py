@@ -10,7 +10,6 @@ from touchline.errors import InputError
 from touchline.logs.align import typical_period
 from touchline.logs.bagfile import Bag
 from touchline.logs.cdr import Decoder
-from touchline.logs.columns import MEASURED
 from touchline.model.description import RobotDescription
 from touchline.suggest import did_you_mean, listing
 
@@ -157,7 +156,7 @@ def _missing_values(
     path: Path, topic: str, description: RobotDescription, states: dict[str, np.ndarray]
 ) -> list[str]:
     problems = []
-    measured = [j for j, joint in enumerate(description.joints) if joint.torque in MEASURED]
+    measured = [j for j, joint in enumerate(description.joints) if joint.measured]
     if np.all(np.isnan(states["position"])):
         problems.append(f"{path}: the messages of {topic} carry no positions")
     if measured and np.all(np.isnan(states["effort"][:, measured])):

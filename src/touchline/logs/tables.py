@@ -29,7 +29,7 @@ def table_columns(samples: Any, description: RobotDescription) -> dict[str, np.n
     for signal in ("q", "qd", "tau"):
         values = np.asarray(getattr(samples, signal), dtype=np.float64)
         for j, joint in enumerate(description.joints):
-            if signal != "tau" or joint.torque in ("sensor", "motor"):
+            if signal != "tau" or joint.measured:
                 columns[f"{signal}.{joint.name}"] = values[:, j]
     for k, sensor in enumerate(description.sensors):
         for axis in sensor.axes:

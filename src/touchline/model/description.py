@@ -37,6 +37,11 @@ class JointDescription:
     rotor_inertia: float = 0.0
     friction: Friction = field(default_factory=Friction)
 
+    @property
+    def measured(self) -> bool:
+        """Whether it has a torque signal of its own."""
+        return self.torque in ("sensor", "motor")
+
 
 @dataclass(frozen=True)
 class SensorDescription:

@@ -3,6 +3,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from touchline.errors import InputError
 from touchline.model.corrections import apply_corrections
@@ -140,19 +141,10 @@ class _Draft:
     def _sensor(self, place: str, entry: SensorEntry) -> SensorDescription:
         bias = self.expander.per_axis(f"{place}.bias", entry.bias, entry, (0.0,) * 6)
         limits = (float("inf"),) * 6
-        return SensorDescription(
-            name=entry.name,
-            link=entry.link,
-            xyz=entry.pose.xyz,
-            rpy=entry.pose.rpy,
-            axes=entry.axes,
-            polarity=entry.polarity,
-            frame=entry.frame,
-            compensated=entry.compensated,
-            bias=bias,
-            delay=entry.delay,
-            range=self.expander.per_axis(f"{place}.range", entry.range, entry, limits),
-        )
+        reach = self.expander.per_axis(f"{place}.range", entry.range, entry, limits)
+        same: dict[str, Any] = {key: value for key, value in vars(entry).items() if key != "pose"}
+        same.update(vars(entry.pose), bias=bias, range=reach)
+        return SensorDescription(**same)
 
     def description(self) -> RobotDescription:
         """Return the description; only without problems."""
@@ -180,16 +172,5 @@ class _Draft:
 
 
 def _joint(entry: JointEntry) -> JointDescription:
-    return JointDescription(
-        name=entry.name,
-        torque=entry.torque.kind,
-        sources=entry.torque.sources,
-        sign=entry.sign,
-        gain=entry.gain,
-        bias=entry.bias,
-        delay=entry.delay,
-        range=entry.range,
-        compensated=entry.compensated,
-        rotor_inertia=entry.rotor_inertia,
-        friction=entry.friction,
-    )
+    torque: dict[str, Any] = {"torque": entry.torque.kind, "sources": entry.torque.sources}
+    return JointDescription(**vars(entry) | torque)

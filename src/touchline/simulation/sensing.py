@@ -46,7 +46,7 @@ def sense(
 
 def _joint_log(joint: JointDescription, j: int, readings: Readings) -> Array:
     """The inverse of `torque = sign * gain * logged - bias - friction`."""
-    if joint.torque not in ("sensor", "motor"):
+    if not joint.measured:
         return np.full(len(readings.time), np.nan)
     if joint.torque == "motor":
         shown = readings.motor_torque[:, j]
