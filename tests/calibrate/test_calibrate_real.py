@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Calibration on half a minute of a real UR10: what is left over is friction, not noise."""
+"""Calibration on recordings of real robots: what is left over is friction, or a person."""
 
 import os
 from pathlib import Path
@@ -11,16 +11,30 @@ import touchline as tl
 from touchline.calibrate.run import calibrate
 from touchline.calibrate.summary import summary_text
 from touchline.contact.thresholds import make_thresholds
+from touchline.errors import InputError
 
 REPOSITORY = Path(__file__).resolve().parents[2]
+EXAMPLES = REPOSITORY / "examples" / "robots"
 DATA = Path(os.environ.get("TOUCHLINE_DATA", REPOSITORY.parent / "shared" / "data"))
 
 
-def test_a_real_ur10_gets_thresholds_that_its_own_motion_keeps_below(tmp_path):
-    log = DATA / "panda_ur10_rosbag2" / "ur10_exciting_trajectory.db3"
-    if not log.exists():
+def real(*parts):
+    path = DATA.joinpath(*parts)
+    if not path.exists():
         pytest.skip(f"no recordings at {DATA}: set TOUCHLINE_DATA")
-    text = (REPOSITORY / "examples" / "robots" / "ur10.yaml").read_text()
+    return path
+
+
+@pytest.mark.parametrize("logs", [("a4", "c5"), ("b6", "b8"), ("f2", "a6")])
+def test_a_real_panda_that_is_touched_half_of_the_time_is_refused(logs, tmp_path):
+    paths = [real("panda_touches", f"{log}.csv.gz") for log in logs]
+    with pytest.raises(InputError, match=r"panda_joint\d is more than .* % of the time"):
+        calibrate(paths, EXAMPLES / "panda_hand.yaml", tmp_path / "out.yaml")
+
+
+def test_a_real_ur10_gets_thresholds_that_its_own_motion_keeps_below(tmp_path):
+    log = real("panda_ur10_rosbag2", "ur10_exciting_trajectory.db3")
+    text = (EXAMPLES / "ur10.yaml").read_text()
     robot = tmp_path / "ur10.yaml"
     robot.write_text("\n".join(x for x in text.splitlines() if not x.startswith("  contact:")))
     result = calibrate([log], robot, robot)

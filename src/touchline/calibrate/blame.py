@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What stood out when something seemed to touch the robot: which row, and what its joint did."""
+"""What stands out when something seems to touch the robot: which row, and what its joint does."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.calibrate.quiet import Suspicion
-from touchline.contact.calibration import watching, with_methods
+from touchline.contact.calibration import Residuals, watching, with_methods
 from touchline.contact.detector import Detector
-from touchline.contact.thresholds import row_name
+from touchline.contact.thresholds import make_thresholds, row_name
 from touchline.estimation.observer import Observer
 from touchline.estimation.samples import Samples
 from touchline.model.description import RowCalibration
@@ -19,6 +19,7 @@ from touchline.model.robot import Robot
 Array = NDArray[np.float64]
 
 STILL = 0.01  # rad/s; slower joints stand still
+FAR, OFTEN = 6.0, 0.06  # robust sigmas, and the share of the time that is spent beyond them
 
 
 @dataclass(frozen=True)
@@ -83,3 +84,25 @@ def find_blame(
         speed = float(np.nanmin(qd)), float(np.nanmax(qd))
     unit = "N" if 0 <= row.component < 3 else "Nm"
     return Blame(row_name(robot, row), unit, float(largest[worst]), float(typical[worst]), speed)
+
+
+def often_off(robot: Robot, period: float, found: Residuals) -> list[str]:
+    """Rows that are far off again and again, as those of a robot that is touched throughout.
+
+    Errors of a model scatter about nothing; contacts make a second population. On recordings of a
+    Panda that was touched half of the time 9 to 38 % of the residuals of some joint lie so far out;
+    of a UR10 with friction in its torques 4.5 %.
+    """
+    told = []
+    for i, row in enumerate(make_thresholds(with_methods(robot, "rows"), period).rows):
+        size = np.abs(found.residual[:, i])
+        size = size[np.isfinite(size)]
+        if not len(size):
+            continue
+        limit = FAR * 1.4826 * float(np.median(size))
+        share = float(np.mean(size > limit)) if limit > 0 else 0.0
+        if share > OFTEN:
+            unit = "N" if 0 <= row.component < 3 else "Nm"
+            told.append(f"{row_name(robot, row)} is more than {limit:.2g} {unit} off ")
+            told[-1] += f"for {100 * share:.0f} % of the time"
+    return told

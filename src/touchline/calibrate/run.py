@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.calibrate.blame import find_blame
+from touchline.calibrate.blame import find_blame, often_off
 from touchline.calibrate.held_out import HeldOut, judge, split
 from touchline.calibrate.noise import measure_noise, noise_keys
 from touchline.calibrate.quiet import LISTED, Suspicion, find_contacts
@@ -102,7 +102,7 @@ def calibrate(
     recordings = Recordings(model, logs)
     noise = measure_noise(model, recordings.all("noise"))
     quiet = Robot(replace(model.description, noise=noise), model.mechanism)
-    found, rows = _watch(quiet, recordings)
+    found, rows = _watch(quiet, recordings, trust)
     suspicions = [] if trust else find_contacts(found, METHODS)
     if suspicions:
         raise InputError(_told(quiet, recordings, rows, logs, suspicions))
@@ -156,13 +156,24 @@ def _check_tails(
         )
 
 
-def _watch(robot: Robot, recordings: Recordings) -> tuple[Statistics, dict[str, RowCalibration]]:
+def _watch(
+    robot: Robot, recordings: Recordings, trust: bool
+) -> tuple[Statistics, dict[str, RowCalibration]]:
     """Both passes over the recordings."""
     period = recordings.period
     residuals = collect_residuals(robot, period, recordings.all("residuals"))
     rows = fit_rows(robot, period, residuals)
     if not rows:
         raise InputError("no residual settles: is a signal missing? (touchline check)")
+    often = [] if trust else often_off(robot, period, residuals)
+    if often:
+        raise InputError(
+            [
+                *often[:LISTED],
+                "as if something touched the robot again and again: record motion without contact, "
+                "or describe its friction and payload; --trust takes it for the robot's own doing",
+            ]
+        )
     return collect_statistics(robot, period, rows, recordings.all("statistics")), rows
 
 
