@@ -65,7 +65,7 @@ class Trial:
         reacted: time of the first reacting torque [s].
         effort: largest joint torque, as a part of its limit.
         clipped: whether a limit cut the reaction.
-        false: whether it reacted before the touch, or to the hand that leads.
+        false: whether it reacted before the touch, or first to the hand that leads.
     """
 
     scene: str
@@ -145,7 +145,7 @@ def measure(outcome: Outcome, case: Case, reaction: str, robot: Robot) -> Trial:
     way = (path - path[0]) @ -np.asarray(outcome.encounter.body.direction)
     efforts = np.array([robot.mechanism.joints[name].effort for name in robot.joint_names])
     answered = [step.command.contact for step in acting if step.command.contact is not None]
-    wrong = case.link != HANDLE and any(contact.segment == HANDLE for contact in answered)
+    wrong = case.link != HANDLE and bool(answered) and answered[0].segment == HANDLE
     return Trial(
         **asdict(case),
         reaction=reaction,

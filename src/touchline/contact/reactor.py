@@ -9,7 +9,14 @@ from numpy.typing import NDArray
 
 from touchline.contact.contact import Contact
 from touchline.contact.policy import Choice, Policy
-from touchline.contact.reaction import REACTIONS, SERVO_TIME, Reaction, Retract, settled
+from touchline.contact.reaction import (
+    REACTIONS,
+    SERVO_TIME,
+    Reaction,
+    Retract,
+    settled,
+    within_effort,
+)
 from touchline.contact.state import Since, State
 from touchline.errors import InputError
 from touchline.model.description import PolicyDescription
@@ -21,34 +28,78 @@ Array = NDArray[np.float64]
 OWN = "own:"  # begins the name of a user's own reaction in `policy`
 
 LIMIT_TIME = 0.1  # s: how soon at the least a limit of position may be reached
+BRAKE_SHARE = 0.5  # of the deceleration that a joint's torque gives it, to count on
 
 
 def limited(torque: Array, state: State, positions: bool = True) -> tuple[Array, tuple[str, ...]]:
     """A torque (n,) that breaks no limit, and what had to be cut.
 
-    A joint that would come nearer to a limit of its range than its velocity permits is braked;
-    then all torques are cut to their limits.
+    All torques are cut to their limits. A joint that would come nearer to a limit of its range
+    than its velocity permits is braked, whatever the others do; none is driven beyond its limit of
+    velocity, but what pushes it there is not held against. Where the torques of these joints are
+    not enough for that, all joints are braked.
 
     Args:
         torque: (n,) [Nm or N].
         state: of the robot.
-        positions: whether limits of the range count too.
+        positions: whether limits of range and velocity count too.
     """
-    names, told = state.robot.joint_names, []
-    if positions:
-        lower, upper = state.range
-        fastest, slowest = (upper - state.q) / LIMIT_TIME, (lower - state.q) / LIMIT_TIME
-        near = (state.qd > fastest) | (state.qd < slowest)
-        if near.any():
-            wanted = np.clip(state.qd, np.minimum(slowest, fastest), np.maximum(slowest, fastest))
-            brake = np.diag(state.inertia) * (wanted - state.qd) / SERVO_TIME
-            held = state.bias_torque + brake
-            outward = np.where(state.qd > fastest, torque > held, torque < held) & near
-            torque = np.where(outward, held, torque)
-            told += [f"position {names[j]}" for j in np.flatnonzero(outward)]
+    names = state.robot.joint_names
     cut = np.clip(torque, -state.effort, state.effort)
-    told += [f"torque {names[j]}" for j in np.flatnonzero(np.abs(cut - torque) > 1e-9)]
+    told = [f"torque {names[j]}" for j in np.flatnonzero(np.abs(cut - torque) > 1e-9)]
+    if positions:
+        ends = _permitted(state)
+        speeds = np.array([-state.speed_limit, state.speed_limit])
+        by_range, by_speed = (ends - state.qd) / SERVO_TIME, (speeds - state.qd) / SERVO_TIME
+        by_speed = np.array([np.minimum(by_speed[0], 0.0), np.maximum(by_speed[1], 0.0)])
+        lowest = np.maximum(by_range[0], by_speed[0])
+        highest = np.minimum(by_range[1], by_speed[1])
+        cut, held = _accelerated(cut, state, np.minimum(lowest, highest), highest)
+        near = (by_range[0] >= by_speed[0]) | (by_range[1] <= by_speed[1])
+        told += [f"position {names[j]}" for j in np.flatnonzero(held & near)]
+        told += [f"speed {names[j]}" for j in np.flatnonzero(held & ~near)]
     return cut, tuple(told)
+
+
+def _permitted(state: State) -> Array:
+    """Least and greatest velocities (2, n) from which the joints can stop within their range."""
+    lower, upper = state.range
+    room = np.maximum(state.effort - np.abs(state.bias_torque), 0.0)
+    deceleration = BRAKE_SHARE * room / np.diag(state.inertia)
+
+    def speed(way: Array) -> Array:
+        inside = np.maximum(way, 0.0)
+        able = np.minimum(inside / LIMIT_TIME, np.sqrt(2.0 * deceleration * inside))
+        return np.where(way < 0.0, way / LIMIT_TIME, able)  # from beyond, back
+
+    return np.array([-speed(state.q - lower), speed(upper - state.q)])
+
+
+def _accelerated(
+    torque: Array, state: State, lowest: Array, highest: Array
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Torques (n,) that keep the joints' accelerations (n,) within bounds; also says of which.
+
+    Only joints that would leave them get other torques. What pushes the robot is not counted.
+    """
+    M, bias = state.inertia, state.bias_torque
+    acceleration, out = np.linalg.solve(M, torque - bias), torque
+    bound, held = np.zeros_like(torque), np.zeros(len(torque), dtype=bool)
+    while True:
+        inside = np.clip(acceleration, lowest, highest)
+        worse = ~held & (np.abs(acceleration - inside) > 1e-9 * (1.0 + np.abs(inside)))
+        if not worse.any():
+            break
+        bound[worse], held = inside[worse], held | worse
+        free = ~held
+        acceleration = bound.copy()
+        rest = torque[free] - bias[free] - M[np.ix_(free, held)] @ bound[held]
+        acceleration[free] = np.linalg.solve(M[np.ix_(free, free)], rest)
+        out = np.where(held, bias + M @ acceleration, torque)
+    if np.any(np.abs(out) > state.effort):
+        brake = M @ np.clip(-state.qd / SERVO_TIME, lowest, highest)
+        out = np.clip(bias + within_effort(state, brake), -state.effort, state.effort)
+    return out, held
 
 
 @dataclass(frozen=True)
@@ -60,7 +111,7 @@ class Command:
         reaction: its name; "ignore": the robot's own controller goes on.
         contact: that it answers; None for none.
         reason: why: the rule or the limit.
-        clipped: what had to be cut, as "torque JOINT" or "position JOINT".
+        clipped: what had to be cut, as "torque JOINT", "position JOINT" or "speed JOINT".
     """
 
     torque: Array
