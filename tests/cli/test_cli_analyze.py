@@ -142,6 +142,7 @@ def test_the_summary_tells_what_there_is(robot, recording, tmp_path, capsys):
     options = ["--out", str(tmp_path / "r"), "--bandwidth", "500", "--method", "paper"]
     assert main([*arguments, *options]) == 0
     out = capsys.readouterr().out
+    assert "detection: rows; not calibrated: thresholds follow from the noise figures" in out
     for word in ("400 Hz", "settling", "bad_time", "missing", "sensor_excluded", "joint7", "wrist"):
         assert word in out
     assert "K dt = 1.25 > 1" in out and "use about 100" in out

@@ -128,6 +128,13 @@ def test_policy_is_read(tmp_path):
     assert policy.zones["link7"] == "end_effector" and policy.onset.handle == 2500.0
 
 
+def test_one_bad_number_is_one_error(tmp_path):
+    with pytest.raises(tl.InputError) as error:
+        tl.load_robot(write(tmp_path, "  limits: {link3: {transient: -5}}\n"))
+    (problem,) = error.value.problems
+    assert "policy.limits.link3.transient: -5 is not allowed" in problem
+
+
 @pytest.mark.parametrize(
     ("line", "said"),
     [
@@ -141,6 +148,7 @@ def test_policy_is_read(tmp_path):
         ("rules: [{reaction: stop, clamped: maybe}]", "allowed: true, false"),
         ("rules: stop", "not a list"),
         ("limits: {link3: {reaction: stop}}", "has no number"),
+        ("limits: {link3: {transient: 100, quasi_static: 140}}", "140 is above the transient"),
         ("limits: {limb: {transient: 100}}", "unknown link or segment 'limb'"),
         ("zones: {handle: knob}", "'knob' is not allowed"),
         ("onset: {tool: 3}", "unknown key; allowed: structure"),

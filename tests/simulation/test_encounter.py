@@ -68,11 +68,6 @@ def test_a_stopped_arm_that_is_pushed_on_does_not_creep(scene, link, seed):
     readings, _ = run(plant, controller, forces, seconds, rates, controller.sampled)
     assert controller.steps[-1].command.reaction == "stop"
     late = readings.time > 0.15 + 0.5
-    print(
-        np.ptp(readings.q[late], axis=0).max(),
-        np.abs(readings.qd[late]).max(),
-        np.abs(readings.q[late][-1] - readings.q[150]).max(),
-    )
     assert np.ptp(readings.q[late], axis=0).max() < 2e-3
     assert np.abs(readings.qd[late]).max() < 0.01
     moved = readings.q[late] - readings.q[np.searchsorted(readings.time, 0.15)]

@@ -39,7 +39,10 @@ def read_robot_file(path: Path | str) -> tuple[RobotDescription, Mechanism]:
     model, mechanism, model_problems = _read_model(file, path, folders)
     names = names_in(data)
     draft = _Draft(path, model, folders, file, names, mechanism)
-    problems += [f"{where}: {what}" for where, what in draft.problems]
+    at_fault = tuple(problems)  # a whole is not to blame where one of its parts is
+    for where, what in draft.problems:
+        if not any(problem.startswith(f"{where}.") for problem in at_fault):
+            problems.append(f"{where}: {what}")
     lines = [f"{path}: {problem}" for problem in dict.fromkeys(problems)] + model_problems
     if lines or mechanism is None:
         raise InputError(lines)

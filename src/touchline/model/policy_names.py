@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Do the links and segments that `policy` names exist?"""
+"""Do the links and segments that `policy` names exist, and do its limits make sense?"""
 
 from collections.abc import Iterator
 
@@ -26,3 +26,6 @@ def check_policy(file: RobotFile, names: Names, mechanism: Mechanism | None) -> 
     for name, limit in file.policy.limits.items():
         if limit.transient is None and limit.quasi_static is None:
             yield f"policy.limits.{name}", "has no number; allowed: transient, quasi_static"
+        elif limit.transient and limit.quasi_static and limit.quasi_static > limit.transient:
+            what = f"{limit.quasi_static:g} is above the transient limit of {limit.transient:g}"
+            yield f"policy.limits.{name}.quasi_static", what

@@ -152,3 +152,10 @@ def event_where(event: Event) -> str:
     if link is not None:
         return str(link)
     return f"beyond {event.joint}" if event.joint else ""
+
+
+def detection_fact(robot: Robot, thresholds: Thresholds) -> str:
+    """Which tests detect, and whether they have a rate of false alarms."""
+    detection = robot.description.detection
+    calibrated = f"calibrated for {detection.false_alarms:g} false alarms an hour"
+    return f"{', '.join(detection.method)}; {thresholds.note or calibrated}"

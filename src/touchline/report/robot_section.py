@@ -9,6 +9,7 @@ import numpy as np
 from touchline.model.description import JointDescription, SensorDescription
 from touchline.model.robot import Robot
 from touchline.report.analysis import Analysis
+from touchline.report.facts import detection_fact
 from touchline.report.html import Cell, section, table, text
 
 
@@ -43,8 +44,8 @@ def _general(analysis: Analysis) -> list[list[Any]]:
         ["observer", f"method {analysis.method}"],
         [
             "detection",
-            f"{', '.join(detection.method)}; "
-            f"{_alarms(analysis)}; fires after {1e3 * detection.min_duration:g} ms, "
+            f"{detection_fact(robot, analysis.thresholds)}; "
+            f"fires after {1e3 * detection.min_duration:g} ms, "
             f"ends below {detection.release:g} of the thresholds for {1e3 * detection.hold:g} ms; "
             "baseline over "
             f"{detection.baseline.time:g} s, at most {detection.baseline.limit:g} thresholds",
@@ -53,13 +54,6 @@ def _general(analysis: Analysis) -> list[list[Any]]:
     if analysis.bandwidth:
         rows.append(["bandwidth given", f"{analysis.bandwidth:g} rad/s for all rows"])
     return [row for row in rows if row[1] != ""]
-
-
-def _alarms(analysis: Analysis) -> str:
-    if analysis.thresholds.note:
-        return analysis.thresholds.note
-    rate = analysis.robot.description.detection.false_alarms
-    return f"calibrated for {rate:g} false alarms an hour"
 
 
 def _joints(analysis: Analysis) -> str:

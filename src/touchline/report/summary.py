@@ -4,7 +4,13 @@
 import numpy as np
 
 from touchline.report.analysis import Analysis
-from touchline.report.facts import event_where, health_facts, joint_facts, segment_facts
+from touchline.report.facts import (
+    detection_fact,
+    event_where,
+    health_facts,
+    joint_facts,
+    segment_facts,
+)
 
 MOST_EVENTS = 40
 
@@ -58,8 +64,9 @@ def _health(analysis: Analysis) -> list[str]:
 
 def _events(analysis: Analysis) -> list[str]:
     events = analysis.events
+    head = f"detection: {detection_fact(analysis.robot, analysis.thresholds)}"
     if not events:
-        return ["events: none"]
+        return [head, "events: none"]
     rows = [["event", "detected", "lasted", "level", "segment", "force", "torque", "where"]]
     for event in events[:MOST_EVENTS]:
         lasted = "on" if event.cleared is None else number(event.cleared - event.detected)
@@ -77,7 +84,7 @@ def _events(analysis: Analysis) -> list[str]:
         )
     hidden = len(events) - MOST_EVENTS
     more = [f"  ... and {hidden} more in events.json"] if hidden > 0 else []
-    return [f"events: {len(events)} (times in s, peaks in N and Nm)", *table(rows), *more]
+    return [head, f"events: {len(events)} (times in s, peaks in N and Nm)", *table(rows), *more]
 
 
 def _residuals(analysis: Analysis) -> list[str]:
