@@ -6,7 +6,7 @@ import pytest
 
 from touchline.figure import new_figure
 from touchline.model.robot import load_robot
-from touchline.reproduce import applications, fig5, fig6
+from touchline.reproduce import applications, fig5, fig6, overlapping
 from touchline.reproduce.arm_view import ArmView
 from touchline.reproduce.replay import Replay
 from touchline.reproduce.wrench_routes import Routes
@@ -20,7 +20,7 @@ def robot():
 
 @pytest.fixture(scope="module")
 def pushes():
-    return fig5.pushed(0)
+    return overlapping.pushed(0)
 
 
 def test_pushes_overlap_and_are_found_and_located(pushes):
@@ -43,13 +43,13 @@ def test_only_the_printed_form_leaves_a_ghost_in_recoil(pushes):
 
 
 def test_a_ball_is_drawn_back_at_once_and_out_of_the_way():
-    ball = fig5.QuickRelease(
+    ball = overlapping.QuickRelease(
         "ball", "tool", (0, 0, 0), (0, 1, 0), start=1.0, hold=1.0, force=50.0, stiffness=1000.0
     )
     reach = ball.travel(ball.release)
     assert reach == pytest.approx(0.054) and ball.travel(0.5) == 0.0
     assert ball.travel(ball.release + reach / ball.retreat) == pytest.approx(0.0)
-    assert ball.travel(ball.release + 10.0) == -fig5.CLEAR
+    assert ball.travel(ball.release + 10.0) == -overlapping.CLEAR
 
 
 def test_the_tool_stays_right_while_somebody_leans_on_the_elbow(robot):

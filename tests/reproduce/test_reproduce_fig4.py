@@ -12,6 +12,7 @@ from touchline.estimation.classical import classical_error
 from touchline.model.robot import load_robot
 from touchline.reproduce import fig4
 from touchline.reproduce.conditioning import EndEffector, best_conditioned, nearby_singularity
+from touchline.reproduce.passage import passage
 from touchline.simulation.setup import read_setup
 
 ACROSS = (5.5, 6.5)  # the second in which the arm crosses the singularity
@@ -19,7 +20,7 @@ ACROSS = (5.5, 6.5)  # the second in which the arm crosses the singularity
 
 @pytest.fixture(scope="module")
 def way():
-    return fig4.passage(0, ACROSS)
+    return passage(0, ACROSS)
 
 
 @pytest.fixture(scope="module")
@@ -35,14 +36,14 @@ def test_the_arm_passes_the_best_configuration_and_crosses_the_singularity(way):
     middle = len(way.motion.time) // 2
     np.testing.assert_allclose(way.motion.q[middle], way.singular, atol=1e-12)
     assert way.condition[middle] > 1e9 and np.median(way.condition) < 1e3
-    whole = fig4.passage(0, (2.0, 2.01))
+    whole = passage(0, (2.0, 2.01))
     np.testing.assert_allclose(whole.motion.q[0], whole.best, atol=1e-12)
     smallest = np.linalg.svd(effector.jacobian(way.motion.q), compute_uv=False)[:, -1]
     assert smallest[middle - 100] > 0.01 < smallest[middle + 100]
 
 
 def test_the_arm_keeps_to_its_limits():
-    way = fig4.passage(0, fig4.SPAN)
+    way = passage(0, fig4.SPAN)
     joints = [way.robot.mechanism.joints[name] for name in way.robot.joint_names]
     assert (way.motion.q > [j.lower for j in joints]).all()
     assert (way.motion.q < [j.upper for j in joints]).all()

@@ -20,7 +20,8 @@ from touchline.figure import (
     thin,
 )
 from touchline.reproduce.experiment import Drawing, Row
-from touchline.reproduce.fig4 import BEST, JOINT, SINGULAR, Outcome
+from touchline.reproduce.fig4 import JOINT, Outcome
+from touchline.reproduce.passage import BEST, SINGULAR
 
 Array = NDArray[np.float64]
 

@@ -25,11 +25,11 @@ from touchline.reproduce.fig5 import (
     SEGMENTS,
     STRONG,
     STRUCTURE,
-    Pushes,
     Recoil,
     point_errors,
 )
 from touchline.reproduce.fig5 import ghost as ghost_of
+from touchline.reproduce.overlapping import Pushes
 from touchline.reproduce.replay import FORCE, Replay
 
 Array = NDArray[np.float64]
