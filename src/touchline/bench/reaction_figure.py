@@ -27,11 +27,11 @@ from touchline.figure import (
     save,
     styled,
 )
-from touchline.simulation.encounter import HIT_TIME
 
 LOOKS = dict(zip(REACTIONS, (FAINT, *SHADES), strict=False))
 MARKERS = dict(zip(REACTIONS, "os^v", strict=True))
 SHOWN = (Case("wall", "link5", 0.5, 0), Case("free", "link5", 1.0, 0))
+TICKS = (10, 30, 100, 300, 1000, 3000)  # N
 SPAN = (-0.02, 0.4)  # s around the touch
 
 
@@ -49,11 +49,10 @@ def time_figure() -> Any:
             encounter = encounter_of(case)
             for name in REACTIONS:
                 outcome = outcome_of(case, encounter, name)
-                time = outcome.readings.time - HIT_TIME
+                force = pressing(outcome)
+                time = outcome.readings.time - outcome.readings.time[np.argmax(force > 0)]
                 inside = (time > SPAN[0]) & (time < (SPAN[1] if case.scene == "wall" else 0.1))
-                axes.plot(
-                    1e3 * time[inside], pressing(outcome)[inside], color=LOOKS[name], label=name
-                )
+                axes.plot(1e3 * time[inside], force[inside], color=LOOKS[name], label=name)
             axes.axhline(QUIET, color=FAINT, linewidth=0.6, linestyle=":")
             axes.set_xlabel("time from the touch [ms]")
             axes.set_ylabel("force [N]")
@@ -79,6 +78,9 @@ def peak_figure(trials: Sequence[Trial]) -> Any:
                 axes.plot(before, after, MARKERS[name], color=LOOKS[name], label=name, **look)
             axes.set_xscale("log")
             axes.set_yscale("log")
+            for axis in (axes.xaxis, axes.yaxis):
+                axis.set_ticks(TICKS, [f"{force:g}" for force in TICKS])
+                axis.set_ticks([], minor=True)
             axes.set_xlim(0.8 * np.min(list(without.values())), 1.2 * most)
             axes.set_ylim(0.8 * np.min([t.peak for t in trials]), 1.2 * most)
             axes.set_xlabel("peak without reaction [N]")
