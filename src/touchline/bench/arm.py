@@ -8,7 +8,7 @@ from touchline.model.description import Noise
 from touchline.model.robot import Robot, load_robot
 
 FILES = Path(__file__).parent / "arms"
-ARMS = ("panda", "sara", "sara-full", "ur10")
+ARMS = ("panda", "panda-torques", "sara", "sara-full", "ur10")
 
 
 @dataclass(frozen=True)

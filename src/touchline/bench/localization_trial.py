@@ -277,7 +277,7 @@ def _event_distances(events: list[Event], robot: Robot, scene: Scene) -> Array:
         row = min(int(np.searchsorted(signals.time, time)), len(signals.time) - 1)
         places = true_places(robot, scene, signals.q[row])
         columns.append(distances(places, [event.position])[:, 0])
-    return np.array(columns).reshape(len(events), -1).T.reshape(len(scene.touches), len(events))
+    return np.array(columns).reshape(len(events), len(scene.touches)).T
 
 
 def _of_answer(answer: Answer, touch: Touch, place: Array) -> dict:

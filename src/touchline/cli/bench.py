@@ -36,7 +36,7 @@ def observer(
 
 def localization(
     *,
-    robots: tuple[Literal["panda", "sara", "sara-full", "ur10"], ...] = ("panda",),
+    robots: tuple[Literal["panda", "panda-torques", "sara", "sara-full", "ur10"], ...] = ("panda",),
     contacts: tuple[Literal[1, 2, 3], ...] = (1, 2, 3),
     noise: tuple[Literal[0, 1, 2, 3], ...] = (0, 1, 2, 3),
     begin: tuple[Literal["apart", "together"], ...] = ("apart", "together"),
@@ -55,7 +55,7 @@ def localization(
     Example: touchline bench localization --robots panda sara --runs 10000 --out figures
 
     Args:
-        robots: The arms; panda and ur10 need the package example-robot-data.
+        robots: The arms; the pandas and ur10 need the package example-robot-data.
         contacts: How many contacts at once, at most one per rigid body.
         noise: Tiers of sensor noise, 0 is none.
         begin: Several contacts begin 0.1 s apart, or at the same instant.
