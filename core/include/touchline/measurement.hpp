@@ -74,6 +74,16 @@ class Measurement {
 
   bool has_wrench() const { return has_wrench_; }
   const double* wrench() const { return wrench_; }
+  // What a contact's growth shows in: its force, or without a wrench the size of all torques.
+  Vec3 load() const {
+    if (has_wrench_) return {wrench_[0], wrench_[1], wrench_[2]};
+    double square = 0.0;
+    for (int i = 0; i < count_; ++i) square += own_[i] * own_[i];
+    return {std::sqrt(square), 0.0, 0.0};
+  }
+  // How old the rows are, if a filtered force is `lag` [s] old: torques are projected at each
+  // instant, on axes that move with the contact's link.
+  double lag(double of_force) const { return has_wrench_ ? of_force : 0.0; }
   // Rows in use: six of a wrench and the others.
   int size() const { return size_; }
   int scalars() const { return count_; }

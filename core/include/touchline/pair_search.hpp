@@ -51,11 +51,14 @@ class PairSearch {
   const PairStarts& starts() const { return starts_; }
 
   // Independent equations for a contact on each of two bodies: the rows of the wrench, and those
-  // that feel only one of the two.
+  // that feel only one of the two; without a wrench those that feel either.
   int rank(int node_a, int node_b) const {
-    int count = measurement_->has_wrench() ? 6 : 0;
-    for (int i = count; i < rows_; ++i)
-      count += measurement_->feels(i, node_a) != measurement_->feels(i, node_b);
+    const bool wrench = measurement_->has_wrench();
+    int count = wrench ? 6 : 0;
+    for (int i = count; i < rows_; ++i) {
+      const bool a = measurement_->feels(i, node_a), b = measurement_->feels(i, node_b);
+      count += wrench ? a != b : a || b;
+    }
     return count;
   }
 

@@ -44,14 +44,13 @@ class Tracks {
       report(s.contacts.count > 0 ? s.contacts.known[0].serial : s.first, single_.clear());
       return;
     }
-    if (!measurement_.has_wrench() || settings_.first_entry) {
+    if (settings_.first_entry) {
       report(s.first, single_.locate(g, 0.0, measurement_));
       return;
     }
-    total_ = force();
-    const double age = s.age.follow(total_, bandwidth, time);
-    lag_ = age / bandwidth;
-    pasts_[g].follow(total_, bandwidth, time, measurement_.posture());
+    lag_ = measurement_.lag(s.age.follow(measurement_.load(), bandwidth, time) / bandwidth);
+    if (measurement_.has_wrench())
+      pasts_[g].follow(measurement_.load(), bandwidth, time, measurement_.posture());
     if (!s.arriving || s.contacts.count > 1) age_all(s.contacts);
     if (s.arriving) {
       arrive(s, read);
@@ -78,15 +77,10 @@ class Tracks {
   double young() const { return SegmentContacts::kYoung / bandwidth_; }
   double brief() const { return 1.0 / bandwidth_; }
 
-  Vec3 force() const {
-    const double* w = measurement_.wrench();
-    return {w[0], w[1], w[2]};
-  }
-
   void age_all(JointEstimate& contacts) const {
     for (int c = 0; c < contacts.count; ++c) {
       KnownContact& k = contacts.known[c];
-      k.lag = k.age.follow(k.force, bandwidth_, time_) / bandwidth_;
+      k.lag = measurement_.lag(k.age.follow(k.force, bandwidth_, time_) / bandwidth_);
     }
   }
 
@@ -156,7 +150,7 @@ class Tracks {
     KnownContact k;
     k.serial = serial;
     keep(a, single_.surfaces(), k);
-    k.lag = brief();
+    k.lag = measurement_.lag(brief());
     k.age = age;
     contacts.add(k, settings_.force_scale);
   }
@@ -292,7 +286,8 @@ class Tracks {
   Answer& remainder(SegmentContacts& s, Read&& read) {
     const JointEstimate& known = s.before.contacts;
     fit_.take_out(known, Change::none(), measurement_);
-    const double lag = s.new_age.follow(force(), bandwidth_, time_) / bandwidth_;
+    const double lag =
+        measurement_.lag(s.new_age.follow(measurement_.load(), bandwidth_, time_) / bandwidth_);
     answer_ = single_.locate(g_, lag, measurement_);
     freed_ = false;
     if (placed(answer_) || answer_.status == Status::wrench_only) return answer_;
@@ -369,7 +364,6 @@ class Tracks {
   Twins twins_;
   int g_ = 0;
   double bandwidth_ = 0.0, time_ = 0.0, lag_ = 0.0;
-  Vec3 total_;
 };
 
 }  // namespace touchline
