@@ -20,7 +20,7 @@ struct Answer {
   double pitch = 0.0;         // in standard deviations
   double chi2 = 0.0;
   int degrees = 0;  // of freedom of chi2
-  // Of several contacts that cannot be told apart: equations at hand, and unknowns.
+  // Where they do not suffice, for one contact or to tell two apart: equations, and unknowns.
   int rank = 0, unknowns = 0;
 };
 

@@ -60,6 +60,7 @@ struct KnownContact {
   // What was said when it was found: its other explanations keep their places on their links.
   Status status = Status::located;
   double body_probability = 1.0;
+  int rank = 0, unknowns = 0;
   int count = 0;
   struct Other {
     int surface, node;
@@ -78,6 +79,8 @@ inline void keep(const Answer& answer, const LinkSurfaces& surfaces, KnownContac
   known.force = best.fit.force;
   known.status = answer.status;
   known.body_probability = answer.body_probability;
+  known.rank = answer.rank;
+  known.unknowns = answer.unknowns;
   known.count = answer.count;
   for (int i = 0; i < answer.count; ++i) {
     const Candidate& k = answer.candidates[i];
@@ -106,6 +109,8 @@ inline void report(const KnownContact& known, const LinkSurfaces& surfaces, Answ
   answer.status = known.status;
   answer.body_probability = known.body_probability;
   answer.force = known.force;
+  answer.rank = known.rank;
+  answer.unknowns = known.unknowns;
   answer.count = std::max(known.count, 1);
   for (int i = 0; i < known.count; ++i) {
     const KnownContact::Other& other = known.others[i];

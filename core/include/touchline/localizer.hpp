@@ -111,6 +111,7 @@ class Localizer {
     int serial = -1;
     EventPlace event;
     std::vector<double> q;
+    bool undetermined = false;  // were there fewer equations than unknowns?
   };
 
   // Those that ended with the last sample; those that last or were the last on segment g.
@@ -133,7 +134,7 @@ class Localizer {
         here += b.share;
     }
     const bool sharp = event.variance() < settings_.spread_limit() * settings_.spread_limit();
-    return here >= settings_.certain && sharp ? Status::located : Status::ambiguous;
+    return here >= settings_.certain && sharp && !m.undetermined ? Status::located : Status::ambiguous;
   }
 
  private:
@@ -172,6 +173,7 @@ class Localizer {
     const bool explained =
         answer.status == Status::located || answer.status == Status::ambiguous;
     if (!m.event.open(static_cast<int>(answer.status), explained)) return;
+    m.undetermined = answer.unknowns > 0;
     for (int i = 0; i < answer.count; ++i) {
       const Candidate& k = answer.candidates[i];
       m.event.add(k.surface, single_.surfaces().to_node(k.point, surfaces()[k.surface].node),

@@ -126,6 +126,13 @@ class Measurement {
     return i < first || rows_.feels(*used_[i - first], node);
   }
 
+  // Independent equations for one contact on the body of `node`: a wrench, or the rows that feel it.
+  int equations(int node) const {
+    int count = has_wrench_ ? 6 : 0;
+    for (int i = count; i < size_; ++i) count += feels(i, node);
+    return count;
+  }
+
   // The lower triangle of the covariance of all rows.
   void covariance(double* out) const { std::copy_n(covariance_.data(), size_ * size_, out); }
 

@@ -40,7 +40,7 @@ class SingleContact {
   // Nothing is known.
   const Answer& clear() {
     answer_.status = Status::none;
-    answer_.count = 0;
+    answer_.count = answer_.rank = answer_.unknowns = 0;
     answer_.force = {kNaN, kNaN, kNaN};
     return answer_;
   }
@@ -52,6 +52,7 @@ class SingleContact {
 
  private:
   static constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  static constexpr int kUnknowns = 5;  // of one contact: two of its place, three of its force
   static constexpr double kNegligible = 10.0;  // of the log posterior, below the best
   // Of the way that a contact has come: unknown.
   static constexpr double kDoubt = 0.1, kRemembered = 0.02;
@@ -143,7 +144,13 @@ class SingleContact {
       answer_.status = unexplained(g, measurement);
     } else {
       answer_.force = best.fit.force;
-      answer_.status = certain() ? Status::located : Status::ambiguous;
+      const int equations = measurement.equations(node_of(best));
+      if (equations < kUnknowns) {
+        answer_.rank = equations;
+        answer_.unknowns = kUnknowns;
+      }
+      const bool sure = equations >= kUnknowns && certain();
+      answer_.status = sure ? Status::located : Status::ambiguous;
     }
   }
 

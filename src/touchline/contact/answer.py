@@ -103,12 +103,12 @@ class Answer:
 
     @property
     def rank(self) -> int | None:
-        """Independent equations for contacts that cannot be told apart, of the `unknowns`."""
+        """Independent equations, of the `unknowns`, where they do not suffice."""
         return int(self._row[RANK]) or None
 
     @property
     def unknowns(self) -> int | None:
-        """Of contacts that cannot be told apart: two for each place, three for each force."""
+        """Two for each place, three for each force, where the equations do not suffice."""
         return int(self._row[UNKNOWNS]) or None
 
     @property

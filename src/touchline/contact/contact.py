@@ -47,8 +47,9 @@ class Contact:
         zone: "structure", "end_effector" or "handle"; None while that is open.
         clamped: whether forces on two sides oppose each other; None where that is not known.
         rate: at which the force grows [N/s].
-        rank: of two contacts that cannot be told apart: the independent equations at hand, of the
-            `unknowns` (two for each place, three for each force).
+        rank: where the independent equations at hand do not suffice, for one contact (joint torques
+            alone) or to tell two apart: how many there are, of the `unknowns` (two for each place,
+            three for each force).
     """
 
     segment: str

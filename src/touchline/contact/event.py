@@ -34,7 +34,7 @@ class Event:
         time_of_position: the last strong sample [s].
         position_std: root of the trace of its covariance [m].
         candidates: all explanations, best first, at `time_of_position`.
-        rank: of contacts that cannot be told apart: independent equations, of the `unknowns`.
+        rank: where equations do not suffice: independent ones at hand, of the `unknowns`.
         decided: when the level was decided [s]; None while it is a default.
         zone: "structure", "end_effector" or "handle"; None while that is open.
         clamped: whether forces on two sides opposed each other; None where that is not known.

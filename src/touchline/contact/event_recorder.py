@@ -38,7 +38,7 @@ class _Gathered:
         self.force = 0.0  # the largest norm, and the wrench and the joint positions then
         self.wrench, self.q = np.zeros(6), np.zeros(joints)
         self.torque = np.zeros(joints)  # the largest of each joint
-        self.inseparable: Array | None = None  # the last answer that names a rank
+        self.undetermined: Array | None = None  # the last answer that names a rank
         self._sum = np.zeros(rows)
         self._count = 0
 
@@ -142,10 +142,12 @@ class EventRecorder:
     def _place(self, event: Event, gathered: _Gathered, answer: EventAnswer) -> None:
         for name, value in vars(answer).items():
             setattr(event, name, value)
-        if event.status == "not_separable" and gathered.inseparable is not None:
-            last = self._localizer.answer(gathered.inseparable)
-            event.rank, event.unknowns = last.rank, last.unknowns
-            event.candidates = last.candidates
+        if gathered.undetermined is not None:
+            last = self._localizer.answer(gathered.undetermined)
+            if event.status == last.status:
+                event.rank, event.unknowns = last.rank, last.unknowns
+            if event.status == last.status == "not_separable":
+                event.candidates = last.candidates
         event.zone = self._zones.of(event.segment, event.link)
         if not event.clamped:
             event.clamped = None if event.status == "not_separable" else False
@@ -174,7 +176,7 @@ class EventRecorder:
         gathered.add_rows(strength, np.hstack([normalized, np.nan_to_num(wrenches[:, :3])]))
         apart = np.flatnonzero(part[:, ANSWER + UNKNOWNS] > 0)
         if len(apart):
-            gathered.inseparable = part[apart[-1], ANSWER:].copy()
+            gathered.undetermined = part[apart[-1], ANSWER:].copy()
 
     def _name_joint(self, event: Event, gathered: _Gathered) -> None:
         mean, names = gathered.mean, self._robot.joint_names
