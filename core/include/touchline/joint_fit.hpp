@@ -46,10 +46,10 @@ class JointFit {
       : posture_(posture), surfaces_(surfaces), rows_(rows * (kSize + 1)), loose_(rows * kSize) {}
 
   // Where a contact was at the time that its force speaks of [world].
-  Vec3 earlier(const KnownContact& k) const {
+  Vec3 earlier(const KnownContact& k, const Measurement& measurement) const {
     const Vec3 p = surfaces_.to_world(k.point, k.node);
     const Spatial& v = posture_.twist(k.node);
-    return p - k.lag * (v.linear + cross(v.angular, p));
+    return p - measurement.lag(k.lag) * (v.linear + cross(v.angular, p));
   }
 
   // Widens the noise of the rows by what is not known of how the contacts moved in the meantime.
@@ -57,7 +57,7 @@ class JointFit {
     double moment = 0.0;
     for (int c = 0; c < estimate.count; ++c) {
       const KnownContact& k = estimate.known[c];
-      const Vec3 way = surfaces_.to_world(k.point, k.node) - earlier(k);
+      const Vec3 way = surfaces_.to_world(k.point, k.node) - earlier(k, measurement);
       moment += kUncertainWay * norm(way) * norm(k.force);
     }
     if (moment > 1e-6) measurement.loosen_moments(moment);
@@ -170,7 +170,7 @@ class JointFit {
       columns(measurement, estimate.known[c], rows_.data() + kEach * c, n);
     for (int c = 0; c < estimate.count; ++c) {
       const KnownContact& k = estimate.known[c];
-      measurement.take_out(k.node, wrench(k), k.lag);
+      measurement.take_out(k.node, wrench(k, measurement), k.lag);
     }
     std::copy(estimate.covariance, estimate.covariance + n * n, factor_);
     for (int i = 0; i < n; ++i) factor_[i * (n + 1)] += change.added[i];
@@ -189,14 +189,14 @@ class JointFit {
   static constexpr int kSize = JointEstimate::kSize;
   static constexpr double kUncertainWay = 0.1;  // of the way that a contact has come
 
-  Spatial wrench(const KnownContact& k) const {
-    const Vec3 p = earlier(k);
+  Spatial wrench(const KnownContact& k, const Measurement& m) const {
+    const Vec3 p = earlier(k, m);
     return {k.force, cross(p, k.force)};
   }
 
   // What force and shift of a contact do to the rows, in columns of a matrix of that width.
   void columns(const Measurement& m, const KnownContact& k, double* out, int width) const {
-    const Vec3 p = earlier(k);
+    const Vec3 p = earlier(k, m);
     const Vec3 unit[3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
     for (int i = 0; i < 3; ++i) m.load(k.node, {unit[i], cross(p, unit[i])}, k.lag, out + i, width);
     Vec3 s[2];

@@ -81,8 +81,8 @@ class Measurement {
     for (int i = 0; i < count_; ++i) square += own_[i] * own_[i];
     return {std::sqrt(square), 0.0, 0.0};
   }
-  // How old the rows are, if a filtered force is `lag` [s] old: torques are projected at each
-  // instant, on axes that move with the contact's link.
+  // How old the rows are, if a filtered force is so old [s]: without a wrench, torques are taken as
+  // those of the axes and places of now.
   double lag(double of_force) const { return has_wrench_ ? of_force : 0.0; }
   // Rows in use: six of a wrench and the others.
   int size() const { return size_; }
@@ -117,7 +117,7 @@ class Measurement {
     store(w, values);
     for (int i = 0; i < first; ++i) out[i * stride] = values[i];
     for (int i = 0; i < count_; ++i)
-      out[(first + i) * stride] = rows_.load(*used_[i], node, w, lag, loaded);
+      out[(first + i) * stride] = rows_.load(*used_[i], node, w, this->lag(lag), loaded);
   }
 
   // Does row i feel contacts on the body of `node`?
@@ -150,7 +150,7 @@ class Measurement {
     for (int i = 0; i < count_; ++i) {
       const SegmentRow& r = *used_[i];
       bool loaded;
-      own_[i] -= rows_.load(r, node, w, lag, loaded);
+      own_[i] -= rows_.load(r, node, w, this->lag(lag), loaded);
       // A joint outboard of the contact: what the wrench says of it has not reached it.
       if (!loaded && r.joint >= 0) outboard_[i] += rows_.carried(r, w, lag);
     }

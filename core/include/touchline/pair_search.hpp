@@ -34,7 +34,7 @@ class PairSearch {
   // solutions are those that explain, the most probable first.
   void search(int g, double lag, const Measurement& measurement) {
     g_ = g;
-    lag_ = lag;
+    lag_ = measurement.lag(lag);
     measurement_ = &measurement;
     rows_ = measurement.size();
     count_ = 0;

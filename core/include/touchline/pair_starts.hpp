@@ -47,7 +47,7 @@ class PairStarts {
   // `lag` [s] old.
   void find(int g, double lag, const Measurement& measurement) {
     g_ = g;
-    lag_ = lag;
+    lag_ = measurement.lag(lag);
     measurement_ = &measurement;
     rows_ = measurement.size();
     count_ = tried_ = 0;

@@ -48,7 +48,7 @@ class Tracks {
       report(s.first, single_.locate(g, 0.0, measurement_));
       return;
     }
-    lag_ = measurement_.lag(s.age.follow(measurement_.load(), bandwidth, time) / bandwidth);
+    lag_ = s.age.follow(measurement_.load(), bandwidth, time) / bandwidth;
     if (measurement_.has_wrench())
       pasts_[g].follow(measurement_.load(), bandwidth, time, measurement_.posture());
     if (!s.arriving || s.contacts.count > 1) age_all(s.contacts);
@@ -80,7 +80,7 @@ class Tracks {
   void age_all(JointEstimate& contacts) const {
     for (int c = 0; c < contacts.count; ++c) {
       KnownContact& k = contacts.known[c];
-      k.lag = measurement_.lag(k.age.follow(k.force, bandwidth_, time_) / bandwidth_);
+      k.lag = k.age.follow(k.force, bandwidth_, time_) / bandwidth_;
     }
   }
 
@@ -150,7 +150,7 @@ class Tracks {
     KnownContact k;
     k.serial = serial;
     keep(a, single_.surfaces(), k);
-    k.lag = measurement_.lag(brief());
+    k.lag = brief();
     k.age = age;
     contacts.add(k, settings_.force_scale);
   }
@@ -286,8 +286,7 @@ class Tracks {
   Answer& remainder(SegmentContacts& s, Read&& read) {
     const JointEstimate& known = s.before.contacts;
     fit_.take_out(known, Change::none(), measurement_);
-    const double lag =
-        measurement_.lag(s.new_age.follow(measurement_.load(), bandwidth_, time_) / bandwidth_);
+    const double lag = s.new_age.follow(measurement_.load(), bandwidth_, time_) / bandwidth_;
     answer_ = single_.locate(g_, lag, measurement_);
     freed_ = false;
     if (placed(answer_) || answer_.status == Status::wrench_only) return answer_;
