@@ -74,6 +74,9 @@ class Measurement {
 
   bool has_wrench() const { return has_wrench_; }
   const double* wrench() const { return wrench_; }
+  // Do changes tell of new contacts? With joint torques alone there is no pitch, and few equations
+  // or none are left over: what a model's errors leave looks like one more contact.
+  bool can_be_followed() const { return has_wrench_ || noise_.exact_torques(); }
   // What a contact's growth shows in: its force, or without a wrench the size of all torques.
   Vec3 load() const {
     if (has_wrench_) return {wrench_[0], wrench_[1], wrench_[2]};

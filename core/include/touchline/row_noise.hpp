@@ -26,6 +26,9 @@ class RowNoise {
         sources_(6 * sensors_ + 2 * joints_),
         coefficients_(rows * sources_) {}
 
+  // Are torques as good as their noise figures say?
+  bool exact_torques() const { return figures_.torque_error == 0.0; }
+
   void clear() { std::fill(coefficients_.begin(), coefficients_.end(), 0.0); }
 
   // Rows `at` to `at + 5`: the wrench of a segment [world], loaded by `load`.

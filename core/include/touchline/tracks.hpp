@@ -44,7 +44,7 @@ class Tracks {
       report(s.contacts.count > 0 ? s.contacts.known[0].serial : s.first, single_.clear());
       return;
     }
-    if (settings_.first_entry) {
+    if (!measurement_.can_be_followed() || settings_.first_entry) {
       report(s.first, single_.locate(g, 0.0, measurement_));
       return;
     }
