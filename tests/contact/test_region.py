@@ -5,10 +5,12 @@ import numpy as np
 import pytest
 from shapes import box, chain, measured, still
 
+import touchline as tl
 from touchline.bench.touches import TouchSampler, resting_signals
 from touchline.contact.localizer import Localizer
 from touchline.contact.skin import Skin
 from touchline.estimation.observer import Observer
+from touchline.simulation.scenario import three_touches
 
 PLACE, PUSH = np.array([0.03, -0.05, 0.1]), np.array([4.0, 3.0, -20.0])
 
@@ -73,3 +75,18 @@ def test_nine_in_ten_true_places_are_in_the_region_of_ninety_percent(layout):
     inside = np.mean(np.array(levels) <= 0.9)
     assert 0.85 <= inside <= 0.95  # 90 % of 200: one sigma is 2.1 %
     assert 0.38 <= np.mean(np.array(levels) <= 0.5) <= 0.62
+
+
+def test_a_region_is_that_of_one_contact_or_an_error():
+    robot = tl.load_robot("sara")
+    s = three_touches(robot, speed=0.0, seconds=0.5).samples
+    pipeline, several = tl.Pipeline(robot), 0
+    with pytest.raises(ValueError, match="single contact"):
+        pipeline.localizer.region()
+    for sample in zip(s.time, s.q, s.qd, s.tau, s.wrench, strict=True):
+        contacts = pipeline.update(*sample).contacts
+        if len(contacts) > 1 and several < 5:
+            several += 1
+            with pytest.raises(ValueError, match="single contact"):
+                pipeline.localizer.region()
+    assert several == 5

@@ -37,8 +37,15 @@ class Localizer {
   Localizer& operator=(const Localizer&) = delete;
 
   const std::vector<LinkSurface>& surfaces() const { return single_.surfaces().all(); }
-  // The posterior of the place that was located last, cell by cell.
-  std::vector<SurfaceCell> region() const { return single_.region(); }
+  // The posterior of the place of the only contact of the last sample, cell by cell; throws where
+  // there are several or none, or where that one's place is not this sample's.
+  std::vector<SurfaceCell> region() const {
+    const Answer& own = single_.answer();
+    if (said_ != 1 || !placed(*last_) || !placed(own) ||
+        norm(last_->candidates[0].point - own.candidates[0].point) > 0.0)
+      throw std::invalid_argument("the last sample does not speak of the place of a single contact");
+    return single_.region();
+  }
   const Measurement& measurement() const { return measurement_; }
 
   // Sizes of what the methods below take.
@@ -60,6 +67,7 @@ class Localizer {
   // averaged; `qd` and `quiet` may be null.
   void set_state(const double* q, const double* qd, const double* quiet) {
     measurement_.set_state(q, qd, quiet);
+    said_ = 0;
   }
 
   // Covariance (6, 6) of a segment's wrench; false where it has none.
@@ -76,6 +84,8 @@ class Localizer {
   }
 
   const Answer& locate(int g, const double* row, const double* normalized, double lag) {
+    said_ = 1;
+    last_ = &single_.answer();
     if (!measurement_.read(g, row, normalized)) return single_.clear();
     return single_.locate(g, lag, measurement_);
   }
@@ -99,6 +109,8 @@ class Localizer {
                    [&] { return measurement_.read(g, row, normalized); });
     const Reports& reports = tracks_.reports();
     for (int i = 0; i < reports.ended(); ++i) end(g, reports.ended(i));
+    said_ += reports.count();
+    if (reports.count() > 0) last_ = &reports[0].answer;
     const double strength = measurement_.strength(g, normalized);
     for (int i = 0; i < reports.count(); ++i)
       remember(g, reports[i], reports.share(i) * strength, time, q);
@@ -203,6 +215,8 @@ class Localizer {
   std::vector<SegmentContacts> states_;              // per segment
   std::vector<std::vector<Memory>> memories_;  // per segment: of events
   std::vector<Memory*> ended_;
+  int said_ = 0;  // contacts of which something was said in the last sample, and of one of them what
+  const Answer* last_ = nullptr;
 };
 
 }  // namespace touchline

@@ -5,6 +5,7 @@ Everything random follows from the seed, the cell and the number of the run, so 
 does not depend on how runs are spread over processes.
 """
 
+from contextlib import suppress
 from dataclasses import astuple, dataclass
 from functools import lru_cache
 from typing import Any
@@ -259,8 +260,9 @@ def _judge(pipeline: Pipeline, scene: Scene) -> list[Touched]:
         if (k := mine[i]) is not None:
             about |= _of_answer(answers[k], touch, places[i])
             if len(answers) == 1:
-                region = pipeline.localizer.region()
-                about["level"] = region.level(touch.patch.link, places[i])
+                with suppress(ValueError):  # else as of a known contact, from its covariance
+                    region = pipeline.localizer.region()
+                    about["level"] = region.level(touch.patch.link, places[i])
         about |= _of_candidates(answers, touch, places[i])
         here = touch.patch
         T = robot.poses(touch.q)[here.node] @ here.T_node_link

@@ -151,10 +151,14 @@ class Localizer:
         )
 
     def region(self) -> Region:
-        """The posterior over links and surfaces of the contact that was located last.
+        """The posterior over links and surfaces of the only contact of the last sample.
 
-        Of the last call of `locate`, or of the last sample of `Pipeline.update` or `run`. Takes
-        milliseconds: worked out when asked for.
+        Of the last call of `locate`, or of the last sample of `Pipeline.update` or `run` in which
+        something touched. Takes milliseconds: worked out when asked for.
+
+        Raises:
+            ValueError: there are several contacts, or none whose place follows from that sample
+                alone; a `Contact` has `candidates` and `covariance` in any case.
         """
         cells = self.core.region()
         return Region(
