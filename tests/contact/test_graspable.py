@@ -5,8 +5,11 @@ import numpy as np
 import pytest
 from shapes import box, chain, measured, still
 
+from touchline.bench.touches import Touch, resting_signals
 from touchline.contact.contact import Contact
 from touchline.contact.localizer import Localizer
+from touchline.contact.pipeline import Pipeline
+from touchline.contact.skin import Skin
 
 CUBE = box(0.2, 0.2, 0.2)
 PLACE, PULL = np.array([0.03, -0.05, 0.1]), np.array([4.0, 3.0, 20.0])
@@ -49,6 +52,25 @@ def test_a_push_on_what_can_be_grasped_is_located_beside_its_exit():
     answer = locate(still(CUBE, ("body",)), [], [("body", PLACE, -PULL)])
     assert answer.status == "ambiguous"  # as a push on top or a pull from below
     assert {round(float(c.position[2]), 6) for c in answer.candidates} == {0.1, -0.1}
+
+
+def test_the_pipeline_tells_the_moment_of_a_twist():
+    """2 Nm about z and a pull of 15 N along it, on what can be grasped, in the flow of samples."""
+    robot = chain(sensors=(("base", "link0"), ("tool", "link3")), graspable=("link3",))
+    patch = next(patch for patch in Skin(robot).patches if patch.link == "link3")
+    point = robot.poses(Q)[patch.node][:3, 3]
+    loads = [("link3", point, np.array([0.0, 0.0, 15.0])), *twist("link3", point, 2.0)]
+    touches = [(Touch(Q, patch, at, np.zeros(3), force), 0.3) for _, at, force in loads]
+    signals = resting_signals(robot, Q, touches, 0.45, None)
+    pipeline = Pipeline(robot)
+    for sample in zip(*vars(signals).values(), strict=True):
+        result = pipeline.update(*sample)
+    (contact,) = result.contacts
+    assert (contact.segment, contact.status, contact.position) == ("tool", "wrench_only", None)
+    assert contact.line is not None
+    np.testing.assert_allclose(contact.line[0], [*point[:2], 0.0], atol=1e-4)
+    assert contact.moment == pytest.approx(2.0, abs=1e-4)
+    assert contact.size == pytest.approx(15.0, abs=1e-4)
 
 
 def test_a_contact_tells_the_line_and_the_moment_of_its_wrench():

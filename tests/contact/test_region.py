@@ -52,6 +52,7 @@ LAYOUTS = {
     "base sensor and joint torques": ((("base", "link0"),), "sensor"),
     "base sensor": ((("base", "link0"),), "none"),
     "sensor in the chain": ((("base", "link0"), ("middle", "link2")), "sensor"),
+    "joint torques": ((), "sensor"),
 }
 
 

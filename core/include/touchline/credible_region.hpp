@@ -11,6 +11,7 @@
 
 #include "touchline/approach.hpp"
 #include "touchline/explanations.hpp"
+#include "touchline/force_evidence.hpp"
 
 namespace touchline {
 
@@ -116,10 +117,10 @@ class CredibleRegion {
       }
       const double area = 0.5 * norm(cross(p.b - p.a, p.c - p.a));
       const bool grasped = found_.surfaces()[surface].graspable;
-      const Fit fit = found_.fitter().fit(view.q, view.earlier(centre), normal, grasped);
-      const double volume = found_.fitter().log_volume(view.q, view.earlier(centre));
-      const double prior = found_.fitter().log_prior(fit, grasped);
-      const double log_density = -0.5 * fit.cost() + volume + prior - view.width;
+      const Vec3 place = view.earlier(centre);
+      const Fit fit = found_.fitter().fit(view.q, place, normal, grasped);
+      const double log_density =
+          ForceEvidence(found_.fitter()).at(view.q, place, normal, grasped, fit) - view.width;
       if (std::isfinite(log_density)) {
         cells_.push_back({surface, centre, normal, area, log_density});
         forces_.push_back(fit.force);

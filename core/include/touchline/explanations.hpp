@@ -97,9 +97,11 @@ class Explanations {
   }
 
  private:
-  static constexpr int kMost = 192, kStarts = 2, kPassed = 4;
+  static constexpr int kMost = 192, kStarts = 3, kPassed = 4;
   static constexpr double kRelevant = 25.0;  // of chi2: where a search is worth while
-  static constexpr double kRough = 400.0;    // of chi2: where a start may lead to something
+  static constexpr double kRough = 150.0;    // of chi2: where a start may lead to something
+  static constexpr double kFew = 1e4;        // and as long as there are only few of them
+  static constexpr double kSpread = 0.04;    // of starts on one surface [m]
   static constexpr double kFar = 0.15;       // from the line: not what it speaks of [m]
   static constexpr double kGrazing = 4.0;  // cost of the cone beyond which a point is moved
   static constexpr double kCoarse = 6e-3;  // joint torques alone tell no place better [m]
@@ -262,14 +264,16 @@ class Explanations {
       int found = 0;
       for (const SurfaceSample& sample : surfaces_.samples(s)) {
         if (count_ == kMost) return;
+        const double limit =
+            std::max(best_ + kRough, found < kStarts ? kFew : worst(starts, found)->fit.cost());
         place(view, s, surfaces_.to_world(sample.point, view.node),
-              surfaces_.turn_to_world(sample.normal, view.node), best_ + kRough);
-        if (candidates_[count_].fit.cost() < best_ + kRough)
-          found = insert(starts, kStarts, found, candidates_[count_], 0.04);
+              surfaces_.turn_to_world(sample.normal, view.node), limit);
+        found = insert(starts, kStarts, found, candidates_[count_], kSpread);
       }
       for (int i = 0; i < found && count_ < kMost; ++i) {
-        candidates_[count_] = starts[i];
-        refinement_.improve(view, candidates_[count_], kCoarse);
+        Candidate& k = candidates_[count_] = starts[i];
+        if (!refinement_.descend(view, k) && k.fit.cost() < best_ + kRough)
+          refinement_.settle(view, k, kCoarse, 0.8 * kSpread);
         if (!known(0, kSame)) keep();
       }
     }
@@ -287,11 +291,15 @@ class Explanations {
       starts[found] = k;
       return found + 1;
     }
-    auto worst = std::max_element(starts, starts + found, [](const Candidate& a, const Candidate& b) {
+    Candidate* last = worst(starts, found);
+    if (k.fit.cost() < last->fit.cost()) *last = k;
+    return found;
+  }
+
+  static Candidate* worst(Candidate* starts, int count) {
+    return std::max_element(starts, starts + count, [](const Candidate& a, const Candidate& b) {
       return a.fit.cost() < b.fit.cost();
     });
-    if (k.fit.cost() < worst->fit.cost()) *worst = k;
-    return found;
   }
 
   const Posture& posture_;

@@ -80,6 +80,12 @@ class ForceFitter {
     return q(w);
   }
 
+  // What is measured of the force at `point`, and assumed of its size:
+  // chi2(f) = constant - 2 g . f + f^T A f.
+  void force_terms(const Quadratic& q, const Vec3& point, double* A, double* g) const {
+    reduce(q, point, A, g);
+  }
+
   // Logarithm of the volume of forces at `point` that explain as well as the best.
   double log_volume(const Quadratic& q, const Vec3& point) const {
     double A[9], g[3];

@@ -132,7 +132,8 @@ class Mesh {
           return norm(d);
         },
         [&](const Triangle& tri, SurfacePoint& best) {
-          offer(tri, nearest_on(tri, p), p, best);
+          if (std::fabs(dot(tri.normal, p - tri.a)) < best.distance)
+            offer(tri, nearest_on(tri, p), p, best);
         });
   }
 

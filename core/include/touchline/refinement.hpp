@@ -23,9 +23,6 @@ class Refinement {
     if (!descend(view, k)) settle(view, k, finest, around);
   }
 
- private:
-  static constexpr double kArrived = 2e-4;  // length of a step [m]
-
   // Goes downhill by Gauss-Newton steps; returns whether that was all there was to do.
   bool descend(const View& view, Candidate& k) const {
     bool arrived = false;
@@ -47,21 +44,25 @@ class Refinement {
 
   // Where the friction cone or an edge stands in the way: smaller and smaller trials around, down
   // to `finest` [m].
-  void settle(const View& view, Candidate& k, double finest, double around) const {
+  void settle(const View& view, Candidate& k, double finest, double around = 0.064) const {
     for (double radius = 0.5 * around; radius > finest; radius *= 0.5) {
       for (int round = 0; round < 3 && better_around(view, k, radius); ++round) {
       }
     }
   }
 
+ private:
+  static constexpr double kArrived = 2e-4;  // length of a step [m]
+
   bool better_around(const View& view, Candidate& k, double radius) const {
     Vec3 s, t;
     tangents(k.normal, s, t);
     const Vec3 centre = k.point;
     bool better = false;
-    for (int i = 0; i < 6; ++i) {
-      const double a = 1.0471975511965976 * i;
-      better |= try_point(view, k, centre + radius * (std::cos(a) * s + std::sin(a) * t));
+    constexpr double kHalf = 0.5, kSine = 0.8660254037844386;  // of 60 degrees
+    for (const double side : {1.0, -1.0}) {
+      for (const Vec3& way : {s, kHalf * s + kSine * t, kHalf * s - kSine * t})
+        better |= try_point(view, k, centre + (side * radius) * way);
     }
     return better;
   }

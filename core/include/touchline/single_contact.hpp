@@ -12,6 +12,7 @@
 #include "touchline/approach.hpp"
 #include "touchline/credible_region.hpp"
 #include "touchline/explanations.hpp"
+#include "touchline/force_evidence.hpp"
 
 namespace touchline {
 
@@ -96,8 +97,10 @@ class SingleContact {
       const View& view = found_.view(k);
       found_.fitter().information(view.q, view.earlier(k.point), k.normal, k.fit.force, H, g);
       if (!cholesky(H, 5)) continue;
-      k.weight = -0.5 * (k.fit.cost() + log_determinant(H, 5)) + 
-                 found_.fitter().log_prior(k.fit, graspable(k)) - view.width;
+      const double around = -std::log(H[18] * H[24]);  // of the places that explain as well
+      k.weight = around - view.width +
+                 ForceEvidence(found_.fitter())
+                     .at(view.q, view.earlier(k.point), k.normal, graspable(k), k.fit);
       most = std::max(most, k.weight);
       covariance_along(H, k.along);
     }
