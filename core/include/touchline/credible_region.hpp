@@ -42,6 +42,7 @@ class CredibleRegion {
   static constexpr double kGrowth = 0.4;   // of their edges beyond, per sigma
   static constexpr double kLength = 0.04;  // of an edge there [m]
   static constexpr double kReach = 9.0;    // sigmas beyond which there is nothing
+  static constexpr double kClose = 25.0;   // of chi2, above the best
   static constexpr double kNegligible = 15.0;  // of the log density, below the densest cell
   static constexpr std::size_t kMost = 20000;  // cells
 
@@ -64,7 +65,9 @@ class CredibleRegion {
   void divide(const View& view, int index) {
     metrics_.clear();
     for (const Candidate& k : found_) {
-      if (k.view != index || !(k.weight > 1e-9)) continue;
+      // Without a line a candidate is no measure of its surroundings: open forces add to them.
+      const bool counts = view.line ? k.weight > 1e-9 : k.fit.cost() < found_.best() + kClose;
+      if (k.view != index || !counts) continue;
       Metric m;
       if (!metric(view, k, m)) continue;
       metrics_.push_back(m);

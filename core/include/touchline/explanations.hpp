@@ -30,6 +30,8 @@ class Explanations {
     for (int g = 0; g < observer.row_layout().segments; ++g)
       most = std::max(most, surfaces_.bodies(g).size());
     views_.resize(most);
+    starts_.resize(observer.row_layout().segments);
+    for (std::vector<Start>& starts : starts_) starts.reserve(kMost);
     candidates_.resize(kMost);
   }
 
@@ -38,9 +40,13 @@ class Explanations {
 
   // Finds all that may explain segment g; `measurement` has read it. `mean(node)`: where a body was
   // when it felt what the wrench speaks of, and `doubt`: which part of the way since is not known.
+  // `again`: what was found by a search a moment ago serves once more.
   template <class MeanOf>
-  void find(int g, MeanOf&& mean, double doubt, Measurement& measurement) {
+  void find(int g, MeanOf&& mean, double doubt, Measurement& measurement, bool again) {
     count_ = used_ = 0;
+    found_ = &starts_[g];
+    again_ = again;
+    if (!again) found_->clear();
     best_ = std::numeric_limits<double>::infinity();
     for (const Body& body : surfaces_.bodies(g)) {
       View& view = views_[used_++];
@@ -133,7 +139,11 @@ class Explanations {
   // where it only grazes the body, better points are nearby.
   void beside(View& view) {
     const int found = count_, own = index(view);
-    const bool passed = view.floor < best_ + kSigmas * kSigmas && pass(view);
+    const bool near = view.floor < best_ + kSigmas * kSigmas;
+    const bool passed = near && (again_ ? revisit(view, kFine, kApart) : pass(view));
+    for (int i = 0; near && !again_ && i < found; ++i) {  // what is entered now may be missed next
+      if (candidates_[i].view == own) remember(view, candidates_[i]);
+    }
     if (!view.met && !passed) miss(view);
     if (view.steep) return;
     for (int i = 0; i < found && count_ < kMost; ++i) {
@@ -182,9 +192,33 @@ class Explanations {
     for (int i = 0; i < found && count_ < kMost; ++i) {
       place(view, starts[i].surface, starts[i].point, starts[i].normal);
       refinement_.improve(view, candidates_[count_], kFine, kApart);
+      remember(view, candidates_[count_]);
       if (!known(0, kSame)) keep();
     }
     return found > 0;
+  }
+
+  // Starts from where the last search has ended, within `around` [m]. Returns whether it has found
+  // anything on this body.
+  bool revisit(View& view, double finest, double around) {
+    bool any = false;
+    for (const Start& start : *found_) {
+      if (surfaces_[start.surface].node != view.node || count_ == kMost) continue;
+      any = true;
+      place(view, start.surface, surfaces_.to_world(start.point, view.node),
+            surfaces_.turn_to_world(start.normal, view.node));
+      if (view.line && entered(candidates_[count_])) continue;
+      if (!(candidates_[count_].fit.cost() < best_ + kRough)) continue;
+      refinement_.improve(view, candidates_[count_], finest, around);
+      if (!known(0, kSame)) keep();
+    }
+    return any;
+  }
+
+  void remember(const View& view, const Candidate& k) {
+    if (found_->size() < kMost && k.fit.cost() < best_ + kRelevant)
+      found_->push_back({k.surface, surfaces_.to_node(k.point, view.node),
+                         surfaces_.turn_to_node(k.normal, view.node)});
   }
 
   // Is there an entry of the line nearby that explains as well?
@@ -259,6 +293,10 @@ class Explanations {
 
   // Without a line: the best of the points spread over each link, each improved.
   void search(View& view) {
+    if (again_) {
+      revisit(view, kCoarse, 4.0 * kCoarse);
+      return;
+    }
     for (int s : *view.surfaces) {
       Candidate starts[kStarts];
       int found = 0;
@@ -274,6 +312,7 @@ class Explanations {
         Candidate& k = candidates_[count_] = starts[i];
         if (!refinement_.descend(view, k) && k.fit.cost() < best_ + kRough)
           refinement_.settle(view, k, kCoarse, 0.8 * kSpread);
+        remember(view, k);
         if (!known(0, kSame)) keep();
       }
     }
@@ -308,6 +347,14 @@ class Explanations {
   Refinement refinement_;
   std::vector<View> views_;
   std::vector<Candidate> candidates_;
+  // Where searches on each segment have ended, in the frames of the nodes.
+  struct Start {
+    int surface;
+    Vec3 point, normal;
+  };
+  std::vector<std::vector<Start>> starts_;
+  std::vector<Start>* found_ = nullptr;  // those of the segment at hand
+  bool again_ = false;
   int used_ = 0, count_ = 0;
   double best_ = 0.0;
 };

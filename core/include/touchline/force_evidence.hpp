@@ -21,7 +21,7 @@ class ForceEvidence {
   // Logarithm of the integral at `point`, but for a constant; `fit`: the best force there.
   double at(const Quadratic& q, const Vec3& point, const Vec3& normal, bool grasped,
             const Fit& fit) const {
-    double A[9], g[3], factor[9], inverse[9], axes[9], values[9];
+    double A[9], g[3], factor[9], inverse[9], C[9], axes[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     fitter_.force_terms(q, point, A, g);
     std::copy(A, A + 9, factor);
     if (!cholesky(factor, 3)) return -std::numeric_limits<double>::infinity();
@@ -32,16 +32,18 @@ class ForceEvidence {
     if (variance < wide * wide)
       return -0.5 * (fit.cost() + log_determinant(factor, 3)) + 1.5 * std::log(kTurn) +
              fitter_.log_prior(fit, grasped);
-    std::copy(A, A + 9, values);
-    diagonalize(values, axes, 3);
+    for (int i = 0; i < 9; ++i) {  // the covariance: (L L^T)^-1
+      C[i] = 0.0;
+      for (int k = 0; k < 3; ++k) C[i] += inverse[3 * k + i / 3] * inverse[3 * k + i % 3];
+    }
+    diagonalize(C, axes, 3);
     int open[3], count = 0;
-    double log_narrow = 0.0;  // logarithm of the volume in the other directions
+    // Logarithm of the volume in the other directions.
+    double log_narrow = 1.5 * std::log(kTurn) - 0.5 * log_determinant(factor, 3);
     for (int i = 0; i < 3; ++i) {
-      if (1.0 / std::sqrt(values[4 * i]) > wide) {
-        open[count++] = i;
-      } else {
-        log_narrow += 0.5 * std::log(kTurn / values[4 * i]);
-      }
+      if (!(C[4 * i] > wide * wide)) continue;
+      open[count++] = i;
+      log_narrow -= 0.5 * std::log(kTurn * C[4 * i]);
     }
     if (count == 0) return -0.5 * fit.cost() + fitter_.log_prior(fit, grasped) + log_narrow;
     if (count > 1) return over_directions(q, A, g, normal, grasped);
@@ -50,7 +52,7 @@ class ForceEvidence {
     const int k = open[0];
     const double least = q.constant - g[0] * f[0] - g[1] * f[1] - g[2] * f[2];
     return log_narrow - 0.5 * least +
-           along({f[0], f[1], f[2]}, {axes[k], axes[3 + k], axes[6 + k]}, values[4 * k], normal,
+           along({f[0], f[1], f[2]}, {axes[k], axes[3 + k], axes[6 + k]}, 1.0 / C[4 * k], normal,
                  grasped);
   }
 

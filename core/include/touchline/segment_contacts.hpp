@@ -23,6 +23,8 @@ struct SegmentContacts {
   Age age;               // of the segment's wrench
   double explained = 0;  // since when one contact has explained all [s]
   bool explains = false;
+  double looked = -1.0;  // time of the last search for a sole contact [s]
+  int looked_for = -1;   // and how many were known then
   // Time of the last fit [s]. That which a contact was found by lies ahead: the noise of a filtered
   // sample tells nothing new for 1 / K.
   double updated = 0.0;

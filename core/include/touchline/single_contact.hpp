@@ -12,7 +12,6 @@
 #include "touchline/approach.hpp"
 #include "touchline/credible_region.hpp"
 #include "touchline/explanations.hpp"
-#include "touchline/force_evidence.hpp"
 
 namespace touchline {
 
@@ -25,17 +24,18 @@ class SingleContact {
         settings_(settings),
         found_(observer, posture, settings, std::move(surfaces)) {}
 
-  // The contact on segment g, which `measurement` has read; its wrench is `lag` [s] old.
-  const Answer& locate(int g, double lag, Measurement& measurement) {
+  // The contact on segment g, which `measurement` has read; its wrench is `lag` [s] old. `again`: it
+  // was looked for a moment ago, and the same places are looked at.
+  const Answer& locate(int g, double lag, Measurement& measurement, bool again = false) {
     const auto mean = [&](int node) {
       return steady_mean(posture_.pose(node), posture_.twist(node), lag);
     };
-    return locate(g, mean, kDoubt, measurement);
+    return locate(g, mean, kDoubt, measurement, again);
   }
 
   // The same, if it is known where the bodies were when they felt it.
-  const Answer& locate(int g, const Past& past, Measurement& measurement) {
-    return locate(g, [&](int node) { return past.mean(node); }, kRemembered, measurement);
+  const Answer& locate(int g, const Past& past, Measurement& measurement, bool again) {
+    return locate(g, [&](int node) { return past.mean(node); }, kRemembered, measurement, again);
   }
 
   // Nothing is known.
@@ -59,7 +59,7 @@ class SingleContact {
   static constexpr double kDoubt = 0.1, kRemembered = 0.02;
 
   template <class MeanOf>
-  const Answer& locate(int g, MeanOf&& mean, double doubt, Measurement& measurement) {
+  const Answer& locate(int g, MeanOf&& mean, double doubt, Measurement& measurement, bool again) {
     clear();
     if (measurement.has_wrench()) {
       const double* w = measurement.wrench();
@@ -70,7 +70,7 @@ class SingleContact {
     } else if (measurement.has_wrench() && weak(measurement)) {
       answer_.status = Status::wrench_only;
     } else {
-      found_.find(g, mean, doubt, measurement);
+      found_.find(g, mean, doubt, measurement, again);
       weigh();
       conclude(g, measurement);
     }
@@ -97,10 +97,8 @@ class SingleContact {
       const View& view = found_.view(k);
       found_.fitter().information(view.q, view.earlier(k.point), k.normal, k.fit.force, H, g);
       if (!cholesky(H, 5)) continue;
-      const double around = -std::log(H[18] * H[24]);  // of the places that explain as well
-      k.weight = around - view.width +
-                 ForceEvidence(found_.fitter())
-                     .at(view.q, view.earlier(k.point), k.normal, graspable(k), k.fit);
+      k.weight = -0.5 * (k.fit.cost() + log_determinant(H, 5)) +
+                 found_.fitter().log_prior(k.fit, graspable(k)) - view.width;
       most = std::max(most, k.weight);
       covariance_along(H, k.along);
     }

@@ -45,7 +45,7 @@ class Tracks {
       return;
     }
     if (!measurement_.can_be_followed() || settings_.first_entry) {
-      report(s.first, single_.locate(g, 0.0, measurement_));
+      report(s.first, single_.locate(g, 0.0, measurement_, again(s)));
       return;
     }
     lag_ = s.age.follow(measurement_.load(), bandwidth, time) / bandwidth;
@@ -71,6 +71,7 @@ class Tracks {
   const Reports& reports() const { return reports_; }
 
  private:
+  static constexpr double kLook = 0.35;        // times 1 / K, between searches
   static constexpr double kNear = 2e-3;        // places that differ by less are the same [m]
   static constexpr double kLasting = 2.0;      // times 1 / K: the age of a reference in calm
 
@@ -92,8 +93,8 @@ class Tracks {
   template <class Read>
   void sole(SegmentContacts& s, Read&& read) {
     const Past& past = pasts_[g_];
-    const Answer& a = past.known() ? single_.locate(g_, past, measurement_)
-                                   : single_.locate(g_, lag_, measurement_);
+    const Answer& a = past.known() ? single_.locate(g_, past, measurement_, again(s))
+                                   : single_.locate(g_, lag_, measurement_, again(s));
     if (s.contacts.count == 0) {
       if (a.status == Status::not_separable) {
         s.explains = false;
@@ -127,6 +128,14 @@ class Tracks {
     begin_arrival(s);
     read();
     arrive(s, read);
+  }
+
+  // Was the contact looked for a moment ago? Filtered noise does not change much in the meantime.
+  bool again(SegmentContacts& s) const {
+    if (s.contacts.count == s.looked_for && time_ - s.looked < kLook / bandwidth_) return true;
+    s.looked = time_;
+    s.looked_for = s.contacts.count;
+    return false;
   }
 
   // Does a sole contact explain all, with its force free?
