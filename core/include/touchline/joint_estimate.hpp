@@ -71,11 +71,13 @@ struct JointEstimate {
     }
   }
 
-  // The places' own covariances, from the joint one.
+  // The places' own covariances, from the joint one; none is sharper than surfaces are.
   void spread() {
     const int n = size();
     for (int c = 0; c < count; ++c) {
-      const double* P = covariance + (kEach * c + 3) * (n + 1);
+      double* P = covariance + (kEach * c + 3) * (n + 1);
+      P[0] = std::max(P[0], kSharpest);
+      P[n + 1] = std::max(P[n + 1], kSharpest);
       known[c].place = {P[0], P[1], P[n + 1]};
     }
   }
@@ -110,6 +112,7 @@ struct JointEstimate {
  private:
   static constexpr double kAnywhere = 1e-2;  // variance of a place before it is known [m2]
   static constexpr double kTremor = 1e-3;    // of forces that are held [N2/s]
+  static constexpr double kSharpest = 2.5e-9;  // variance of a place [m2]
   static constexpr double kCreep = 1e-8;     // and of their places [m2/s]
 
   // `v` by the shortest turn that takes one unit vector to another (Rodrigues).

@@ -34,6 +34,13 @@ class KnownFit {
     return least < limit(3, kArrival) || held < limit(0, kArrival);
   }
 
+  // Do they, one of them anywhere and with any force, as well as if nothing had changed?
+  bool explain_calmly(const JointEstimate& estimate) {
+    change_ = Change::none();
+    fit_.begin(measurement_, estimate);
+    return fit_.cost(estimate, change_) < limit(JointFit::kEach, kCalm);
+  }
+
   // Do they with all their forces free?
   bool explain_freely(const JointEstimate& estimate) {
     change_ = Change::of_forces(estimate.count, free_);

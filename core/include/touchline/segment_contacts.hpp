@@ -46,9 +46,14 @@ struct SegmentContacts {
   bool is_calm = false, is_placed = false;
   Age new_age;
 
+  double met = -1.0;  // since when two contacts are one place [s]
+
   // One contact that slides, as it is known from where it seems to have come to rest.
   int slider = -1;
-  double rests = 0.0;  // since when [s]
+  double slid = -1.0;  // when it was seen to last [s], and where
+  Answer slide;
+  double weighed = 0.0, against[kMost] = {};  // what speaks against each: sum of chi2, up to when
+  double rests = -1.0;  // since when it does [s]
   JointEstimate rested;
 
   // Notes what is known, every `interval` [s].

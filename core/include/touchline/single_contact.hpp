@@ -38,6 +38,14 @@ class SingleContact {
     return locate(g, [&](int node) { return past.mean(node); }, kRemembered, measurement, again);
   }
 
+  // The same, where forces of other contacts are free.
+  const Answer& locate_beside_free_forces(int g, double lag, Measurement& measurement) {
+    beside_free_forces_ = true;
+    locate(g, lag, measurement);
+    beside_free_forces_ = false;
+    return answer_;
+  }
+
   // Nothing is known.
   const Answer& clear() {
     answer_.status = Status::none;
@@ -77,13 +85,14 @@ class SingleContact {
     return answer_;
   }
 
-  // Too small a force to draw a line.
+  // Too small a force to draw a line. Beside free forces it takes all rows to tell.
   bool weak(const Measurement& measurement) const {
     double C[36];
     measurement.wrench_covariance(C);
-    const double size2 = dot(answer_.force, answer_.force);
+    const double size2 = dot(answer_.force, answer_.force), variance = C[0] + C[7] + C[14];
+    if (beside_free_forces_) return false;
     return size2 < settings_.least_force * settings_.least_force ||
-           size2 < 16.0 * (C[0] + C[7] + C[14]);
+           size2 < 16.0 * variance;
   }
 
   // Posterior of each candidate: likelihood, the volume of force and surface that explains as well
@@ -253,6 +262,7 @@ class SingleContact {
   const Posture& posture_;
   const LocalizerSettings& settings_;
   Explanations found_;
+  bool beside_free_forces_ = false;
   Answer answer_;
 };
 

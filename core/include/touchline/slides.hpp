@@ -4,6 +4,8 @@
 // began to. No allocation per sample.
 #pragma once
 
+#include <algorithm>
+
 #include "touchline/known_fit.hpp"
 #include "touchline/reports.hpp"
 #include "touchline/segment_contacts.hpp"
@@ -25,12 +27,15 @@ class Slides {
         reports_(reports) {}
 
   // Has one contact moved along its body, no faster than contacts slide? Of several the one that
-  // explains best. Then all are reported; once it rests they are known from where it does.
+  // explains best. Then all are reported, also where a sample says otherwise in between; once it
+  // rests they are known from where it does.
   template <class Read>
   Outcome follow(SegmentContacts& s, int g, double lag, double bandwidth, double time,
                  Read&& read) {
     const JointEstimate& before = s.before.contacts;
     const double brief = 1.0 / bandwidth, way = kFastest * (time - s.since + brief);
+    const double passed = 0.5 * bandwidth * std::max(0.0, time - s.weighed);
+    s.weighed = time;
     int slider = -1;
     for (int c = 0; c < before.count; ++c) {
       read();
@@ -39,23 +44,40 @@ class Slides {
         fit_.take_out(others_, Change::none(), measurement_);
       }
       const Answer& a = single_.locate(g, before.count > 1 ? before.known[c].lag : lag, measurement_);
-      if (!within_reach(before.known[c], a, single_.surfaces(), way)) continue;
-      if (slider >= 0 && a.chi2 > answer_.chi2) continue;
+      const bool can = within_reach(before.known[c], a, single_.surfaces(), way);
+      s.against[c] += passed * (can ? a.chi2 : chi2_limit(measurement_.size(), kNever));
+      if (!can || (slider >= 0 && s.against[c] > s.against[slider])) continue;
       slider = c;
       answer_ = a;
     }
-    if (slider < 0) return Outcome::none;
+    if (slider < 0 && !(time - s.slid < brief)) return Outcome::none;
+    const bool found = slider >= 0;
+    if (found) {
+      if (!decided(s, slider) && moved(before.known[slider]) > settings_.place_radius)
+        answer_.status = Status::ambiguous;
+      s.slid = time;
+      s.slide = answer_;
+    } else {
+      slider = s.slider;
+    }
     for (int i = 0; i < before.count; ++i) {
       if (i != slider) reports_.add(before.known[i]);
     }
-    reports_.add(before.known[slider].serial, answer_);
-    if (time - s.since < SegmentContacts::kYoung * brief) return Outcome::slides;
+    reports_.add(before.known[slider].serial, s.slide);
+    const bool anew = s.slider != slider || s.rests < 0.0;
+    s.slider = slider;
+    if (!found) return Outcome::slides;
     read();
-    if (s.slider != slider || !stays(s)) {
-      s.slider = slider;
+    if (before.count == 1) {  // nothing is held: any sample tells where it is
+      if (time - s.since < SegmentContacts::kYoung * brief) return Outcome::slides;
+      rest(s.rested = before, slider);
+      s.contacts = s.rested;
+      return Outcome::rests;
+    }
+    if (anew || !stays(s)) {
       s.rests = time;
       rest(s.rested = before, slider);
-    } else if (time - s.rests >= brief) {
+    } else if (time - s.rests >= (decided(s, slider) ? SegmentContacts::kYoung : kLong) * brief) {
       s.contacts = s.rested;
       return Outcome::rests;
     }
@@ -64,10 +86,26 @@ class Slides {
 
  private:
   static constexpr double kFastest = 0.5;  // contacts slide no faster [m/s]
+  // Of chi2: a difference that tells which one slides; and in sigmas, that of what cannot slide.
+  static constexpr double kMargin = 9.0, kNever = 5.0;
+  static constexpr double kLong = 10.0;  // times 1 / K, where it cannot be told
+
+  // Can no other one as well have slid?
+  static bool decided(const SegmentContacts& s, int slider) {
+    for (int c = 0; c < s.before.contacts.count; ++c) {
+      if (c != slider && s.against[c] < s.against[slider] + kMargin) return false;
+    }
+    return true;
+  }
+
+  // From where a contact was known to where it is found [m].
+  double moved(const KnownContact& k) const {
+    return norm(answer_.candidates[0].point - single_.surfaces().to_world(k.point, k.node));
+  }
 
   bool stays(const SegmentContacts& s) {
     fit_.weigh(s.rested, measurement_);
-    return known_.explain(s.rested) && known_.held();
+    return known_.explain(s.rested);
   }
 
   // Contact c is where it was found now.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "touchline/known_fit.hpp"
+#include "touchline/merging.hpp"
 #include "touchline/past.hpp"
 #include "touchline/reports.hpp"
 #include "touchline/segment_contacts.hpp"
@@ -31,6 +32,7 @@ class Tracks {
         reports_(single.surfaces()),
         pasts_(segments, Past(measurement.posture().nodes().size())),
         slides_(single, measurement, settings, fit_, known_, reports_),
+        merging_(single.surfaces(), settings, fit_, known_, reports_),
         twins_(single.surfaces(), measurement, settings, fit_, known_, reports_, rows, segments) {}
 
   // One sample of segment g: fills the reports. `read()` takes the measurement anew.
@@ -192,6 +194,9 @@ class Tracks {
     s.since = time_;
     s.is_calm = s.is_placed = false;
     s.newcomer = s.slider = -1;
+    s.slid = s.rests = -1.0;
+    s.weighed = time_;
+    std::fill(s.against, s.against + JointEstimate::kMost, 0.0);
     s.new_age.restart(time_ - period_);
     s.refer_at_last(time_);
   }
@@ -211,10 +216,11 @@ class Tracks {
         return;
     }
     read();
-    Answer& a = remainder(s, read);
-    const bool found = placed(a);
-    if (!found && changed(s, read)) return;
+    Answer& a = remainder(s);
+    if (!placed(a) && changed(s, read)) return;
     if (lets_go(s, a)) return;
+    if (a.status == Status::not_separable) free(s, read);
+    const bool found = placed(a);
     if (found && !s.is_placed) s.placed = time_;
     s.is_placed = found;
     const int count = s.contacts.count;
@@ -229,6 +235,7 @@ class Tracks {
       if (lasting && !found) reports_.doubt_last();
     }
     if (!found && !lasting) return;
+    if (a.count == 0) a.status = Status::not_separable;  // no force is left, but it does not fit
     if (s.newcomer < 0) s.newcomer = reports_.next();
     report(s.newcomer, a);
   }
@@ -289,22 +296,38 @@ class Tracks {
     end(s.newcomer);
   }
 
-  // What is left without the known contacts, as one contact: with their forces held, or, where
-  // that explains nothing, free.
-  template <class Read>
-  Answer& remainder(SegmentContacts& s, Read&& read) {
+  // What is left without the known contacts, their forces held, as one contact.
+  Answer& remainder(SegmentContacts& s) {
     const JointEstimate& known = s.before.contacts;
     fit_.take_out(known, Change::none(), measurement_);
-    const double lag = s.new_age.follow(measurement_.load(), bandwidth_, time_) / bandwidth_;
-    answer_ = single_.locate(g_, lag, measurement_);
+    new_lag_ = s.new_age.follow(measurement_.load(), bandwidth_, time_) / bandwidth_;
     freed_ = false;
-    if (placed(answer_) || answer_.status == Status::wrench_only) return answer_;
+    return answer_ = single_.locate(g_, new_lag_, measurement_);
+  }
+
+  // The same with their forces free, where there are equations enough: three for each, and five.
+  template <class Read>
+  void free(SegmentContacts& s, Read&& read) {
+    const JointEstimate& known = s.before.contacts;
     read();
     fit_.take_out(known, Change::of_forces(known.count, settings_.force_scale), measurement_);
-    const Answer& freed = single_.locate(g_, lag, measurement_);
-    freed_ = placed(freed);
+    const Answer& freed = single_.locate_beside_free_forces(g_, new_lag_, measurement_);
+    if (!placed(freed)) return;
+    const int node = single_.surfaces()[freed.candidates[0].surface].node;
+    freed_ = rank(known, node) >= 3 * known.count + JointEstimate::kEach;
     if (freed_) answer_ = freed;
-    return answer_;
+  }
+
+  // Independent equations: of the wrench, and those that do not feel all of these bodies.
+  int rank(const JointEstimate& known, int node) const {
+    int count = measurement_.has_wrench() ? 6 : 0;
+    for (int i = count; i < measurement_.size(); ++i) {
+      bool tells = false;
+      for (int c = 0; c < known.count; ++c)
+        tells |= measurement_.feels(i, known.known[c].node) != measurement_.feels(i, node);
+      count += tells;
+    }
+    return count;
   }
 
   // The newcomer is known, and with it what its place shares with the others.
@@ -338,6 +361,7 @@ class Tracks {
       return;
     }
     accept(s);
+    if (merging_.follow(s, bandwidth_, time_)) known_as_of_now(s);
     for (int c = 0; c < s.contacts.count; ++c) report(s.contacts.known[c]);
     release(s);
   }
@@ -369,9 +393,10 @@ class Tracks {
   Reports reports_;
   std::vector<Past> pasts_;  // per segment: of its whole wrench
   Slides slides_;
+  Merging merging_;
   Twins twins_;
   int g_ = 0;
-  double bandwidth_ = 0.0, time_ = 0.0, lag_ = 0.0;
+  double bandwidth_ = 0.0, time_ = 0.0, lag_ = 0.0, new_lag_ = 0.0;
 };
 
 }  // namespace touchline
