@@ -17,7 +17,7 @@ from touchline.bench.arm import load_arm
 from touchline.bench.credibility import credibility
 from touchline.bench.localization_baselines import baseline_places
 from touchline.bench.matching import distances, match
-from touchline.bench.moving import moving_signals
+from touchline.bench.moving import carried, moving_signals
 from touchline.bench.touches import Signals, Touch, TouchSampler, resting_signals
 from touchline.contact.answer import Answer
 from touchline.contact.detector import Detection
@@ -33,6 +33,7 @@ FORCE = 20.0  # N
 NEAR, GROSS = 0.0225, 0.1  # m: what counts as found, and as grossly wrong
 FIRST, APART = 0.55, 0.1  # s: the first onset, after settling and a quiet half second, then each
 FRICTION = 0.5
+FAST = 0.2  # m/s: slower contacts tell nothing of lag
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,8 @@ class Touched:
         event_body: of the event.
         candidate: probability of the best candidate within reach of the truth; 0: there is none.
         candidate_error: distance of the candidate nearest to the truth [m].
+        lag: of an arm in motion, `error` in parts of |v| / K: the way that a point with the speed
+            |v| across its force is seen behind its place without compensation; NaN below `FAST`.
     """
 
     link: str
@@ -89,6 +92,7 @@ class Touched:
     event_body: str = ""
     candidate: float = 0.0
     candidate_error: float = np.nan
+    lag: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -134,10 +138,14 @@ class Trial:
 
 @dataclass(frozen=True)
 class Scene:
-    """The touches of a run with their onsets [s], and the signals they make."""
+    """The touches of a run with their onsets [s], and the signals they make.
+
+    Forces are constant in world, or turn with their links (`turning`).
+    """
 
     touches: list[tuple[Touch, float]]
     signals: Signals
+    turning: bool = False
 
 
 @lru_cache(maxsize=8)
@@ -156,11 +164,13 @@ def make_scene(cell: Cell, run: int, seed: int = 0) -> Scene:
     onsets = [(touch, FIRST + i * step) for i, touch in enumerate(touches)]
     duration = onsets[-1][1] + APART
     noise = np.random.default_rng([seed, run, cell.tier, 1]) if cell.tier else None
-    if cell.speed:
-        signals = moving_signals(robot, onsets, duration, cell.speed, chance, noise)
-    else:
-        signals = resting_signals(robot, touches[0].q, onsets, duration, noise)
-    return Scene(onsets, signals)
+    if not cell.speed:
+        return Scene(onsets, resting_signals(robot, touches[0].q, onsets, duration, noise))
+    # Where the arm turns fast, a force that is constant in world soon leaves its friction cone; but
+    # contacts on one segment are told apart by forces that do not all change.
+    turning = cell.contacts == 1
+    signals = moving_signals(robot, onsets, duration, cell.speed, chance, noise, turning=turning)
+    return Scene(onsets, signals, turning)
 
 
 def run_trial(cell: Cell, run: int, seed: int = 0, baselines: tuple[str, ...] = ()) -> Trial:
@@ -259,6 +269,7 @@ def _judge(pipeline: Pipeline, scene: Scene) -> list[Touched]:
             about |= {"event_error": float(apart[i, k]), "event_body": body}
         if (k := mine[i]) is not None:
             about |= _of_answer(answers[k], touch, places[i])
+            about |= _in_motion(answers[k], robot, scene, touch)
             if len(answers) == 1:
                 with suppress(ValueError):  # else as of a known contact, from its covariance
                     region = pipeline.localizer.region()
@@ -297,6 +308,23 @@ def _of_answer(answer: Answer, touch: Touch, place: Array) -> dict:
         "std": float(np.sqrt(np.trace(covariance))),
         "level": credibility(answer, touch.patch.body, place),
     }
+
+
+def _in_motion(answer: Answer, robot: Robot, scene: Scene, touch: Touch) -> dict:
+    """Lag, and the error of a force that has turned with its link, on an arm in motion."""
+    s = scene.signals
+    points, forces = carried(robot, touch, s.q[-2:])
+    force = forces[-1] if scene.turning else touch.force
+    about: dict[str, float] = {}
+    if answer.force is not None:
+        about["force_error"] = float(np.linalg.norm(answer.force - force))
+    velocity = (points[1] - points[0]) / (s.time[-1] - s.time[-2])
+    along = force / np.linalg.norm(force)
+    speed = float(np.linalg.norm(velocity - along * (along @ velocity)))
+    if answer.position is not None and touch.patch.segment is not None and speed > FAST:
+        error = float(np.linalg.norm(answer.position - points[1]))
+        about["lag"] = error * robot.description.bandwidth_sensors[touch.patch.segment] / speed
+    return about
 
 
 def _of_candidates(answers: list[Answer], touch: Touch, place: Array) -> dict:
