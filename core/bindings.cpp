@@ -14,7 +14,7 @@
 #include "contact_bindings.hpp"
 #include "detector_bindings.hpp"
 #include "samples.hpp"
-#include "touchline/observer.hpp"
+#include "touchline/observer/observer.hpp"
 
 // Types for the stub; what is not an array of float64 of the right shape is a TypeError.
 #define TOUCHLINE_ARRAY "numpy.typing.NDArray[numpy.float64]"

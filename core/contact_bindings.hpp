@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "arrays.hpp"
-#include "touchline/classifier.hpp"
-#include "touchline/localizer.hpp"
+#include "touchline/classifier/classifier.hpp"
+#include "touchline/localizer/localizer.hpp"
 
 namespace contact {
 

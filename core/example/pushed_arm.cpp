@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <vector>
 
-#include "touchline/observer.hpp"
+#include "touchline/observer/observer.hpp"
 
 using touchline::Vec3;
 

@@ -7,14 +7,20 @@ import numpy as np
 import pytest
 
 import touchline as tl
-from touchline.bench import detection_classical, detection_files
-from touchline.bench.detection_classical import FastClassical, less_baseline
-from touchline.bench.detection_drawing import draw
-from touchline.bench.detection_outcome import Outcome
-from touchline.bench.detection_tables import alarm_table, delay_table
-from touchline.bench.detection_work import Setting, maker
-from touchline.bench.free_motion import MotionMaker, generator, imperfect, random_trajectory
-from touchline.bench.pushes import AFTER, BEFORE, PushMaker, random_pushes
+from touchline.bench.detection import classical as detection_classical
+from touchline.bench.detection import files as detection_files
+from touchline.bench.detection.classical import FastClassical, less_baseline
+from touchline.bench.detection.drawing import draw
+from touchline.bench.detection.free_motion import (
+    MotionMaker,
+    generator,
+    imperfect,
+    random_trajectory,
+)
+from touchline.bench.detection.outcome import Outcome
+from touchline.bench.detection.pushes import AFTER, BEFORE, PushMaker, random_pushes
+from touchline.bench.detection.tables import alarm_table, delay_table
+from touchline.bench.detection.work import Setting, maker
 from touchline.contact.calibration import Statistics, watching, with_methods
 from touchline.contact.detector import Detector
 from touchline.contact.tail import Tail

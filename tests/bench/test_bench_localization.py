@@ -8,13 +8,13 @@ import pytest
 from oracle import PinocchioTwin
 
 import touchline as tl
-from touchline.bench.arm import TIERS, load_arm
-from touchline.bench.credibility import mixture_level
-from touchline.bench.localization import Plan, main, run_plan
-from touchline.bench.localization_table import wilson
-from touchline.bench.localization_trial import Cell, make_scene, pair_rank, run_trial
-from touchline.bench.matching import distances, match
-from touchline.bench.surface_map import SurfaceMap
+from touchline.bench.localization.arm import TIERS, load_arm
+from touchline.bench.localization.credibility import mixture_level
+from touchline.bench.localization.matching import distances, match
+from touchline.bench.localization.run import Plan, main, run_plan
+from touchline.bench.localization.surface_map import SurfaceMap
+from touchline.bench.localization.table import wilson
+from touchline.bench.localization.trial import Cell, make_scene, pair_rank, run_trial
 from touchline.bench.touches import TouchSampler, touch_loads
 from touchline.contact.skin import Skin
 from touchline.errors import InputError

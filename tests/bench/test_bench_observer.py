@@ -9,12 +9,12 @@ import pinocchio as pin
 import pytest
 from robots import describe, random_mechanism, random_robot
 
-from touchline.bench import observer as bench
-from touchline.bench.discretization import discretization_errors, filtered, fixed_sensor
-from touchline.bench.motion import fast_motion, pushed_link
-from touchline.bench.observer import main, plain, run_benchmark, two_sensor_arm
+from touchline.bench.observer import run as bench
+from touchline.bench.observer.discretization import discretization_errors, filtered, fixed_sensor
+from touchline.bench.observer.motion import fast_motion, pushed_link
+from touchline.bench.observer.run import main, plain, run_benchmark, two_sensor_arm
+from touchline.bench.observer.timing import Candidate, measure
 from touchline.bench.pinocchio_peer import PinocchioObserver
-from touchline.bench.timing import Candidate, measure
 from touchline.bench.urdf import robot_urdf, sensor_link
 from touchline.errors import InputError
 from touchline.estimation.dynamics import gravity_loads

@@ -8,20 +8,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from touchline.bench import wrench, wrench_methods
 from touchline.bench.touches import Touch, TouchSampler, resting_signals
-from touchline.bench.wrench_log import Log
-from touchline.bench.wrench_methods import METHODS, OPEN, between_samples, pseudo_inverse
-from touchline.bench.wrench_scenarios import Scenario, Scene, scenarios
-from touchline.bench.wrench_scores import (
+from touchline.bench.wrench import methods as wrench_methods
+from touchline.bench.wrench import run as wrench
+from touchline.bench.wrench.log import Log
+from touchline.bench.wrench.methods import METHODS, OPEN, between_samples, pseudo_inverse
+from touchline.bench.wrench.scenarios import Scenario, Scene, scenarios
+from touchline.bench.wrench.scores import (
     QUANTITIES,
     impact_values,
     leaders,
     run_scenario,
     window_errors,
 )
-from touchline.bench.wrench_stage import BIAS, IMPACT, QUIET, START, Stage
-from touchline.bench.wrench_tables import row_keys, scenario_table, tally, verdict, write_tables
+from touchline.bench.wrench.stage import BIAS, IMPACT, QUIET, START, Stage
+from touchline.bench.wrench.tables import row_keys, scenario_table, tally, verdict, write_tables
 from touchline.cli import main
 from touchline.contact.skin import Skin
 from touchline.errors import InputError
@@ -277,7 +278,7 @@ def test_bad_input_is_refused_before_anything_runs(stage, tmp_path, capsys):
 
 def test_figures_show_every_scenario(stage, few, tmp_path):
     pytest.importorskip("matplotlib")
-    from touchline.bench.wrench_figure import errors_figure, save_figures
+    from touchline.bench.wrench.figure import errors_figure, save_figures
 
     methods = [m for m in METHODS if m.own or m.name == "classical"]
     log = stage.free(2.0)

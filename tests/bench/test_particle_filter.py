@@ -6,9 +6,13 @@ import pytest
 from scipy.optimize import lsq_linear
 
 import touchline as tl
-from touchline.bench.line_rules import first_entry, nearest_to_line
-from touchline.bench.localization_trial import Cell, arm_and_skin, make_scene, run_trial
-from touchline.bench.particle_filter import ParticleFilter, least_misfit, tempered_weights
+from touchline.bench.localization.line_rules import first_entry, nearest_to_line
+from touchline.bench.localization.particle_filter import (
+    ParticleFilter,
+    least_misfit,
+    tempered_weights,
+)
+from touchline.bench.localization.trial import Cell, arm_and_skin, make_scene, run_trial
 from touchline.contact.skin import Skin
 
 

@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 
 import touchline as tl
-from touchline.bench.free_motion import MotionMaker, generator, imperfect, random_trajectory
+from touchline.bench.detection.free_motion import (
+    MotionMaker,
+    generator,
+    imperfect,
+    random_trajectory,
+)
 from touchline.calibrate.noise import NoiseMeter
 from touchline.calibrate.robot_file import write_description
 from touchline.calibrate.run import _check_tails, calibrate

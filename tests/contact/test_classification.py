@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import touchline as tl
-from touchline.bench.interactions import BEGIN, InteractionSampler
+from touchline.bench.classification.interactions import BEGIN, InteractionSampler
 from touchline.bench.touches import TouchSampler
 from touchline.contact.skin import Skin
 

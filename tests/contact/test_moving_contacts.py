@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 
-from touchline.bench.arm import load_arm
-from touchline.bench.moving import carried, moving_signals
+from touchline.bench.localization.arm import load_arm
+from touchline.bench.localization.moving import carried, moving_signals
 from touchline.bench.touches import TouchSampler
 from touchline.contact.pipeline import Pipeline
 from touchline.contact.skin import Skin

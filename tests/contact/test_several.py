@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from shapes import chain
 
-from touchline.bench.moving import moving_signals
+from touchline.bench.localization.moving import moving_signals
 from touchline.bench.touches import Touch, resting_signals, touch_loads
 from touchline.contact.pipeline import Pipeline
 from touchline.contact.skin import Skin

@@ -7,7 +7,7 @@
 #include <new>
 #include <vector>
 
-#include "touchline/observer.hpp"
+#include "touchline/observer/observer.hpp"
 
 static long allocations = 0;
 

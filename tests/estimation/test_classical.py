@@ -6,8 +6,8 @@ import pytest
 from motion import Recording, ramp
 from robots import describe, random_mechanism
 
-from touchline.bench.motion import fast_motion
-from touchline.bench.observer import two_sensor_arm
+from touchline.bench.observer.motion import fast_motion
+from touchline.bench.observer.run import two_sensor_arm
 from touchline.errors import InputError
 from touchline.estimation.classical import (
     ClassicalObserver,

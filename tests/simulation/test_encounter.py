@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 
-from touchline.bench.guiding import guide, handle_point
-from touchline.bench.reaction_trial import Case, measure, pressing, reactor
+from touchline.bench.reaction.guiding import guide, handle_point
+from touchline.bench.reaction.trial import Case, measure, pressing, reactor
 from touchline.contact.pipeline import Pipeline
 from touchline.contact.reactor import Reactor
 from touchline.model.description import PolicyDescription, PolicyRule

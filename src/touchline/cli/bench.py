@@ -29,7 +29,7 @@ def observer(
         rounds: How often each candidate is timed.
         output: Writes the figures here as well (.json or .csv).
     """
-    from touchline.bench.observer import main
+    from touchline.bench.observer.run import main
 
     return main(output, rounds)
 
@@ -66,7 +66,7 @@ def localization(
         seed: Of all that is random.
         out: Folder for tables, every touch and figures.
     """
-    from touchline.bench.localization import Plan, main
+    from touchline.bench.localization.run import Plan, main
 
     main(Plan(robots, contacts, noise, begin, speeds, runs, seed, baselines), out)
     return 0
@@ -82,7 +82,7 @@ def classification(*, interactions: int = 2000, seed: int = 0, out: Directory = 
         seed: Of all that is random.
         out: Folder for a table of every interaction.
     """
-    from touchline.bench.classification import main
+    from touchline.bench.classification.run import main
 
     main(interactions, seed, out)
     return 0
@@ -98,7 +98,7 @@ def reaction(*, encounters: int = 2, guiding: float = 1.0, out: Directory = None
         guiding: Hours in which the arm is led by its handle; 0 leaves it out.
         out: Folder for a table of every encounter, and figures.
     """
-    from touchline.bench.reaction import main
+    from touchline.bench.reaction.run import main
 
     main(encounters, guiding, out)
     return 0
@@ -113,7 +113,7 @@ def wrench(*, seed: int = 0, out: Directory = None) -> int:
         seed: Of all that is random.
         out: Folder for tables and figures.
     """
-    from touchline.bench.wrench import main
+    from touchline.bench.wrench.run import main
 
     main(out, seed)
     return 0
@@ -145,7 +145,7 @@ def detection(
         pushes: Of each force.
         out: Folder for tables and figures, which keep what other runs have written there.
     """
-    from touchline.bench.detection import Plan, main
+    from touchline.bench.detection.run import Plan, main
 
     main(Plan(observers, rates, velocity_noise, hours, pushes), out)
     return 0

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Contact or collision, and clamped or free: what kind of touch a segment feels.
 
-What counts as a blow is said here; `core/include/touchline/classifier.hpp` follows the samples.
+What counts as a blow is said here; the native `classifier.hpp` follows the samples.
 """
 
 from collections.abc import Sequence

@@ -83,7 +83,7 @@ def native_noise(
 
 
 class Detector:
-    """Runs an observer and tests its residuals (see `core/include/touchline/detector.hpp`).
+    """Runs an observer and tests its residuals (see the native `detector.hpp`).
 
     Args:
         observer: the observer; feed samples to the detector, not to both.

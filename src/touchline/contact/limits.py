@@ -8,7 +8,7 @@ from touchline.model.description import DetectionDescription, TailDescription
 
 Array = NDArray[np.float64]
 
-CUSUM_SHIFT = 1.0  # as `kShift` in core/include/touchline/detection_row.hpp
+CUSUM_SHIFT = 1.0  # as `kShift` in core/include/touchline/detector/detection_row.hpp
 
 
 def threshold(tail: TailDescription, rate: float) -> float:

@@ -21,7 +21,7 @@ TORQUE_ERROR = 0.02  # a joint's torque sensor is no better, and a touch is no p
 
 
 class Localizer:
-    """One estimator for every layout of sensors (see `core/include/touchline/localizer.hpp`).
+    """One estimator for every layout of sensors (see the native `localizer.hpp`).
 
     Candidates are all entries of the line of force action into all links of the segment, the
     surface nearest to it where it misses, and sampled points where joint torques alone leave no

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """From logged numbers to what acts on the model, for whole recordings, in numpy.
 
-The same rules as the native core's (`core/include/touchline/signals.hpp`), for the baselines.
+The same rules as the native core's (`signals.hpp`), for the baselines.
 """
 
 import numpy as np

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is said of two contacts that began at the same instant: two places, or the parts of the
+// links that may be touched. No allocation.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "touchline/localizer/pair_search.hpp"
+#include "touchline/place/answer.hpp"
+
+namespace touchline {
+
+class PairAnswer {
+ public:
+  explicit PairAnswer(const LocalizerSettings& settings) : settings_(settings) {}
+
+  // Are there two places that can be told apart?
+  bool separable(const PairSearch& pairs, int rows) const {
+    if (pairs.count() == 0 || pairs[0].rank < PairSearch::kUnknowns) return false;
+    double enough = 0.0;  // probability of pairs that can be told apart
+    for (int i = 0; i < pairs.count(); ++i)
+      enough += pairs[i].rank >= PairSearch::kUnknowns ? pairs[i].weight : 0.0;
+    return enough >= kSeparable &&
+           pairs[0].chi2 < chi2_limit(std::max(1, rows - PairSearch::kUnknowns), settings_.pitch_limit);
+  }
+
+  // What is said of one contact of the best pair, with its places in the other solutions.
+  void name(const PairSearch& pairs, int k, int rows, Answer& answer) const {
+    const Pair& best = pairs[0];
+    answer = Answer{};
+    double here = 0.0;
+    for (int i = 0; i < pairs.count(); ++i) {
+      const Pair& s = pairs[i];
+      add(answer, s.ends[k], s.weight);
+      const bool same = s.ends[0].node == best.ends[0].node && s.ends[1].node == best.ends[1].node;
+      if (same && norm(s.ends[0].point - best.ends[0].point) < settings_.place_radius &&
+          norm(s.ends[1].point - best.ends[1].point) < settings_.place_radius)
+        here += s.weight;
+      if (s.ends[k].node == best.ends[k].node) answer.body_probability += s.weight;
+    }
+    double spread = 0.0;
+    for (const PairEnd& e : best.ends)
+      spread = std::max(spread, std::sqrt(e.along[0] + e.along[2]));
+    const bool sure = here >= kSure && spread < settings_.spread_limit();
+    answer.status = sure ? Status::located : Status::ambiguous;
+    answer.chi2 = best.chi2;
+    answer.degrees = std::max(1, rows - PairSearch::kUnknowns);
+  }
+
+  // All that may be touched, where the contacts cannot be told apart: one region for each link,
+  // then the widest ones in two.
+  void name_all(const PairSearch& pairs, Answer& a) {
+    a.status = Status::not_separable;
+    a.count = cells_ = 0;
+    a.rank = pairs.count() > 0 ? pairs[0].rank : 0;
+    a.unknowns = PairSearch::kUnknowns;
+    double least = std::numeric_limits<double>::infinity();
+    pairs.starts().regions([&](int, const Vec3&, double cost) { least = std::min(least, cost); });
+    pairs.starts().regions([&](int surface, const Vec3& point, double cost) {
+      if (cells_ == kCells) return;
+      cell_[cells_++] = {surface, point, std::exp(0.5 * (least - cost)), -1};
+    });
+    for (int i = 0; i < cells_ && a.count < Answer::kCandidates; ++i) {
+      bool known = false;
+      for (int k = 0; k < a.count; ++k) known = known || a.candidates[k].surface == cell_[i].surface;
+      if (!known) centre(a, i);
+    }
+    assign(a);
+    while (a.count > 0 && a.count < Answer::kCandidates) {
+      const int far = farthest(a);
+      if (far < 0) break;
+      centre(a, far);
+      assign(a);
+    }
+  }
+
+ private:
+  static constexpr double kSeparable = 0.9;  // probability of pairs that are told apart
+  static constexpr double kSure = 0.95;      // and of one that is located
+  static constexpr int kCells = 512;
+
+  // Part of a link that may be touched, and the region that it belongs to.
+  struct Cell {
+    int surface;
+    Vec3 point;
+    double weight;
+    int region;
+  };
+  void centre(Answer& a, int cell) {
+    Candidate& k = a.candidates[a.count++];
+    k = Candidate{};
+    k.surface = cell_[cell].surface;
+    k.point = cell_[cell].point;
+  }
+
+  // The cell farthest from the centre of its region; -1 where all are near enough.
+  int farthest(const Answer& a) const {
+    int far = -1;
+    double most = settings_.place_radius;
+    for (int i = 0; i < cells_; ++i) {
+      if (cell_[i].region < 0) continue;
+      const double distance = norm(cell_[i].point - a.candidates[cell_[i].region].point);
+      if (distance > most) {
+        most = distance;
+        far = i;
+      }
+    }
+    return far;
+  }
+
+  // Gives each cell to the nearest region of its link.
+  void assign(Answer& a) {
+    double sum = 0.0;
+    for (int k = 0; k < a.count; ++k) a.candidates[k].weight = a.candidates[k].radius = 0.0;
+    for (int i = 0; i < cells_; ++i) {
+      double least = std::numeric_limits<double>::infinity();
+      cell_[i].region = -1;
+      for (int k = 0; k < a.count; ++k) {
+        const double distance = norm(a.candidates[k].point - cell_[i].point);
+        if (a.candidates[k].surface != cell_[i].surface || distance > least) continue;
+        least = distance;
+        cell_[i].region = k;
+      }
+      if (cell_[i].region < 0) continue;
+      Candidate& k = a.candidates[cell_[i].region];
+      k.radius = std::max(k.radius, least + PairStarts::kReach);
+      k.weight += cell_[i].weight;
+      sum += cell_[i].weight;
+    }
+    for (int k = 0; k < a.count; ++k) a.candidates[k].weight /= sum;
+  }
+
+  static void add(Answer& a, const PairEnd& e, double weight) {
+    for (int i = 0; i < a.count; ++i) {
+      Candidate& k = a.candidates[i];
+      if (k.surface != e.surface || norm(k.point - e.point) > 5e-3) continue;
+      k.weight += weight;
+      return;
+    }
+    if (a.count == Answer::kCandidates) return;
+    Candidate& k = a.candidates[a.count++];
+    k = Candidate{};
+    k.surface = e.surface;
+    k.point = e.point;
+    k.normal = e.normal;
+    k.fit.force = e.force;
+    k.weight = weight;
+    std::copy(e.along, e.along + 3, k.along);
+  }
+
+  const LocalizerSettings& settings_;
+  Cell cell_[kCells];
+  int cells_ = 0;
+};
+
+}  // namespace touchline

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+// How the noise of the signals reaches the rows that a segment is judged by: linear in independent
+// sources (readings, velocities), from which the covariance of all rows follows. No allocation per
+// sample.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "touchline/detector/noise_figures.hpp"
+#include "touchline/model/dense.hpp"
+#include "touchline/model/posture.hpp"
+#include "touchline/observer/observer.hpp"
+
+namespace touchline {
+
+class RowNoise {
+ public:
+  RowNoise(const Observer& observer, const Posture& posture, NoiseFigures figures, std::size_t rows)
+      : observer_(observer),
+        posture_(posture),
+        figures_(std::move(figures)),
+        sensors_(observer.row_layout().sensors),
+        joints_(observer.row_layout().joints),
+        sources_(6 * sensors_ + 2 * joints_),
+        coefficients_(rows * sources_) {}
+
+  // Are torques as good as their noise figures say?
+  bool exact_torques() const { return figures_.torque_error == 0.0; }
+
+  void clear() { std::fill(coefficients_.begin(), coefficients_.end(), 0.0); }
+
+  // Rows `at` to `at + 5`: the wrench of a segment [world], loaded by `load`.
+  void add_wrench(int at, const Segment& segment, const Spatial& load) {
+    const Gains g = gains(observer_.sensors()[segment.sensor].bandwidth);
+    add_sensor(at, segment.sensor, g, 1.0, load_error(segment.sensor, load));
+    for (int t : segment.successors) add_sensor(at, t, g, -1.0, LoadError{});
+  }
+
+  // A row that is one axis of a sensor and reads `value`.
+  void add_axis(int at, int sensor, int axis, double value) {
+    double* out = row(at);
+    const Gains g = gains(observer_.sensors()[sensor].bandwidth);
+    const double load = figures_.wrench_error * value;
+    const double filtered = g.reading * figures_.wrench[6 * sensor + axis];
+    out[6 * sensor + axis] = std::sqrt(filtered * filtered + load * load);
+    const int node = observer_.sensors()[sensor].node;
+    add_velocity(posture_.axis(node, axis), node, g.velocity, out);
+  }
+
+  // A row that is a joint's torque, less what the sensors outboard of it say, and reads `value`.
+  void add_joint(int at, int j, double value) {
+    double* out = row(at);
+    const JointRow& joint = observer_.joints()[j];
+    const Gains g = gains(joint.bandwidth);
+    const double load = figures_.torque_error * value, filtered = g.reading * figures_.tau[j];
+    out[6 * sensors_ + j] = std::sqrt(filtered * filtered + load * load);
+    for (int node : joint.nodes) add_velocity(posture_.subspace(node), node, g.velocity, out);
+    for (const Projection& pair : observer_.layout().outboard_sensors[j]) {
+      const Spatial& s = posture_.subspace(observer_.layout().lines[pair.line]);
+      const int node = observer_.sensors()[pair.sensor].node;
+      for (int a = 0; a < 6; ++a)
+        out[6 * pair.sensor + a] -=
+            g.reading * figures_.wrench[6 * pair.sensor + a] * dot(s, unit_wrench(node, a));
+      add_velocity(s, node, -g.velocity, out);
+    }
+  }
+
+  // The lower triangle of the covariance (size, size) of the first rows, of which `forces` are
+  // forces; `speed2`: sum of squares of the joints' velocities.
+  void covariance(int size, int forces, double speed2, double* out) const {
+    const double motion = 1.0 + speed2 / (kFast * kFast);
+    for (int a = 0; a < size; ++a) {
+      for (int b = 0; b <= a; ++b) {
+        const double* x = coefficients_.data() + a * sources_;
+        const double* y = coefficients_.data() + b * sources_;
+        double sum = 0.0;
+        for (int k = 0; k < sources_; ++k) sum += x[k] * y[k];
+        out[a * size + b] = sum;
+      }
+      const double least = a < forces ? figures_.force : figures_.moment;
+      out[a * size + a] += motion * least * least;
+    }
+  }
+
+ private:
+  static constexpr double kFast = 3.0;  // the trapezoid errs noticeably [rad/s]
+
+  // How a first-order filter passes noise: of readings, averaged over each interval, and of
+  // velocities, which enter through a difference of momenta.
+  struct Gains {
+    double reading, velocity;
+  };
+  Gains gains(double bandwidth) const {
+    const double dt = figures_.period, a = pole(bandwidth, dt, Discretization::automatic);
+    return {std::sqrt(std::min(1.0, 0.5 * (1.0 - a))),
+            (1.0 - a) / dt * std::sqrt(2.0 / (1.0 + a))};
+  }
+
+  // The error of gains and model, which grows with the load, by the sensor's axes.
+  struct LoadError {
+    double force = 0.0, moment = 0.0;
+  };
+  LoadError load_error(int sensor, const Spatial& load) const {
+    const Spatial w = wrench_to_child(posture_.pose(observer_.sensors()[sensor].node), load);
+    return {figures_.wrench_error * std::sqrt(dot(w.linear, w.linear)),
+            figures_.wrench_error * std::sqrt(dot(w.angular, w.angular))};
+  }
+
+  void add_sensor(int at, int s, const Gains& g, double sign, const LoadError& error) {
+    const int node = observer_.sensors()[s].node;
+    for (int a = 0; a < 6; ++a) {
+      const double filtered = g.reading * figures_.wrench[6 * s + a];
+      const double load = a < 3 ? error.force : error.moment;
+      add_column(at, 6 * s + a, unit_wrench(node, a),
+                 sign * std::sqrt(filtered * filtered + load * load));
+    }
+    for (int i = 0; i < joints_; ++i)
+      add_column(at, 6 * sensors_ + joints_ + i, posture_.momentum(node, i),
+                 sign * g.velocity * figures_.qd[i]);
+  }
+
+  void add_column(int at, int source, const Spatial& w, double scale) {
+    double values[6];
+    store(w, values);
+    for (int i = 0; i < 6; ++i) row(at + i)[source] += scale * values[i];
+  }
+
+  // What the noise of velocities does to the momentum of a node along a twist.
+  void add_velocity(const Spatial& along, int node, double gain, double* out) const {
+    double* to = out + 6 * sensors_ + joints_;
+    for (int c = 0; c < joints_; ++c)
+      to[c] += gain * figures_.qd[c] * dot(along, posture_.momentum(node, c));
+  }
+
+  Spatial unit_wrench(int node, int axis) const {
+    double w[6] = {0, 0, 0, 0, 0, 0};
+    w[axis] = 1.0;
+    return wrench_to_parent(posture_.pose(node), {{w[0], w[1], w[2]}, {w[3], w[4], w[5]}});
+  }
+
+  double* row(int at) { return coefficients_.data() + at * sources_; }
+
+  const Observer& observer_;
+  const Posture& posture_;
+  NoiseFigures figures_;
+  int sensors_, joints_, sources_;
+  std::vector<double> coefficients_;  // rows by sources
+};
+
+}  // namespace touchline

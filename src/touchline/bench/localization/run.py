@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`touchline bench localization`: how well contacts are located, by the protocol of Han and Kim.
+
+Random poses, reachable points uniform over the area of the links (outside all other links, 3 cm
+free along the outward normal and along the way of the push, above the floor), 20 N in the friction
+cone, sensors at 1 kHz with white noise; all of it through the real pipeline.
+"""
+
+import csv
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from touchline.bench.localization.arm import ARMS
+from touchline.bench.localization.baselines import BASELINES
+from touchline.bench.localization.table import (
+    baseline_table,
+    failures,
+    published,
+    rank_table,
+    tables,
+)
+from touchline.bench.localization.trial import (
+    Cell,
+    Trial,
+    arm_and_skin,
+    flat,
+    make_pipeline,
+    make_scene,
+    run_trial,
+)
+from touchline.bench.request import check_least, prepare_results
+from touchline.errors import InputError
+
+CHUNK = 25  # runs handed to a process at once
+TIMED = 6  # runs whose updates are timed
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to run.
+
+    Attributes:
+        robots: names of arms.
+        contacts: numbers of contacts.
+        noise: numbers of tiers, 0 for none.
+        begin: "apart" and "together".
+        speeds: of the joints [rad/s].
+        runs: per cell.
+        seed: of all that is random.
+        baselines: names of those that run along.
+    """
+
+    robots: tuple[str, ...] = ARMS
+    contacts: tuple[int, ...] = (1, 2, 3)
+    noise: tuple[int, ...] = (0, 1, 2, 3)
+    begin: tuple[str, ...] = ("apart", "together")
+    speeds: tuple[float, ...] = (0.0,)
+    runs: int = 1000
+    seed: int = 0
+    baselines: tuple[str, ...] = tuple(BASELINES)
+
+    def cells(self) -> list[Cell]:
+        """Every combination that there is."""
+        return [
+            Cell(arm, count, tier, begin == "together", speed)
+            for arm in self.robots
+            for tier in self.noise
+            for speed in self.speeds
+            for begin in self.begin
+            for count in self.contacts
+            if count > 1 or begin == self.begin[0]
+        ]
+
+
+def run_plan(plan: Plan, processes: int | None = None) -> Iterator[list[Trial]]:
+    """The trials of a plan, chunk by chunk as they are done, on all cores.
+
+    Args:
+        plan: what to run.
+        processes: default: one for each core; 0: in this process.
+    """
+    chunks = [
+        (cell, range(start, min(start + CHUNK, plan.runs)), plan.seed, plan.baselines)
+        for cell in plan.cells()
+        for start in range(0, plan.runs, CHUNK)
+    ]
+    if processes == 0:
+        yield from (_run_chunk(*chunk) for chunk in chunks)
+        return
+    count = processes or len(os.sched_getaffinity(0))
+    with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
+        waiting = [pool.submit(_run_chunk, *chunk) for chunk in chunks]
+        try:
+            for done in as_completed(waiting):
+                yield done.result()
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _run_chunk(cell: Cell, runs: range, seed: int, baselines: tuple[str, ...]) -> list[Trial]:
+    return [run_trial(cell, run, seed, baselines) for run in runs]
+
+
+def update_time(cell: Cell, seed: int = 0, runs: int = TIMED) -> float:
+    """Median time [s] of `Pipeline.update` while all contacts of a cell last.
+
+    With position, force, level and clamping of each contact read.
+    """
+    spent = []
+    for run in range(runs):
+        scene = make_scene(cell, run, seed)
+        s = scene.signals
+        pipeline = make_pipeline(*arm_and_skin(cell.arm, cell.tier))
+        begun = max(onset for _, onset in scene.touches) + 0.02
+        for sample in zip(s.time, s.q, s.qd, s.tau, s.wrench, strict=True):
+            start = perf_counter()
+            for contact in pipeline.update(*sample).contacts:
+                _ = contact.position, contact.force, contact.level, contact.clamped
+            if sample[0] > begun:
+                spent.append(perf_counter() - start)
+    return float(np.median(spent))
+
+
+def main(plan: Plan | None = None, out: Path | None = None, processes: int | None = None) -> None:
+    """Runs a plan, prints its tables, and writes them with every trial into a folder."""
+    from tqdm import tqdm
+
+    plan = plan or Plan()
+    check_least(1, runs=plan.runs)
+    check_least(0, seed=plan.seed, **{"speeds": min(plan.speeds, default=0.0)})
+    if not plan.cells():
+        raise InputError("nothing to run: one of robots, contacts, noise, begin, speeds is empty")
+    prepare_results(out)
+    for arm in plan.robots:
+        arm_and_skin(arm, plan.noise[0])  # a missing model is told before the work
+    cells = plan.cells()
+    trials: list[Trial] = []
+    with tqdm(total=plan.runs * len(cells), desc="localization", disable=None, leave=False) as bar:
+        for chunk in run_plan(plan, processes):
+            trials += chunk
+            bar.update(len(chunk))
+    order = {cell: i for i, cell in enumerate(cells)}
+    trials.sort(key=lambda trial: (order[trial.cell], trial.run))
+    times = {cell: update_time(cell, plan.seed, min(TIMED, plan.runs)) for cell in cells}
+    parts = [tables(trials, times), published(), rank_table(trials), baseline_table(trials)]
+    parts.append(failures(trials))
+    text = "\n\n".join(part for part in parts if part)
+    print(text)
+    if out is not None:
+        (out / "tables.txt").write_text(text + "\n", encoding="utf-8")
+        write(out / "trials.csv", trials)
+        from touchline.bench.localization.figures import save_figures
+
+        save_figures(out, trials)
+        print(f"\nTables, every touch, and figures are in {out}")
+
+
+def write(path: Path, trials: Sequence[Trial]) -> None:
+    """Writes one row per touch (.csv)."""
+    rows = [row for trial in trials for row in flat(trial)]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)

@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The tables of the localization benchmark, the published figures beside them."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.bench.localization.arm import TIERS
+from touchline.bench.localization.baselines import BASELINES
+from touchline.bench.localization.trial import GROSS, NEAR, Cell, Touched, Trial
+from touchline.bench.tables import Row, aligned
+
+Array = NDArray[np.float64]
+
+HEAD: Row = (
+    "contacts", "begin", "arm", "runs", "found", "95 % interval", "as event", "in the set",
+    "surely wrong", "body", "> 10 cm", "median", "p99", "RMS", "RMS found", "lag", "force",
+    "90 % holds", "unsure", "us",
+)  # fmt: skip
+# Contacts, found, RMS [mm], RMS of the force [N], time [ms], source.
+PUBLISHED = (
+    ("1", "99.96 %", "1.6", "0.01", "0.45", "Han and Kim, ICRA 2023, Panda, noise-free"),
+    ("2", "96.70 %", "10.8", "2.00", "1.66", "same"),
+    ("3", "81.63 %", "35.0", "4.63", "4.50", "same"),
+    ("1", "", "about 30", "", "161", "contact particle filter, Manuelli and Tedrake, IROS 2016"),
+    ("2", "", "", "", "244", "same"),
+    ("3", "", "", "", "395", "same"),
+    ("1", "", "4.4", "", "15.97", "Han and Kim, ICRA 2025, real robot"),
+    ("2", "", "12.4", "", "", "same"),
+)
+LEGEND = (
+    "found: every touch within 22.5 mm at the last sample, nothing else named; as event: the same\n"
+    "of the events' positions; in the set: every touch near a returned explanation or in\n"
+    "the part of a link that one stands for;\n"
+    "surely wrong: as many places as touches, all `located`, but not found; body: the right\n"
+    "rigid body named; lengths in mm, force RMS in N; RMS over all that was located, RMS found\n"
+    "without what is farther off than 22.5 mm; lag: the distance in parts of |v|/K, the way a\n"
+    "point at the speed |v| across its force is behind without compensation, median and 99th\n"
+    "percentile of those faster than 0.2 m/s; 90 % holds: share of truths in the 90 % region;\n"
+    "unsure: not answered by `located`; us: median time of Pipeline.update while touched,\n"
+    "with position, force, level and clamping of each contact read."
+)
+
+
+def wilson(good: int, of: int, z: float = 1.959964) -> tuple[float, float]:
+    """95 % score interval of a rate (Wilson 1927)."""
+    if of == 0:
+        return 0.0, 1.0
+    rate = good / of
+    centre = rate + z * z / (2 * of)
+    half = z * np.sqrt(rate * (1 - rate) / of + z * z / (4 * of * of))
+    return (centre - half) / (1 + z * z / of), (centre + half) / (1 + z * z / of)
+
+
+def tables(trials: Sequence[Trial], times: dict[Cell, float]) -> str:
+    """All cells, arm by arm and tier by tier."""
+    cells = list(dict.fromkeys(trial.cell for trial in trials))
+    parts = []
+    for arm in dict.fromkeys(cell.arm for cell in cells):
+        for tier in sorted({cell.tier for cell in cells if cell.arm == arm}):
+            rows: list[Row] = [HEAD]
+            own = [cell for cell in cells if (cell.arm, cell.tier) == (arm, tier)]
+            for cell in own:
+                of_cell = [trial for trial in trials if trial.cell == cell]
+                rows.append(_line(cell, of_cell, times.get(cell, np.nan)))
+            parts.append(f"{arm}, {TIERS[tier]}\n{aligned(rows, text_columns=(1, 2))}")
+    return "\n\n".join([*parts, LEGEND])
+
+
+def published() -> str:
+    """What is published of the same, with its source."""
+    head = ("contacts", "found", "RMS mm", "force RMS N", "ms", "published")
+    return aligned([head, *PUBLISHED], text_columns=(5,))
+
+
+def rank_table(trials: Iterable[Trial]) -> str:
+    """Pairs that begin together, by the rank of their equations; empty without such pairs."""
+    pairs = [trial for trial in trials if trial.cell.together and trial.cell.contacts == 2]
+    if not pairs:
+        return ""
+    rows: list[Row] = [
+        ("arm", "noise", "rank", "pairs", "found", "truth in the set", "confidently wrong")
+    ]
+    keys = sorted({(trial.cell.arm, trial.cell.tier, trial.rank) for trial in pairs})
+    for arm, tier, rank in keys:
+        own = [t for t in pairs if (t.cell.arm, t.cell.tier, t.rank) == (arm, tier, rank)]
+        rates = [[t.found for t in own], [t.in_set for t in own],
+                 [t.confidently_wrong for t in own]]  # fmt: skip
+        shares = [f"{100 * np.mean(rate):.2f} %" for rate in rates]
+        name = str(rank) if rank else "apart"
+        rows.append((arm, str(TIERS[tier]), name, str(len(own)), *shares))
+    legend = "rank: independent equations of a pair on one segment; two contacts need 10"
+    return f"{aligned(rows, text_columns=(0, 1))}\n{legend}"
+
+
+def baseline_table(trials: Iterable[Trial]) -> str:
+    """Every baseline beside our estimator on the same runs; empty without baselines."""
+    rows: list[Row] = [("arm", "noise", "contacts", "begin", "method", "runs", "found", "> 10 cm",
+                        "median", "RMS found")]  # fmt: skip
+    groups: dict[tuple[Cell, str], list[Trial]] = {}
+    for trial in trials:
+        for name, _ in trial.baselines:
+            groups.setdefault((trial.cell, name), []).append(trial)
+    for (cell, name), own in groups.items():
+        errors = np.array([dict(trial.baselines)[name] for trial in own])
+        ours = np.array([[touch.error for touch in trial.touches] for trial in own])
+        for method, error in ((BASELINES[name], errors), ("  ours, on these runs", ours)):
+            near = error < NEAR
+            rows.append((
+                cell.arm, str(TIERS[cell.tier]), str(cell.contacts), _timing(cell), method,
+                str(len(own)), _percent(np.mean(near.all(axis=1))),
+                _percent(np.mean(error > GROSS)),
+                _mm(np.nanmedian(error)) if np.isfinite(error).any() else "-",
+                _mm(_rms(error[near])),
+            ))  # fmt: skip
+    if len(rows) == 1:
+        return ""
+    legend = "here found does not mind what is named besides; lengths in mm"
+    return f"{aligned(rows, text_columns=(0, 1, 3, 4))}\n{legend}"
+
+
+def failures(trials: Iterable[Trial]) -> str:
+    """Every touch of noise-free runs that was not found, with what was named for it."""
+    rows: list[Row] = [("arm", "contacts", "begin", "run", "touched", "named", "error mm", "status",
+             "same body", "nearest other mm")]  # fmt: skip
+    for trial in trials:
+        if trial.cell.tier or trial.found:
+            continue
+        for touch in trial.touches:
+            if not touch.error < NEAR:
+                rows.append(_failure(trial, touch))
+    if len(rows) == 1:
+        return "Noise-free, every touch was found."
+    legend = "nearest other: distance of the nearest explanation on the touched body from the truth"
+    return f"{aligned(rows, text_columns=(0, 2, 4, 5, 7, 8))}\n{legend}"
+
+
+def _failure(trial: Trial, touch: Touched) -> Row:
+    same = "" if not touch.found_body else "yes" if touch.found_body == touch.body else "no"
+    return (
+        trial.cell.arm,
+        str(trial.cell.contacts),
+        _timing(trial.cell),
+        str(trial.run),
+        touch.link,
+        touch.found_link or "-",
+        _mm(touch.error),
+        touch.status,
+        same,
+        _mm(touch.candidate_error),
+    )
+
+
+def _line(cell: Cell, trials: list[Trial], time: float) -> Row:
+    touches = [touch for trial in trials for touch in trial.touches]
+    error = np.array([touch.error for touch in touches])
+    known = error[np.isfinite(error)]
+    level = np.array([touch.level for touch in touches])
+    good = sum(trial.found for trial in trials)
+    low, high = wilson(good, len(trials))
+    return (
+        str(cell.contacts),
+        _timing(cell),
+        f"{cell.speed:g} rad/s" if cell.speed else "at rest",
+        str(len(trials)),
+        _percent(good / len(trials)),
+        f"{100 * low:.2f}-{100 * high:.2f}",
+        _percent(np.mean([trial.event_found for trial in trials])),
+        _percent(np.mean([trial.in_set for trial in trials])),
+        _percent(np.mean([trial.confidently_wrong for trial in trials])),
+        _percent(np.mean([touch.found_body == touch.body for touch in touches])),
+        _percent(np.mean(error > GROSS)),
+        *(_mm(np.percentile(known, p) if len(known) else np.nan) for p in (50, 99)),
+        _mm(_rms(known)),
+        _mm(_rms(known[known < NEAR])),
+        _lag(np.array([touch.lag for touch in touches])),
+        f"{_rms(np.array([touch.force_error for touch in touches])):.3f}",
+        _percent(np.mean(level[np.isfinite(level)] < 0.9)) if np.isfinite(level).any() else "-",
+        _percent(np.mean([touch.status != "located" for touch in touches])),
+        f"{1e6 * time:.0f}" if np.isfinite(time) else "-",
+    )
+
+
+def _lag(lags: Array) -> str:
+    known = lags[np.isfinite(lags)]
+    return f"{np.median(known):.3f}, {np.percentile(known, 99):.2f}" if len(known) else "-"
+
+
+def _timing(cell: Cell) -> str:
+    return "" if cell.contacts == 1 else "together" if cell.together else "0.1 s apart"
+
+
+def _rms(values: Array) -> float:
+    values = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
+
+
+def _percent(rate: float | np.floating) -> str:
+    return f"{100 * rate:.2f} %"
+
+
+def _mm(length: float | np.floating) -> str:
+    return f"{1e3 * length:.2f}" if np.isfinite(length) else "-"
