@@ -112,8 +112,8 @@ struct JointEstimate {
  private:
   static constexpr double kAnywhere = 1e-2;  // variance of a place before it is known [m2]
   static constexpr double kTremor = 1e-3;    // of forces that are held [N2/s]
-  static constexpr double kSharpest = 2.5e-9;  // variance of a place [m2]
-  static constexpr double kCreep = 1e-8;     // and of their places [m2/s]
+  static constexpr double kSharpest = 4e-10;  // variance of a place [m2]
+  static constexpr double kCreep = 2e-9;     // and of their places [m2/s]
 
   // `v` by the shortest turn that takes one unit vector to another (Rodrigues).
   static Vec3 turned(const Vec3& v, const Vec3& from, const Vec3& to) {
