@@ -100,13 +100,14 @@ class Browser:
     def _connect(self, url: str) -> Any:
         return connect(url, max_size=None, compression=None, proxy=None)
 
-    def call(self, method: str, **params: Any) -> dict[str, Any]:
-        """One command of the protocol, and its result."""
+    def call(self, method: str, patience: float = PATIENCE, **params: Any) -> dict[str, Any]:
+        """One command of the protocol, and its result; TimeoutError if it takes too long."""
         self._count += 1
         number = self._count
+        end = time.monotonic() + patience
         self._socket.send(json.dumps({"id": number, "method": method, "params": params}))
-        while True:
-            answer = json.loads(self._socket.recv(timeout=PATIENCE))
+        while True:  # what the page does meanwhile comes in between
+            answer = json.loads(self._socket.recv(timeout=max(0.0, end - time.monotonic())))
             if answer.get("id") == number:
                 assert "error" not in answer, f"{method}: {answer['error']}"
                 return answer["result"]
@@ -264,10 +265,18 @@ class Browser:
         """What the window shows, (height, width, 3) of 0 to 255; also as a PNG file."""
         from PIL import Image
 
-        data = base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
+        data = base64.b64decode(self._screenshot())
         if file is not None:
             Path(file).write_bytes(data)
         return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
+
+    def _screenshot(self) -> str:
+        for _ in range(5):
+            try:
+                return self.call("Page.captureScreenshot", PATIENCE / 4, format="png")["data"]
+            except TimeoutError:  # now and then it waits for a frame that never comes
+                self.call("Page.bringToFront")
+        raise AssertionError("the browser shows no picture")
 
     def close(self) -> None:
         """Ends the browser."""
