@@ -196,21 +196,42 @@ class Browser:
         self.click(*self.place(text))
 
     def choose(self, label: str, option: str) -> None:
-        """Takes an option of the drop-down list with a label."""
-        found = self.run(
-            FIND_INPUT % (json.dumps("input:not([type=checkbox])"), *self.place(label))
-        )
-        assert found, f"nothing to choose beside '{label}'"
-        self.click(*found)
-        until(lambda: self.run(FIND % json.dumps(option)), pause=self.rest, what=f"'{option}'")
-        self.press(option)
+        """Takes an option of the drop-down list with a label; again if the page loses a click."""
+        for _ in range(6):
+            x, y = self._beside(label, "input:not([type=checkbox])")
+            if self.run(f"document.elementFromPoint({x}, {y})?.value") == option:
+                return
+            self.click(x, y)
+            if self._appears(option):
+                self.press(option)
+                self.draw()
+        raise AssertionError(f"'{option}' cannot be chosen beside '{label}'")
+
+    def _beside(self, label: str, kind: str) -> tuple[float, float]:
+        """Middle [pixels] of the input to the right of a label, once the page stands still."""
+
+        def found() -> list[float] | None:
+            return self.run(FIND_INPUT % (json.dumps(kind), *self.place(label)))
+
+        def settled() -> list[float] | None:
+            before = found()
+            self.draw()
+            return before if before == found() else None
+
+        x, y = until(settled, pause=self.rest, what=f"{kind} beside '{label}'")
+        return x, y
+
+    def _appears(self, text: str) -> bool:
+        end = time.monotonic() + PATIENCE / 6
+        while time.monotonic() < end:
+            if self.run(FIND % json.dumps(text)):
+                return True
+            self.rest(0.05)
+        return False
 
     def check(self, label: str) -> None:
         """Clicks on the box with a label, until that changes it: a list may still be closing."""
-        box = json.dumps("input[type=checkbox]")
-        find = FIND_INPUT % (box, *self.place(label))
-        found = self.run(find)
-        assert found, f"no box beside '{label}'"
+        found = self._beside(label, "input[type=checkbox]")
         state = f"document.elementFromPoint({found[0]}, {found[1]})?.checked"
         before = self.run(state)
         for _ in range(5):

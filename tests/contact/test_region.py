@@ -48,6 +48,14 @@ def test_a_link_that_nothing_speaks_for_is_in_no_region():
     assert region.level("another", PLACE) == 1.0
 
 
+def level(localizer, touch):
+    """The smallest region that holds the truth; all there is where the answer has no place."""
+    try:
+        return localizer.region().level(touch.patch.link, touch.position)
+    except ValueError:
+        return 1.0
+
+
 LAYOUTS = {
     "base sensor and joint torques": ((("base", "link0"),), "sensor"),
     "base sensor": ((("base", "link0"),), "none"),
@@ -72,7 +80,7 @@ def test_nine_in_ten_true_places_are_in_the_region_of_ninety_percent(layout):
         rows = observer.run(s.time, s.q, s.qd, s.tau, s.wrench).rows
         assert touch.patch.segment is not None
         localizer.locate(touch.patch.segment, touch.q, observer.estimate(rows[-1]))
-        levels.append(localizer.region().level(touch.patch.link, touch.position))
+        levels.append(level(localizer, touch))
     inside = np.mean(np.array(levels) <= 0.9)
     assert 0.85 <= inside <= 0.95  # 90 % of 200: one sigma is 2.1 %
     assert 0.38 <= np.mean(np.array(levels) <= 0.5) <= 0.62
