@@ -59,25 +59,12 @@ class Mesh {
   // edge is reported by both triangles and never by none.
   template <class Visit>
   void crossings(const ForceLine& line, Visit&& visit) const {
-    if (empty()) return;
     const Vec3 inverse = invert(line.direction);
-    int stack[kDepth], size = 0;
-    stack[size++] = 0;
-    while (size > 0) {
-      const int index = stack[--size];
-      const Box& box = boxes_[index];
-      if (!crosses(box, line.origin, inverse)) continue;
-      if (box.count == 0) {
-        stack[size++] = index + 1;
-        stack[size++] = box.next;
-        continue;
-      }
-      for (int i = box.next; i < box.next + box.count; ++i) {
-        double t;
-        if (crosses(triangles_[i], line, t))
-          visit(Crossing{t, triangles_[i].face, triangles_[i].normal});
-      }
-    }
+    visit_triangles([&](const Box& box) { return crosses(box, line.origin, inverse); },
+                    [&](const Triangle& tri) {
+                      double t;
+                      if (crosses(tri, line, t)) visit(Crossing{t, tri.face, tri.normal});
+                    });
   }
 
   // The point of the surface nearest to the line, if nearer than `limit`.
@@ -98,27 +85,15 @@ class Mesh {
   // to it than `limit` and whose normal is `wanted(normal)`.
   template <class Wanted, class Visit>
   void around(const ForceLine& line, double limit, Wanted&& wanted, Visit&& visit) const {
-    if (empty()) return;
     const Vec3 inverse = invert(line.direction);
-    int stack[kDepth], size = 0;
-    stack[size++] = 0;
-    while (size > 0) {
-      const int index = stack[--size];
-      const Box& box = boxes_[index];
-      if (!crosses(box, line.origin, inverse, limit)) continue;
-      if (box.count == 0) {
-        stack[size++] = index + 1;
-        stack[size++] = box.next;
-        continue;
-      }
-      for (int i = box.next; i < box.next + box.count; ++i) {
-        if (!wanted(triangles_[i].normal)) continue;
-        SurfacePoint p;
-        p.distance = limit;
-        nearer_to_line(triangles_[i], line, p);
-        if (p.face >= 0) visit(p);
-      }
-    }
+    visit_triangles([&](const Box& box) { return crosses(box, line.origin, inverse, limit); },
+                    [&](const Triangle& tri) {
+                      if (!wanted(tri.normal)) return;
+                      SurfacePoint p;
+                      p.distance = limit;
+                      nearer_to_line(tri, line, p);
+                      if (p.face >= 0) visit(p);
+                    });
   }
 
   // The point of the surface nearest to `p`, if nearer than `limit`.
@@ -165,6 +140,25 @@ class Mesh {
     }
     boxes_[index] = box;
     return index;
+  }
+
+  // Calls `visit(Triangle)` for all in boxes that are `reached(Box)`, in no order.
+  template <class Reached, class Visit>
+  void visit_triangles(Reached&& reached, Visit&& visit) const {
+    if (empty()) return;
+    int stack[kDepth], size = 0;
+    stack[size++] = 0;
+    while (size > 0) {
+      const int index = stack[--size];
+      const Box& box = boxes_[index];
+      if (!reached(box)) continue;
+      if (box.count == 0) {
+        stack[size++] = index + 1;
+        stack[size++] = box.next;
+        continue;
+      }
+      for (int i = box.next; i < box.next + box.count; ++i) visit(triangles_[i]);
+    }
   }
 
   static BasicVec3<float> rounded(const Vec3& v, float towards) {
