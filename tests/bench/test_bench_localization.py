@@ -9,13 +9,17 @@ from oracle import PinocchioTwin
 
 import touchline as tl
 from touchline.bench.localization.arm import TIERS, load_arm
+from touchline.bench.localization.cell import Cell
+from touchline.bench.localization.columns import wilson
 from touchline.bench.localization.credibility import mixture_level
 from touchline.bench.localization.matching import distances, match
 from touchline.bench.localization.run import Plan, main, run_plan
+from touchline.bench.localization.scene import make_scene
+from touchline.bench.localization.segment_table import segment_tables
 from touchline.bench.localization.surface_map import SurfaceMap
-from touchline.bench.localization.table import wilson
-from touchline.bench.localization.trial import Cell, make_scene, pair_rank, run_trial
-from touchline.bench.touches import TouchSampler, touch_loads
+from touchline.bench.localization.trial import pair_rank, run_trial
+from touchline.bench.localization.trials_file import write_trials
+from touchline.bench.touches import TouchSampler, sample_on_each, touch_loads
 from touchline.contact.skin import Skin
 from touchline.errors import InputError
 
@@ -58,7 +62,7 @@ def test_statics_are_pinocchios():
     robot = panda()
     twin = PinocchioTwin(robot.description, robot.mechanism)
     for run in range(5):
-        scene = make_scene(Cell("panda", 2, together=True), run)
+        scene = make_scene(Cell("panda", 2, begin="together"), run)
         q = scene.signals.q[-1]
         expected = twin.loads(q, 0 * q, 0 * q)
         first = np.r_[scene.signals.tau[0], scene.signals.wrench[0].ravel()]
@@ -141,9 +145,51 @@ def test_the_description_says_how_noisy_the_sensors_are():
 
 def test_tiers_and_timing_share_poses_and_places():
     a = make_scene(Cell("sara", 2, 0), 7).touches
-    b = make_scene(Cell("sara", 2, 3, together=True), 7).touches
+    b = make_scene(Cell("sara", 2, 3, begin="together"), 7).touches
     for (one, _), (other, _) in zip(a, b, strict=True):
         np.testing.assert_array_equal(one.position, other.position)
+
+
+def test_one_contact_on_each_segment_is_as_one():
+    """Alone or with others, at the same place of the same pose and with the same noise."""
+    plan = Plan(("sara",), (1,), (1,), ("segments",), (0.0, 2.0), runs=3, baselines=())
+    trials = [trial for chunk in run_plan(plan, 0) for trial in chunk]
+    together = {(t.cell.speed, t.run): t for t in trials if not t.cell.alone}
+    alone = [trial for trial in trials if trial.cell.alone]
+    assert len(together) == 2 * 3 and len(alone) == 3 * 2 * 3
+    for trial in alone:
+        (one,) = trial.touches
+        other = together[trial.cell.speed, trial.run]
+        (same,) = [touch for touch in other.touches if touch.segment == one.segment]
+        assert (same.link, same.x, same.y, same.z) == (one.link, one.x, one.y, one.z)
+        assert one.found and same.found and trial.found and other.found
+        assert abs(same.error - one.error) < 2e-4
+    lines = segment_tables(trials, {}).splitlines()
+    assert lines[0] == "sara, one contact on each segment, 0.05 N / 0.01 Nm / 0.05 Nm"
+    assert lines[2].split()[:6] == ["at", "rest", "base", "alone", "3", "100.00"]
+    assert lines[17].split()[:8] == ["2", "rad/s", "every", "all", "at", "once", "9", "100.00"]
+    scene = make_scene(Cell("sara", 3, begin="segments"), 0)
+    assert [touch.patch.segment for touch, _ in scene.touches] == ["base", "wrist", "handle"]
+    assert len({onset for _, onset in scene.touches}) == 1
+
+
+def test_touches_on_each_segment_are_sampled_where_all_can_be_reached():
+    """The tool may be below the floor: another pose is drawn."""
+    skin = Skin(tl.load_robot("sara"))
+    for seed in range(20):
+        touches = sample_on_each(("wrist", "base"), skin, np.random.default_rng(seed), 20.0)
+        assert [touch.patch.segment for touch in touches] == ["wrist", "base"]
+        np.testing.assert_array_equal(touches[0].q, touches[1].q)
+        assert min(touch.position[2] for touch in touches) >= 0.0
+
+
+def test_segments_need_a_six_axis_sensor():
+    panda()
+    with pytest.raises(InputError, match="--begin segments: panda-torques has no six-axis sensor"):
+        Plan(("panda-torques",), begin=("segments",)).cells()
+    assert Plan(("panda",), (1, 2), (0,), ("segments",)).cells() == [
+        Cell("panda", begin="segments")
+    ]
 
 
 def test_rank_of_pairs():
@@ -222,6 +268,14 @@ def test_tables_and_files_hold_every_trial(tmp_path, capsys):
         assert len(list(csv.DictReader(file))) == 2 * 2 * (1 + 2 + 2)
     for name in ("errors_sara", "arm_sara"):
         assert (tmp_path / f"{name}.png").stat().st_size > 10_000
+
+
+def test_a_later_trial_may_have_more_columns(tmp_path):
+    """The particle filter does not run on a moving arm, which may come first."""
+    cells = [Cell("sara", tier=1, speed=0.5), Cell("sara", tier=1)]
+    write_trials(tmp_path / "trials.csv", [run_trial(cell, 0, 0, ("particles",)) for cell in cells])
+    with (tmp_path / "trials.csv").open() as file:
+        assert [bool(row["error_particles"]) for row in csv.DictReader(file)] == [False, True]
 
 
 def test_a_folder_that_cannot_be_made_is_told_before_the_work(tmp_path):

@@ -6,13 +6,15 @@ import pytest
 from scipy.optimize import lsq_linear
 
 import touchline as tl
+from touchline.bench.localization.cell import Cell
 from touchline.bench.localization.line_rules import first_entry, nearest_to_line
 from touchline.bench.localization.particle_filter import (
     ParticleFilter,
     least_misfit,
     tempered_weights,
 )
-from touchline.bench.localization.trial import Cell, arm_and_skin, make_scene, run_trial
+from touchline.bench.localization.scene import arm_and_skin, make_scene
+from touchline.bench.localization.trial import run_trial
 from touchline.contact.skin import Skin
 
 

@@ -2,6 +2,7 @@
 """Random touches of an arm at rest, and what its sensors report: no physics engine needed."""
 
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,8 @@ from touchline.model.robot import Robot
 from touchline.model.transforms import rotation_to_axis
 
 Array = NDArray[np.float64]
+
+TRIES = 200  # places on a segment, before another pose is tried
 
 
 @dataclass(frozen=True)
@@ -72,17 +75,25 @@ class TouchSampler:
             q: joint positions (n,) [rad or m].
             taken: rigid bodies that are not to be touched.
         """
-        given = q
         while True:
-            q = self._rng.uniform(*_limits(self.robot)) if given is None else given
-            patch = self._patches[self._rng.choice(len(self._patches), p=self._shares)]
-            if patch.body in taken:
-                continue
-            point, normal = self._point(patch, q)
-            if self._reachable(q, point, normal):
-                way = _in_cone(-normal, self._friction, self._rng)
-                if self._free(q, point, -way):
-                    return Touch(q, patch, point, normal, force * way)
+            touch = self.attempt(force, self.pose() if q is None else q, taken)
+            if touch is not None:
+                return touch
+
+    def pose(self) -> Array:
+        """Random joint positions (n,) [rad or m] within their limits."""
+        return self._rng.uniform(*_limits(self.robot))
+
+    def attempt(self, force: float, q: Array, taken: tuple[str, ...] = ()) -> Touch | None:
+        """A random touch, as of `sample`; None if that place is taken or cannot be reached."""
+        patch = self._patches[self._rng.choice(len(self._patches), p=self._shares)]
+        if patch.body in taken:
+            return None
+        point, normal = self._point(patch, q)
+        if not self._reachable(q, point, normal):
+            return None
+        way = _in_cone(-normal, self._friction, self._rng)
+        return Touch(q, patch, point, normal, force * way) if self._free(q, point, -way) else None
 
     def sample_several(self, count: int, force: float) -> list[Touch]:
         """Reachable touches of an arm in one random pose, at most one per rigid body."""
@@ -111,6 +122,32 @@ class TouchSampler:
     def _free(self, q: Array, point: Array, direction: Array) -> bool:
         crossings = self.skin.crossings(q, point, direction)
         return all(not 1e-6 < c.distance < self._clearance for c in crossings)
+
+
+def sample_on_each(
+    segments: tuple[str, ...],
+    skin: Skin,
+    rng: np.random.Generator,
+    force: float,
+    friction: float = 0.5,
+) -> list[Touch]:
+    """Reachable touches of an arm in one random pose in which all these segments can be reached.
+
+    Args:
+        segments: one touch on each, in this order.
+        skin: the robot's surfaces.
+        rng: source of chance.
+        force: [N].
+        friction: forces are uniform in this friction cone.
+    """
+    samplers = [TouchSampler(skin, rng, (name,), friction) for name in segments]
+    while True:
+        q, touches = samplers[0].pose(), []
+        for sampler in samplers:
+            tries = (sampler.attempt(force, q) for _ in range(TRIES))
+            touches += islice((touch for touch in tries if touch is not None), 1)
+        if len(touches) == len(samplers):
+            return touches
 
 
 def _limits(robot: Robot) -> tuple[Array, Array]:

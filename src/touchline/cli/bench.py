@@ -39,7 +39,7 @@ def localization(
     robots: tuple[Literal["panda", "panda-torques", "sara", "sara-full", "ur10"], ...] = ("panda",),
     contacts: tuple[Literal[1, 2, 3], ...] = (1, 2, 3),
     noise: tuple[Literal[0, 1, 2, 3], ...] = (0, 1, 2, 3),
-    begin: tuple[Literal["apart", "together"], ...] = ("apart", "together"),
+    begin: tuple[Literal["apart", "together", "segments"], ...] = ("apart", "together"),
     speeds: tuple[float, ...] = (0.0,),
     runs: int = 1000,
     baselines: tuple[Literal["first", "nearest", "particles"], ...] = (
@@ -58,7 +58,8 @@ def localization(
         robots: The arms; the pandas and ur10 need the package example-robot-data.
         contacts: How many contacts at once, at most one per rigid body.
         noise: Tiers of sensor noise, 0 is none.
-        begin: Several contacts begin 0.1 s apart, or at the same instant.
+        begin: Several contacts begin 0.1 s apart, or at the same instant; segments: one on each
+            segment of the arm at the same instant, beside each of them alone.
         speeds: Of every joint [rad/s]; 0 is an arm at rest.
         runs: Random poses and places per line of the tables.
         baselines: What runs along: the first entry of the line of force action, the surface

@@ -10,8 +10,11 @@ from numpy.typing import NDArray
 
 from touchline.bench.localization.arm import TIERS
 from touchline.bench.localization.baselines import BASELINES
+from touchline.bench.localization.cell import Cell
+from touchline.bench.localization.scene import arm_and_skin
 from touchline.bench.localization.surface_map import SurfaceMap, framing
-from touchline.bench.localization.trial import NEAR, Cell, Trial, arm_and_skin
+from touchline.bench.localization.touched import NEAR
+from touchline.bench.localization.trial import Trial
 from touchline.figure import FAINT, PAGE, SHADES, new_figure, panel_label, save, styled
 
 Array = NDArray[np.float64]
@@ -29,6 +32,7 @@ VIEWS = ((1.0, -1.0, 0.45), (-1.0, 1.0, 0.45))  # from where
 def save_figures(folder: Path, trials: Sequence[Trial]) -> list[str]:
     """Writes all figures that the trials allow into a folder; returns their names."""
     names = []
+    trials = [trial for trial in trials if trial.cell.begin != "segments"]
     for arm in dict.fromkeys(trial.cell.arm for trial in trials):
         own = [trial for trial in trials if trial.cell.arm == arm]
         save(distributions(own), folder, name := f"errors_{arm}")
@@ -115,8 +119,7 @@ def distributions(trials: Sequence[Trial]) -> Any:
             _curve(left, _errors(trials, cell), noise, SHADES[cell.tier])
         panel_label(middle, f"number, {TIERS[min(noisy)]}")
         for i, cell in enumerate(several):
-            begin = "" if cell.contacts == 1 else "together" if cell.together else "0.1 s apart"
-            label = f"{cell.contacts}, {begin}".strip(", ")
+            label = f"{cell.contacts}, {cell.timing}".strip(", ")
             _curve(middle, _errors(trials, cell), label, SHADES[i])
         panel_label(right, f"rules, {TIERS[min(noisy)]}")
         if compared:

@@ -6,9 +6,8 @@ free along the outward normal and along the way of the push, above the floor), 2
 cone, sensors at 1 kHz with white noise; all of it through the real pipeline.
 """
 
-import csv
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -19,6 +18,9 @@ import numpy as np
 
 from touchline.bench.localization.arm import ARMS
 from touchline.bench.localization.baselines import BASELINES
+from touchline.bench.localization.cell import Begin, Cell
+from touchline.bench.localization.scene import arm_and_skin, make_scene, touched_segments
+from touchline.bench.localization.segment_table import segment_tables
 from touchline.bench.localization.table import (
     baseline_table,
     failures,
@@ -26,15 +28,8 @@ from touchline.bench.localization.table import (
     rank_table,
     tables,
 )
-from touchline.bench.localization.trial import (
-    Cell,
-    Trial,
-    arm_and_skin,
-    flat,
-    make_pipeline,
-    make_scene,
-    run_trial,
-)
+from touchline.bench.localization.trial import Trial, make_pipeline, run_trial
+from touchline.bench.localization.trials_file import write_trials
 from touchline.bench.request import check_least, prepare_results
 from touchline.errors import InputError
 
@@ -50,7 +45,7 @@ class Plan:
         robots: names of arms.
         contacts: numbers of contacts.
         noise: numbers of tiers, 0 for none.
-        begin: "apart" and "together".
+        begin: of several, as of a `Cell`. With "segments", each touch also comes alone.
         speeds: of the joints [rad/s].
         runs: per cell.
         seed: of all that is random.
@@ -60,23 +55,40 @@ class Plan:
     robots: tuple[str, ...] = ARMS
     contacts: tuple[int, ...] = (1, 2, 3)
     noise: tuple[int, ...] = (0, 1, 2, 3)
-    begin: tuple[str, ...] = ("apart", "together")
+    begin: tuple[Begin, ...] = ("apart", "together")
     speeds: tuple[float, ...] = (0.0,)
     runs: int = 1000
     seed: int = 0
     baselines: tuple[str, ...] = tuple(BASELINES)
 
     def cells(self) -> list[Cell]:
-        """Every combination that there is."""
+        """Every combination that there is.
+
+        Raises:
+            InputError: an arm without a six-axis sensor has no segment to be touched.
+        """
         return [
-            Cell(arm, count, tier, begin == "together", speed)
+            cell
             for arm in self.robots
             for tier in self.noise
             for speed in self.speeds
-            for begin in self.begin
-            for count in self.contacts
-            if count > 1 or begin == self.begin[0]
+            for cell in self._of(arm, tier, speed)
         ]
+
+    def _of(self, arm: str, tier: int, speed: float) -> list[Cell]:
+        cells: list[Cell] = []
+        timings: list[Begin] = [begin for begin in self.begin if begin != "segments"]
+        if 1 in self.contacts and timings:
+            cells.append(Cell(arm, 1, tier, speed=speed))
+        for begin in timings:
+            cells += [Cell(arm, n, tier, begin, speed) for n in self.contacts if n > 1]
+        if "segments" in self.begin:
+            segments = touched_segments(arm_and_skin(arm, tier)[0])
+            if not segments:
+                raise InputError(f"--begin segments: {arm} has no six-axis sensor, so no segment")
+            each = Cell(arm, len(segments), tier, "segments", speed)
+            cells += [*each.each_alone(segments), each]
+        return cells
 
 
 def run_plan(plan: Plan, processes: int | None = None) -> Iterator[list[Trial]]:
@@ -135,12 +147,12 @@ def main(plan: Plan | None = None, out: Path | None = None, processes: int | Non
     plan = plan or Plan()
     check_least(1, runs=plan.runs)
     check_least(0, seed=plan.seed, **{"speeds": min(plan.speeds, default=0.0)})
-    if not plan.cells():
+    cells = plan.cells()
+    if not cells:
         raise InputError("nothing to run: one of robots, contacts, noise, begin, speeds is empty")
     prepare_results(out)
     for arm in plan.robots:
         arm_and_skin(arm, plan.noise[0])  # a missing model is told before the work
-    cells = plan.cells()
     trials: list[Trial] = []
     with tqdm(total=plan.runs * len(cells), desc="localization", disable=None, leave=False) as bar:
         for chunk in run_plan(plan, processes):
@@ -149,23 +161,14 @@ def main(plan: Plan | None = None, out: Path | None = None, processes: int | Non
     order = {cell: i for i, cell in enumerate(cells)}
     trials.sort(key=lambda trial: (order[trial.cell], trial.run))
     times = {cell: update_time(cell, plan.seed, min(TIMED, plan.runs)) for cell in cells}
-    parts = [tables(trials, times), published(), rank_table(trials), baseline_table(trials)]
-    parts.append(failures(trials))
+    parts = [tables(trials, times), segment_tables(trials, times), published()]
+    parts += [rank_table(trials), baseline_table(trials), failures(trials)]
     text = "\n\n".join(part for part in parts if part)
     print(text)
     if out is not None:
         (out / "tables.txt").write_text(text + "\n", encoding="utf-8")
-        write(out / "trials.csv", trials)
+        write_trials(out / "trials.csv", trials)
         from touchline.bench.localization.figures import save_figures
 
         save_figures(out, trials)
         print(f"\nTables, every touch, and figures are in {out}")
-
-
-def write(path: Path, trials: Sequence[Trial]) -> None:
-    """Writes one row per touch (.csv)."""
-    rows = [row for trial in trials for row in flat(trial)]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)

@@ -4,19 +4,25 @@
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from touchline.bench.localization.arm import TIERS
 from touchline.bench.localization.baselines import BASELINES
-from touchline.bench.localization.trial import GROSS, NEAR, Cell, Touched, Trial
+from touchline.bench.localization.cell import Cell
+from touchline.bench.localization.columns import (
+    TOUCHES,
+    millimetres,
+    percent,
+    rate_columns,
+    rms,
+    touch_columns,
+)
+from touchline.bench.localization.touched import GROSS, NEAR, Touched
+from touchline.bench.localization.trial import Trial
 from touchline.bench.tables import Row, aligned
-
-Array = NDArray[np.float64]
 
 HEAD: Row = (
     "contacts", "begin", "arm", "runs", "found", "95 % interval", "as event", "in the set",
-    "surely wrong", "body", "> 10 cm", "median", "p99", "RMS", "RMS found", "lag", "force",
-    "90 % holds", "unsure", "us",
+    "surely wrong", *TOUCHES,
 )  # fmt: skip
 # Contacts, found, RMS [mm], RMS of the force [N], time [ms], source.
 PUBLISHED = (
@@ -43,19 +49,11 @@ LEGEND = (
 )
 
 
-def wilson(good: int, of: int, z: float = 1.959964) -> tuple[float, float]:
-    """95 % score interval of a rate (Wilson 1927)."""
-    if of == 0:
-        return 0.0, 1.0
-    rate = good / of
-    centre = rate + z * z / (2 * of)
-    half = z * np.sqrt(rate * (1 - rate) / of + z * z / (4 * of * of))
-    return (centre - half) / (1 + z * z / of), (centre + half) / (1 + z * z / of)
-
-
 def tables(trials: Sequence[Trial], times: dict[Cell, float]) -> str:
-    """All cells, arm by arm and tier by tier."""
-    cells = list(dict.fromkeys(trial.cell for trial in trials))
+    """All cells but those with one contact on each segment, arm by arm and tier by tier."""
+    cells = [c for c in dict.fromkeys(t.cell for t in trials) if c.begin != "segments"]
+    if not cells:
+        return ""
     parts = []
     for arm in dict.fromkeys(cell.arm for cell in cells):
         for tier in sorted({cell.tier for cell in cells if cell.arm == arm}):
@@ -76,7 +74,9 @@ def published() -> str:
 
 def rank_table(trials: Iterable[Trial]) -> str:
     """Pairs that begin together, by the rank of their equations; empty without such pairs."""
-    pairs = [trial for trial in trials if trial.cell.together and trial.cell.contacts == 2]
+    pairs = [
+        trial for trial in trials if trial.cell.begin == "together" and trial.cell.contacts == 2
+    ]
     if not pairs:
         return ""
     rows: list[Row] = [
@@ -108,11 +108,11 @@ def baseline_table(trials: Iterable[Trial]) -> str:
         for method, error in ((BASELINES[name], errors), ("  ours, on these runs", ours)):
             near = error < NEAR
             rows.append((
-                cell.arm, str(TIERS[cell.tier]), str(cell.contacts), _timing(cell), method,
-                str(len(own)), _percent(np.mean(near.all(axis=1))),
-                _percent(np.mean(error > GROSS)),
-                _mm(np.nanmedian(error)) if np.isfinite(error).any() else "-",
-                _mm(_rms(error[near])),
+                cell.arm, str(TIERS[cell.tier]), str(cell.contacts), cell.timing, method,
+                str(len(own)), percent(np.mean(near.all(axis=1))),
+                percent(np.mean(error > GROSS)),
+                millimetres(np.nanmedian(error)) if np.isfinite(error).any() else "-",
+                millimetres(rms(error[near])),
             ))  # fmt: skip
     if len(rows) == 1:
         return ""
@@ -141,64 +141,26 @@ def _failure(trial: Trial, touch: Touched) -> Row:
     return (
         trial.cell.arm,
         str(trial.cell.contacts),
-        _timing(trial.cell),
+        trial.cell.timing,
         str(trial.run),
         touch.link,
         touch.found_link or "-",
-        _mm(touch.error),
+        millimetres(touch.error),
         touch.status,
         same,
-        _mm(touch.candidate_error),
+        millimetres(touch.candidate_error),
     )
 
 
 def _line(cell: Cell, trials: list[Trial], time: float) -> Row:
-    touches = [touch for trial in trials for touch in trial.touches]
-    error = np.array([touch.error for touch in touches])
-    known = error[np.isfinite(error)]
-    level = np.array([touch.level for touch in touches])
-    good = sum(trial.found for trial in trials)
-    low, high = wilson(good, len(trials))
     return (
         str(cell.contacts),
-        _timing(cell),
-        f"{cell.speed:g} rad/s" if cell.speed else "at rest",
+        cell.timing,
+        cell.motion,
         str(len(trials)),
-        _percent(good / len(trials)),
-        f"{100 * low:.2f}-{100 * high:.2f}",
-        _percent(np.mean([trial.event_found for trial in trials])),
-        _percent(np.mean([trial.in_set for trial in trials])),
-        _percent(np.mean([trial.confidently_wrong for trial in trials])),
-        _percent(np.mean([touch.found_body == touch.body for touch in touches])),
-        _percent(np.mean(error > GROSS)),
-        *(_mm(np.percentile(known, p) if len(known) else np.nan) for p in (50, 99)),
-        _mm(_rms(known)),
-        _mm(_rms(known[known < NEAR])),
-        _lag(np.array([touch.lag for touch in touches])),
-        f"{_rms(np.array([touch.force_error for touch in touches])):.3f}",
-        _percent(np.mean(level[np.isfinite(level)] < 0.9)) if np.isfinite(level).any() else "-",
-        _percent(np.mean([touch.status != "located" for touch in touches])),
-        f"{1e6 * time:.0f}" if np.isfinite(time) else "-",
+        *rate_columns(sum(trial.found for trial in trials), len(trials)),
+        percent(np.mean([trial.event_found for trial in trials])),
+        percent(np.mean([trial.in_set for trial in trials])),
+        percent(np.mean([trial.confidently_wrong for trial in trials])),
+        *touch_columns([touch for trial in trials for touch in trial.touches], time),
     )
-
-
-def _lag(lags: Array) -> str:
-    known = lags[np.isfinite(lags)]
-    return f"{np.median(known):.3f}, {np.percentile(known, 99):.2f}" if len(known) else "-"
-
-
-def _timing(cell: Cell) -> str:
-    return "" if cell.contacts == 1 else "together" if cell.together else "0.1 s apart"
-
-
-def _rms(values: Array) -> float:
-    values = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
-
-
-def _percent(rate: float | np.floating) -> str:
-    return f"{100 * rate:.2f} %"
-
-
-def _mm(length: float | np.floating) -> str:
-    return f"{1e3 * length:.2f}" if np.isfinite(length) else "-"

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the localization benchmark varies from one line of its tables to the next."""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+Begin = Literal["apart", "together", "segments"]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What is varied.
+
+    Attributes:
+        arm: name of the arm.
+        contacts: how many.
+        tier: of noise.
+        begin: of several: "apart" by 0.1 s, "together" at the same instant; "segments": one on
+            each segment that begins at a six-axis sensor, all at the same instant.
+        speed: of every joint [rad/s]; 0: at rest.
+        alone: with "segments", the name of the only segment that is touched, at the same place of
+            the same pose; "" for all of them.
+    """
+
+    arm: str
+    contacts: int = 1
+    tier: int = 0
+    begin: Begin = "apart"
+    speed: float = 0.0
+    alone: str = ""
+
+    @property
+    def turning(self) -> bool:
+        """Do forces turn with their links, on an arm in motion?
+
+        Where the arm turns fast, a force that is constant in world soon leaves its friction cone;
+        but contacts on one segment are told apart by forces that do not all change.
+        """
+        return self.contacts == 1 or self.begin == "segments"
+
+    @property
+    def timing(self) -> str:
+        """How several contacts begin, in words."""
+        if self.begin == "segments":
+            return f"{self.alone} alone" if self.alone else "each segment"
+        if self.contacts == 1:
+            return ""
+        return "together" if self.begin == "together" else "0.1 s apart"
+
+    @property
+    def motion(self) -> str:
+        """What the arm does, in words."""
+        return f"{self.speed:g} rad/s" if self.speed else "at rest"
+
+    def each_alone(self, segments: tuple[str, ...]) -> list["Cell"]:
+        """The touches of this cell one at a time; nothing where there is but one."""
+        return [replace(self, alone=name) for name in segments] if len(segments) > 1 else []

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The touches of one run and the signals they make.
+
+Everything random follows from the seed, the cell and the number of the run, so that the result
+does not depend on how runs are spread over processes.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.bench.localization.arm import load_arm
+from touchline.bench.localization.cell import Cell
+from touchline.bench.localization.moving import moving_signals
+from touchline.bench.touches import (
+    Signals,
+    Touch,
+    TouchSampler,
+    resting_signals,
+    sample_on_each,
+)
+from touchline.contact.skin import Skin
+from touchline.model.robot import Robot
+
+Array = NDArray[np.float64]
+
+FORCE = 20.0  # N
+FIRST, APART = 0.55, 0.1  # s: the first onset, after settling and a quiet half second, then each
+FRICTION = 0.5
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The touches of a run with their onsets [s], and the signals they make.
+
+    Forces are constant in world, or turn with their links (`turning`).
+    """
+
+    touches: list[tuple[Touch, float]]
+    signals: Signals
+    turning: bool = False
+
+
+@lru_cache(maxsize=8)
+def arm_and_skin(arm: str, tier: int) -> tuple[Robot, Skin]:
+    """An arm and its surfaces, kept from run to run."""
+    robot = load_arm(arm, tier)
+    return robot, Skin(robot)
+
+
+def touched_segments(robot: Robot) -> tuple[str, ...]:
+    """Those that begin at a six-axis sensor."""
+    return tuple(name for name in robot.segment_names if name != "root")
+
+
+def make_scene(cell: Cell, run: int, seed: int = 0) -> Scene:
+    """The touches and signals of one run.
+
+    Tiers, timing, and whether a touch is alone do not change pose and places.
+    """
+    robot, skin = arm_and_skin(cell.arm, cell.tier)
+    chance = np.random.default_rng([seed, run, cell.contacts, *cell.arm.encode()])
+    touches = _sample(cell, robot, skin, chance)
+    step = APART if cell.begin == "apart" else 0.0
+    onsets = [(touch, FIRST + i * step) for i, touch in enumerate(touches)]
+    duration = onsets[-1][1] + APART
+    if cell.alone:
+        onsets = [pair for pair in onsets if pair[0].patch.segment == cell.alone]
+    noise = np.random.default_rng([seed, run, cell.tier, 1]) if cell.tier else None
+    if not cell.speed:
+        return Scene(onsets, resting_signals(robot, touches[0].q, onsets, duration, noise))
+    signals = moving_signals(
+        robot, onsets, duration, cell.speed, chance, noise, turning=cell.turning
+    )
+    return Scene(onsets, signals, cell.turning)
+
+
+def _sample(cell: Cell, robot: Robot, skin: Skin, chance: np.random.Generator) -> list[Touch]:
+    if cell.begin == "segments":
+        return sample_on_each(touched_segments(robot), skin, chance, FORCE, FRICTION)
+    return TouchSampler(skin, chance, friction=FRICTION).sample_several(cell.contacts, FORCE)
+
+
+def true_places(robot: Robot, scene: Scene, q: Array) -> Array:
+    """The touched points (m, 3) [m] in world at joint positions `q` (n,)."""
+    start, now = robot.poses(scene.touches[0][0].q), robot.poses(q)
+    places = []
+    for touch, _ in scene.touches:
+        node = touch.patch.node
+        local = start[node][:3, :3].T @ (touch.position - start[node][:3, 3])
+        places.append(now[node][:3, :3] @ local + now[node][:3, 3])
+    return np.array(places)

@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the pipeline made of each touch of a run."""
+
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.bench.localization.credibility import credibility
+from touchline.bench.localization.matching import distances, match
+from touchline.bench.localization.moving import carried
+from touchline.bench.localization.scene import Scene, true_places
+from touchline.bench.touches import Touch
+from touchline.contact.answer import Answer
+from touchline.contact.event import Event
+from touchline.contact.pipeline import Pipeline
+from touchline.model.robot import Robot
+
+Array = NDArray[np.float64]
+
+NEAR, GROSS = 0.0225, 0.1  # m: what counts as found, and as grossly wrong
+FAST = 0.2  # m/s: slower contacts tell nothing of lag
+
+
+@dataclass(frozen=True)
+class Touched:
+    """One of a run's touches and what was made of it; NaN and "" where nothing was located.
+
+    Attributes:
+        link: the touched link, `body` its rigid body on `segment`, x, y, z the point in the link's
+            frame [m].
+        on_segment: how many places are named on that segment at the last sample.
+        error: distance of the located point from the true one at the last sample [m].
+        force_error: of the force [N].
+        found_link: that was named, on `found_body`.
+        status: of the contact that was matched with this touch.
+        std: root of the trace of its covariance [m].
+        level: probability of the smallest credible region that holds the truth: `Region.level` of
+            a single contact, `credibility` of one of several and of those on different segments.
+        event_error: distance of the event's position at its own time [m].
+        event_body: of the event.
+        candidate: probability of the best candidate within reach of the truth; 0: there is none.
+        candidate_error: distance of the candidate nearest to the truth [m].
+        lag: of an arm in motion, `error` in parts of |v| / K: the way that a point with the speed
+            |v| across its force is seen behind its place without compensation; NaN below `FAST`.
+    """
+
+    link: str
+    body: str
+    segment: str
+    on_segment: int
+    x: float
+    y: float
+    z: float
+    error: float = np.nan
+    force_error: float = np.nan
+    found_link: str = ""
+    found_body: str = ""
+    status: str = "missed"
+    std: float = np.nan
+    level: float = np.nan
+    event_error: float = np.nan
+    event_body: str = ""
+    candidate: float = 0.0
+    candidate_error: float = np.nan
+    lag: float = np.nan
+
+    @property
+    def found(self) -> bool:
+        """It is found at the last sample, and nothing else is named on its segment."""
+        return self.on_segment == 1 and self.error < NEAR
+
+    @property
+    def in_set(self) -> bool:
+        """It is near one of the explanations that are returned."""
+        return self.error < NEAR or self.candidate > 0
+
+    @property
+    def surely_wrong(self) -> bool:
+        """A place for it is called located, and is wrong."""
+        return self.status == "located" and not self.error < NEAR
+
+
+def last_answers(pipeline: Pipeline, scene: Scene) -> list[tuple[str, Answer]]:
+    """What is said of each contact at the last sample, and on which segment it is."""
+    table = pipeline.contacts
+    last = table.sample == len(scene.signals.time) - 1
+    return [
+        (pipeline.robot.segment_names[segment], pipeline.localizer.answer(row))
+        for segment, row in zip(table.segment[last], table.answers[last], strict=True)
+    ]
+
+
+def judge(pipeline: Pipeline, scene: Scene, with_region: bool) -> list[Touched]:
+    """Every touch of a scene that the pipeline has taken.
+
+    Args:
+        pipeline: after all samples.
+        scene: that it took.
+        with_region: the posterior of a single contact is worked out for its `level`.
+    """
+    robot, signals = pipeline.robot, scene.signals
+    places = true_places(robot, scene, signals.q[-1])
+    said = last_answers(pipeline, scene)
+    answers = [answer for _, answer in said]
+    mine = match(distances(places, [answer.position for answer in answers]))
+    apart = _event_distances(pipeline.events, robot, scene)
+    my_event = match(apart)
+    judged = []
+    for i, (touch, _) in enumerate(scene.touches):
+        about = _where(robot, touch)
+        on_segment = [a for segment, a in said if segment == about["segment"]]
+        about["on_segment"] = sum(answer.position is not None for answer in on_segment)
+        if (k := my_event[i]) is not None:
+            body = pipeline.events[k].body or ""
+            about |= {"event_error": float(apart[i, k]), "event_body": body}
+        if (k := mine[i]) is not None:
+            about |= _of_answer(answers[k], touch, places[i])
+            about |= _in_motion(answers[k], robot, scene, touch)
+            if with_region and len(answers) == 1:
+                with suppress(ValueError):  # else as of a known contact, from its covariance
+                    region = pipeline.localizer.region()
+                    about["level"] = region.level(touch.patch.link, places[i])
+        about |= _of_candidates(answers, touch, places[i])
+        judged.append(Touched(**about))
+    return judged
+
+
+def _where(robot: Robot, touch: Touch) -> dict[str, Any]:
+    here = touch.patch
+    T = robot.poses(touch.q)[here.node] @ here.T_node_link
+    x, y, z = (T[:3, :3].T @ (touch.position - T[:3, 3])).tolist()
+    return {"link": here.link, "body": here.body, "segment": here.segment, "x": x, "y": y, "z": z}
+
+
+def _event_distances(events: list[Event], robot: Robot, scene: Scene) -> Array:
+    """Distances (m, k) [m] of the events' positions from the places at their times."""
+    signals, columns = scene.signals, []
+    for event in events:
+        time = np.inf if event.time_of_position is None else event.time_of_position
+        row = min(int(np.searchsorted(signals.time, time)), len(signals.time) - 1)
+        places = true_places(robot, scene, signals.q[row])
+        columns.append(distances(places, [event.position])[:, 0])
+    return np.array(columns).reshape(len(events), len(scene.touches)).T
+
+
+def _of_answer(answer: Answer, touch: Touch, place: Array) -> dict:
+    """What is said of a touch by an answer with a position."""
+    covariance = np.full((3, 3), np.nan) if answer.covariance is None else answer.covariance
+    position, force = (
+        np.full(3, np.nan) if x is None else x for x in (answer.position, answer.force)
+    )
+    return {
+        "error": float(np.linalg.norm(position - place)),
+        "force_error": float(np.linalg.norm(force - touch.force)),
+        "found_link": answer.link or "",
+        "found_body": answer.body or "",
+        "status": answer.status or "",
+        "std": float(np.sqrt(np.trace(covariance))),
+        "level": credibility(answer, touch.patch.body, place),
+    }
+
+
+def _in_motion(answer: Answer, robot: Robot, scene: Scene, touch: Touch) -> dict:
+    """Lag, and the error of a force that has turned with its link, on an arm in motion."""
+    s = scene.signals
+    points, forces = carried(robot, touch, s.q[-2:])
+    force = forces[-1] if scene.turning else touch.force
+    about: dict[str, float] = {}
+    if answer.force is not None:
+        about["force_error"] = float(np.linalg.norm(answer.force - force))
+    velocity = (points[1] - points[0]) / (s.time[-1] - s.time[-2])
+    along = force / np.linalg.norm(force)
+    speed = float(np.linalg.norm(velocity - along * (along @ velocity)))
+    if answer.position is not None and touch.patch.segment is not None and speed > FAST:
+        error = float(np.linalg.norm(answer.position - points[1]))
+        about["lag"] = error * robot.description.bandwidth_sensors[touch.patch.segment] / speed
+    return about
+
+
+def _of_candidates(answers: list[Answer], touch: Touch, place: Array) -> dict:
+    known = [k for answer in answers for k in answer.candidates if k.body == touch.patch.body]
+    if not known:
+        return {}
+    errors = [float(np.linalg.norm(k.position - place)) for k in known]
+    near = [
+        k.probability
+        for k, error in zip(known, errors, strict=True)
+        if error < max(NEAR, k.radius)  # a candidate may stand for a part of its link
+    ]
+    return {"candidate": max(near, default=0.0), "candidate_error": min(errors)}
