@@ -59,6 +59,14 @@ struct JointEstimate {
     out.remove(c);
   }
 
+  // How old that is which each force speaks of, at a time [s].
+  void age(double bandwidth, double time) {
+    for (int c = 0; c < count; ++c) {
+      KnownContact& k = known[c];
+      k.lag = k.age.follow(k.force, bandwidth, time) / bandwidth;
+    }
+  }
+
   // What forces that are held and places that are kept do in a time [s]. A force of which the filter
   // does not show all yet will go on to change: it is younger than 1 / K.
   void creep(double passed, double bandwidth) {

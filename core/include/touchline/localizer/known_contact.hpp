@@ -103,6 +103,17 @@ inline void keep(const Answer& answer, const LinkSurfaces& surfaces, KnownContac
   known.place = {element(0, 0), element(0, 1), element(1, 1)};
 }
 
+// A contact of that number, at the place where it has been found.
+inline KnownContact found_contact(int serial, const Answer& answer, const LinkSurfaces& surfaces,
+                                  const Age& age, double lag) {
+  KnownContact known;
+  keep(answer, surfaces, known);
+  known.serial = serial;
+  known.age = age;
+  known.lag = lag;
+  return known;
+}
+
 // What is said of a known contact now.
 inline void report(const KnownContact& known, const LinkSurfaces& surfaces, Answer& answer) {
   answer = Answer{};

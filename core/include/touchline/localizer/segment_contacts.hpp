@@ -2,9 +2,20 @@
 // What is remembered of the contacts on one segment from sample to sample.
 #pragma once
 
+#include <algorithm>
+
 #include "touchline/localizer/joint_estimate.hpp"
 
 namespace touchline {
+
+// A sample of a segment.
+struct SegmentSample {
+  int segment = 0;
+  double bandwidth = 0.0, time = 0.0;  // of the filter [rad/s], [s]
+  double lag = 0.0;                    // how old that is which the segment's wrench speaks of [s]
+
+  double brief() const { return 1.0 / bandwidth; }  // the memory of the filter [s]
+};
 
 struct SegmentContacts {
   static constexpr int kMost = JointEstimate::kMost;
@@ -71,6 +82,19 @@ struct SegmentContacts {
     if (before.contacts.count == contacts.count) return;
     before.contacts = contacts;
     before.time = time;
+  }
+
+  // What may have become of the contacts up to an instant.
+  void creep(const SegmentSample& now) {
+    contacts.creep(std::max(0.0, now.time - crept), now.bandwidth);
+    crept = now.time;
+  }
+
+  // All that the sample of this instant tells has been taken over.
+  void know(const SegmentSample& now) {
+    updated = now.time + now.brief();
+    crept = restless = now.time;
+    forget_references();
   }
 
   void forget_references() { now.contacts.count = before.contacts.count = 0; }

@@ -30,11 +30,10 @@ class Slides {
   // explains best. Then all are reported, also where a sample says otherwise in between; once it
   // rests they are known from where it does.
   template <class Read>
-  Outcome follow(SegmentContacts& s, int g, double lag, double bandwidth, double time,
-                 Read&& read) {
+  Outcome follow(SegmentContacts& s, const SegmentSample& now, Read&& read) {
     const JointEstimate& before = s.before.contacts;
-    const double brief = 1.0 / bandwidth, way = kFastest * (time - s.since + brief);
-    const double passed = 0.5 * bandwidth * std::max(0.0, time - s.weighed);
+    const double time = now.time, brief = now.brief(), way = kFastest * (time - s.since + brief);
+    const double passed = 0.5 * now.bandwidth * std::max(0.0, time - s.weighed);
     s.weighed = time;
     int slider = -1;
     for (int c = 0; c < before.count; ++c) {
@@ -43,7 +42,8 @@ class Slides {
         before.copy_without(c, others_);
         fit_.take_out(others_, Change::none(), measurement_);
       }
-      const Answer& a = single_.locate(g, before.count > 1 ? before.known[c].lag : lag, measurement_);
+      const double lag = before.count > 1 ? before.known[c].lag : now.lag;
+      const Answer& a = single_.locate(now.segment, lag, measurement_);
       const bool can = within_reach(before.known[c], a, single_.surfaces(), way);
       s.against[c] += passed * (can ? a.chi2 : chi2_limit(measurement_.size(), kNever));
       if (!can || (slider >= 0 && s.against[c] > s.against[slider])) continue;
@@ -111,11 +111,7 @@ class Slides {
   // Contact c is where it was found now.
   void rest(JointEstimate& contacts, int c) {
     KnownContact& k = contacts.known[c];
-    const Age age = k.age;
-    const double lag = k.lag;
-    keep(answer_, single_.surfaces(), k);
-    k.age = age;
-    k.lag = lag;
+    k = found_contact(k.serial, answer_, single_.surfaces(), k.age, k.lag);
     contacts.forget(c, settings_.force_scale);
     fit_.weigh(contacts, measurement_);
     fit_.begin(measurement_, contacts);

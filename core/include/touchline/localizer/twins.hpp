@@ -26,17 +26,18 @@ class Twins {
 
   // One contact explains nothing, from the beginning: looks for two, again and again while their
   // forces rise, then ever more rarely.
-  void follow(SegmentContacts& s, int g, const Answer& one, double lag, double bandwidth,
-              double time) {
+  void follow(SegmentContacts& s, const Answer& one, const SegmentSample& now) {
+    const double time = now.time;
     if (s.apart < 0.0) {
       s.apart = time;
       s.next_search = time;
     }
     if (time >= s.next_search) {
-      pairs_.search(g, lag, measurement_);
-      take(s, one, lag);
+      pairs_.search(now.segment, now.lag, measurement_);
+      take(s, one, now.lag);
       s.searched = time;
-      s.next_search = time + std::max(SegmentContacts::kRefit / bandwidth, 0.5 * (time - s.apart));
+      const double least = SegmentContacts::kRefit * now.brief();
+      s.next_search = time + std::max(least, 0.5 * (time - s.apart));
     } else if (s.paired) {
       if (known_.explain_freely(s.pair)) fit_.accept(s.pair, known_.change(), 0.0);
     }
@@ -51,14 +52,12 @@ class Twins {
     s.pair.known[0].serial = s.first;
     s.pair.known[1].serial = s.twin;
     for (int k = 0; k < 2; ++k) reports_.add(s.pair.known[k]);
-    if (s.searched - s.apart < SegmentContacts::kYoung / bandwidth) return;
+    if (s.searched - s.apart < SegmentContacts::kYoung * now.brief()) return;
     s.contacts = s.pair;
     s.twin = -1;
     s.paired = false;
     s.apart = -1.0;
-    s.updated = time + 1.0 / bandwidth;
-    s.crept = time;
-    s.forget_references();
+    s.know(now);
   }
 
   void forget(SegmentContacts& s) {
@@ -76,12 +75,8 @@ class Twins {
     if (!s.paired) return said_.name_all(pairs_, s.inseparable);
     s.pair.count = 0;
     for (int k = 0; k < 2; ++k) {
-      KnownContact contact;
       said_.name(pairs_, k, measurement_.size(), answer_);
-      keep(answer_, surfaces_, contact);
-      contact.lag = lag;
-      contact.age = s.age;
-      s.pair.add(contact, settings_.force_scale);
+      s.pair.add(found_contact(-1, answer_, surfaces_, s.age, lag), settings_.force_scale);
     }
     fit_.begin(measurement_, s.pair);
     fit_.judge(s.pair);
