@@ -34,7 +34,9 @@ def summary_text(result: Calibration) -> str:
 
 def _noise_lines(result: Calibration) -> list[str]:
     noise = result.noise
-    lines = ["noise, 1 sigma per sample", f"  qd   {_range(noise.qd)} rad/s"]
+    lines = ["noise, 1 sigma per sample"]
+    if noise.qd:
+        lines.append(f"  qd   {_range(noise.qd)} rad/s")
     if any(joint.measured for joint in result.robot.description.joints):
         lines.append(f"  tau  {_range(noise.tau)} Nm")
     for name, six in noise.sensors.items():

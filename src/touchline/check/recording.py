@@ -63,7 +63,7 @@ def _compare(
         line = "  too short, or too many gaps, to compare readings with the model"
         findings.note("recording", line)
         return
-    still = np.abs(windows.slope).max(axis=1) < STILL
+    still = np.abs(windows.slope).max(axis=1, initial=0.0) < STILL
     findings.note(
         "recording",
         f"  {len(windows)} pieces compared with the model, the arm at rest in {int(still.sum())} "

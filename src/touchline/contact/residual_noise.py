@@ -29,7 +29,7 @@ def residual_noise(robot: Robot, period: float) -> tuple[Array, dict[str, Array]
     segments = {name: np.zeros(6) for name in robot.segment_names if name != "root"}
     for q in _configurations(robot):
         momenta = [robot.terms(q, speed)[0] for speed in np.diag(noise.qd)]
-        columns = np.stack(momenta, axis=-1).reshape(n + 6 * k, n)
+        columns = np.array(momenta).reshape(n, n + 6 * k).T
         momentum_var = np.maximum(momentum_var, np.square(K[:, None] * columns[:n]).sum(axis=1))
         for name, so_far in segments.items():
             variance = _segment_variance(robot, name, q, columns[n:].reshape(k, 6, n), period)

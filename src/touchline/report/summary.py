@@ -93,7 +93,7 @@ def _residuals(analysis: Analysis) -> list[str]:
     for joint in joint_facts(robot, statistics, analysis.thresholds):
         values = (joint.rms, joint.quiet_rms, joint.mean, joint.largest, joint.threshold)
         rows.append([joint.name, *(number(value, 3) for value in values)])
-    lines = table(rows, indent="")
+    lines = table(rows, indent="") if robot.joint_names else []
     segments = segment_facts(robot, statistics, analysis.thresholds)
     if segments:
         head = ["external wrench", "RMS [N]", "without contact", "RMS [Nm]", "without contact"]
@@ -102,7 +102,7 @@ def _residuals(analysis: Analysis) -> list[str]:
             forces = (segment.force_rms, segment.quiet_force_rms)
             moments = (segment.moment_rms, segment.quiet_moment_rms)
             rows.append([segment.name, *(number(value, 3) for value in (*forces, *moments))])
-        lines += ["", *table(rows, indent="")]
+        lines += [*[""][: len(lines)], *table(rows, indent="")]
     return lines
 
 
