@@ -1,30 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The headers alone: the C++ example, no allocation per step, clean under sanitizers."""
 
-import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
+from program import COMPILER, compile_program, run_program
 
 ROOT = Path(__file__).parents[2]
-COMPILER = shutil.which("g++") or shutil.which("c++")
-FLAGS = ("-std=c++17", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-ffp-contract=off")
 
 pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C++ compiler on this machine")
-
-
-def compile_program(source, target, *flags):
-    """Compiles one file against the headers; returns what the compiler said of an error."""
-    command = [COMPILER, *FLAGS, *flags, f"-I{ROOT / 'core' / 'include'}", source, "-o", target]
-    return subprocess.run(
-        [str(part) for part in command], check=False, capture_output=True, text=True
-    ).stderr
-
-
-def run_program(program):
-    return subprocess.run([str(program)], capture_output=True, text=True, check=True)
 
 
 def test_example_prints_the_push(tmp_path):

@@ -10,7 +10,7 @@ namespace touchline {
 
 // One point of a pair, with its force.
 struct PairEnd {
-  int surface = -1, node = -1;
+  int surface = -1, body = -1, node = -1;  // `body`: of the segment's
   Vec3 point, normal, force;
   double along[3] = {};  // covariance of the two tangent coordinates
 };

@@ -4,6 +4,8 @@
 // that of a plain double, lane by lane, so the numbers are the same to the last bit.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 
 namespace touchline {
@@ -31,5 +33,38 @@ inline void set_lane(double& v, int, double x) { v = x; }
 inline double lane(const Lanes& v, int i) { return v[i]; }
 inline void set_lane(Lanes& v, int i, double x) { v[i] = x; }
 #endif
+
+inline Lanes all_lanes(double x) { return Lanes{} + x; }
+
+inline Lanes root(Lanes x) {
+  for (int k = 0; k < kLanes; ++k) set_lane(x, k, std::sqrt(lane(x, k)));
+  return x;
+}
+
+inline Lanes larger(const Lanes& a, const Lanes& b) { return a > b ? a : b; }
+inline Lanes smaller(const Lanes& a, const Lanes& b) { return a < b ? a : b; }
+
+inline double smallest(const Lanes& a) {
+  double least = lane(a, 0);
+  for (int k = 1; k < kLanes; ++k) least = std::min(least, lane(a, k));
+  return least;
+}
+
+inline bool any_below(const Lanes& a, const Lanes& b) {
+  bool any = false;
+  for (int k = 0; k < kLanes; ++k) any |= lane(a, k) < lane(b, k);
+  return any;
+}
+
+// To 2e-8 (Abramowitz and Stegun, Handbook of Mathematical Functions, 4.4.46).
+inline Lanes arc_cosine(const Lanes& x) {
+  constexpr double kTerms[] = {-0.0012624911, 0.0066700901, -0.0170881256, 0.0308918810,
+                               -0.0501743046, 0.0889789874, -0.2145988016, 1.5707963050};
+  const Lanes size = smaller(larger(x, -x), all_lanes(1.0));
+  Lanes sum = all_lanes(0.0);
+  for (double term : kTerms) sum = sum * size + term;
+  sum = root(all_lanes(1.0) - size) * sum;
+  return x < all_lanes(0.0) ? all_lanes(3.141592653589793) - sum : sum;
+}
 
 }  // namespace touchline

@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Programs compiled against the headers alone."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+COMPILER = shutil.which("g++") or shutil.which("c++")
+FLAGS = ("-std=c++17", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-ffp-contract=off")
+
+
+def compile_program(source, target, *flags):
+    """Compiles one file against the headers; returns what the compiler said of an error."""
+    command = [COMPILER, *FLAGS, *flags, f"-I{ROOT / 'core' / 'include'}", source, "-o", target]
+    return subprocess.run(
+        [str(part) for part in command], check=False, capture_output=True, text=True
+    ).stderr
+
+
+def run_program(program):
+    return subprocess.run([str(program)], capture_output=True, text=True, check=True)
