@@ -87,7 +87,8 @@ def test_every_command_takes_it(probe, tmp_path, capsys):
     assert np.linalg.norm(np.array(event["position"]) - touch.position) < 1e-3
 
 
-def test_a_simulation_needs_joints(probe, tmp_path, capsys):
-    command = ["simulate", "random_pushes", "--robot", str(probe), "--out", str(tmp_path / "x.csv")]
+@pytest.mark.parametrize("scenario", ["free_motion", "three_touches", "random_pushes", "demo"])
+def test_a_simulation_needs_joints(probe, tmp_path, capsys, scenario):
+    command = ["simulate", scenario, "--robot", str(probe), "--out", str(tmp_path / "x.csv")]
     assert main(command) == 2
     assert "has no joint" in capsys.readouterr().err

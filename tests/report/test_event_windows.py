@@ -32,8 +32,10 @@ def test_a_window_holds_the_extremes_around_its_event(cuts, seed):
     time = 3.0 + PERIOD * np.arange(2000)
     values = rng.normal(size=(2000, 2))
     values[rng.random(2000) < 0.05, 0] = np.nan
-    event = Event(0, "base", "contact", float(time[700]), cleared=float(time[900]))
-    last = Event(1, "base", "contact", float(time[1900]))
+    event = Event(
+        id=0, segment="base", level="contact", detected=float(time[700]), cleared=float(time[900])
+    )
+    last = Event(id=1, segment="base", level="contact", detected=float(time[1900]))
     windows = streamed(time, values, [event, last], sorted(cuts))
     for found, end in ((event, event.cleared + AFTER), (last, time[-1])):
         window = windows.get(found)
@@ -50,7 +52,7 @@ def test_a_window_holds_the_extremes_around_its_event(cuts, seed):
 def test_bad_stamps_do_not_spoil_a_window():
     time = PERIOD * np.arange(1000)
     time[400], time[405] = np.nan, 1e9
-    event = Event(0, "base", "contact", 3.5, cleared=5.0)
+    event = Event(id=0, segment="base", level="contact", detected=3.5, cleared=5.0)
     window = streamed(time, np.ones((1000, 1)), [event], (300, 402)).get(event)
     assert window.start == pytest.approx(3.1) and len(window.low) <= 256
     assert np.nanmin(window.low) == np.nanmax(window.high) == 1.0
@@ -59,7 +61,10 @@ def test_bad_stamps_do_not_spoil_a_window():
 def test_memory_is_bounded(monkeypatch):
     monkeypatch.setattr(event_windows, "MOST_WINDOWS", 3)
     time = PERIOD * np.arange(1000)
-    events = [Event(i, "base", "contact", 0.5 + i, cleared=0.7 + i) for i in range(8)]
+    events = [
+        Event(id=i, segment="base", level="contact", detected=0.5 + i, cleared=0.7 + i)
+        for i in range(8)
+    ]
     windows = streamed(time, np.ones((1000, 1)), events)
     assert [windows.get(e) is not None for e in events] == [True] * 3 + [False] * 5
 

@@ -267,7 +267,15 @@ def test_words_of_an_svg_are_escaped(robot):
 def test_an_event_with_a_place_is_drawn_on_the_link_as_it_stands(robot):
     force, on_link = np.array([0.0, -25.0, 0.0]), np.array([0.0, 0.07, 0.2])
     T = robot.T_world_links(Q)["link3"]
-    event = Event(3, "base", "contact", 1.0, force=force, status="located", link="link3")
+    event = Event(
+        id=3,
+        segment="base",
+        level="contact",
+        detected=1.0,
+        force=force,
+        status="located",
+        link="link3",
+    )
     event.position, event.position_link, event.position_std = np.zeros(3), on_link, 0.02
     scene = event_scene(robot, event, Q, [(np.ones(3), force)])
     truth, estimate = scene.marks
@@ -278,7 +286,9 @@ def test_an_event_with_a_place_is_drawn_on_the_link_as_it_stands(robot):
 
 
 def test_an_event_without_a_place_claims_none(robot):
-    event = Event(0, "base", "contact", 1.0, force=np.array([5.0, 0.0, 0.0]))
+    event = Event(
+        id=0, segment="base", level="contact", detected=1.0, force=np.array([5.0, 0.0, 0.0])
+    )
     scene = event_scene(robot, event, Q)
     assert [mark.is_point for mark in scene.marks] == [False]
     event.status = "ambiguous"
@@ -296,7 +306,7 @@ def test_an_event_without_a_place_claims_none(robot):
 
 
 def test_the_arm_is_drawn_as_it_stood(robot):
-    poses, event = EventPoses(), Event(0, "base", "contact", detected=0.25)
+    poses, event = EventPoses(), Event(id=0, segment="base", level="contact", detected=0.25)
     time = np.arange(10) * 0.1
     q = np.tile(time[:, None], 7)
     q[2] = np.nan
@@ -305,4 +315,4 @@ def test_the_arm_is_drawn_as_it_stood(robot):
     event.time_of_position = 0.61
     poses.add(time[5:], q[5:], [event])
     np.testing.assert_array_equal(poses.get(event), q[6])
-    assert poses.get(Event(1, "base", "contact", 0.0)) is None
+    assert poses.get(Event(id=1, segment="base", level="contact", detected=0.0)) is None

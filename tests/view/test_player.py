@@ -32,7 +32,7 @@ def test_next_visits_every_event_once_and_previous_goes_back(begins, seed):
     rng = np.random.default_rng(seed)
     events = []
     for number, begin in enumerate(begins):
-        event = Event(number, "base", "contact", begin / 10)
+        event = Event(id=number, segment="base", level="contact", detected=begin / 10)
         event.cleared = None if rng.random() < 0.2 else event.detected + rng.uniform(0.01, 0.05)
         if event.cleared is not None and rng.random() < 0.5:
             event.time_of_position = event.detected + 0.005

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.contact.contact import Candidate
+from touchline.contact.event import EventAnswer
 from touchline.contact.skin import Patch
 from touchline.model.robot import Robot
 
@@ -126,21 +127,6 @@ class Answer:
             )
             for surface, node, weight, part in ((*part[:3], part) for part in parts)
         )
-
-
-@dataclass(frozen=True)
-class EventAnswer:
-    """Where an event is, from all its strong samples; see `touchline.Event`."""
-
-    status: str
-    link: str | None = None
-    body: str | None = None
-    body_probability: float | None = None
-    position: Array | None = None
-    position_link: Array | None = None
-    time_of_position: float | None = None
-    position_std: float | None = None
-    candidates: tuple[Candidate, ...] = ()
 
 
 def event_answer(row: Array, names: Names, robot: Robot) -> EventAnswer:

@@ -12,11 +12,40 @@ from touchline.contact.contact import Candidate
 Array = NDArray[np.float64]
 
 
+FIRST = ("id", "segment", "level", "detected", "cleared")  # in `events.json`, for its readers
+
+
 @dataclass
-class Event:
-    """One contact from beginning to end; grows while it lasts.
+class EventAnswer:
+    """Where an event is, from all its strong samples; what is not known is None.
 
     Attributes:
+        status: as of a `Contact`, over the event.
+        link: the link that carries the point, of the rigid `body`.
+        body_probability: of that body, 0 to 1.
+        position: (3,) [m] in world at `time_of_position`, from all strong samples.
+        position_link: (3,) [m] the same in the frame of `link`.
+        time_of_position: the last strong sample [s].
+        position_std: root of the trace of its covariance [m].
+        candidates: all explanations, best first, at `time_of_position`.
+    """
+
+    status: str = "wrench_only"
+    link: str | None = None
+    body: str | None = None
+    body_probability: float | None = None
+    position: Array | None = None
+    position_link: Array | None = None
+    time_of_position: float | None = None
+    position_std: float | None = None
+    candidates: tuple[Candidate, ...] = ()
+
+
+@dataclass(kw_only=True)
+class Event(EventAnswer):
+    """One contact from beginning to end; grows while it lasts.
+
+    Attributes, besides those of an `EventAnswer` (`status`, `link`, `position` ...):
         id: number, from 0 in the order of detection.
         segment: name of the segment.
         level: "contact" or "collision": how it began, or a blow while it lasted.
@@ -26,19 +55,11 @@ class Event:
         force: (3,) [N] in world, mean over the strong samples; None on `root`.
         force_peak: largest force [N]; None on `root`.
         torque_peak: largest external torque [Nm] on `joint`.
-        status: as of a `Contact`, over the event.
-        link: the link that carries the point, of the rigid `body`.
-        body_probability: of that body, 0 to 1.
-        position: (3,) [m] in world at `time_of_position`, from all strong samples.
-        position_link: (3,) [m] the same in the frame of `link`.
-        time_of_position: the last strong sample [s].
-        position_std: root of the trace of its covariance [m].
-        candidates: all explanations, best first, at `time_of_position`.
-        rank: where equations do not suffice: independent ones at hand, of the `unknowns`.
         decided: when the level was decided [s]; None while it is a default.
         zone: "structure", "end_effector" or "handle"; None while that is open.
         clamped: whether forces on two sides opposed each other; None where that is not known.
         rate: largest rate of the segment's force [N/s].
+        rank: where equations do not suffice: independent ones at hand, of the `unknowns`.
     """
 
     id: int
@@ -50,15 +71,6 @@ class Event:
     force: Array | None = None
     force_peak: float | None = None
     torque_peak: float | None = None
-    status: str = "wrench_only"
-    link: str | None = None
-    body: str | None = None
-    body_probability: float | None = None
-    position: Array | None = None
-    position_link: Array | None = None
-    time_of_position: float | None = None
-    position_std: float | None = None
-    candidates: tuple[Candidate, ...] = ()
     decided: float | None = None
     zone: str | None = None
     clamped: bool | None = False
@@ -68,7 +80,8 @@ class Event:
 
     def as_json(self) -> dict[str, Any]:
         """The event as in `events.json`."""
-        return {key: _plain(value) for key, value in vars(self).items()}
+        known = vars(self)
+        return {key: _plain(known[key]) for key in (*FIRST, *known)}
 
 
 def _plain(value: Any) -> Any:

@@ -16,11 +16,10 @@ from touchline.contact.answer import (
     SEGMENT,
     SHARE,
     UNKNOWNS,
-    EventAnswer,
 )
 from touchline.contact.classification import Kind
 from touchline.contact.detector import Detection, Detector
-from touchline.contact.event import Event
+from touchline.contact.event import Event, EventAnswer
 from touchline.contact.localizer import Localizer
 from touchline.contact.zones import Zones
 from touchline.estimation.observer import Estimate
@@ -154,7 +153,8 @@ class EventRecorder:
 
     def _opened(self, number: int, g: int, time: float) -> tuple[Event, _Gathered]:
         if number not in self._open:
-            event = Event(len(self.events), self._robot.segment_names[g], "contact", time)
+            segment = self._robot.segment_names[g]
+            event = Event(id=len(self.events), segment=segment, level="contact", detected=time)
             event.zone = self._zones.of(event.segment)
             self.events.append(event)
             gathered = _Gathered(len(self._rows) + 3, len(self._robot.joint_names))

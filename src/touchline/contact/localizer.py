@@ -4,9 +4,10 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from touchline.contact.answer import ENDED, NUMBER, Answer, EventAnswer, Names, event_answer
+from touchline.contact.answer import ENDED, NUMBER, Answer, Names, event_answer
 from touchline.contact.classification import Classifier
 from touchline.contact.detector import Detection, native_noise
+from touchline.contact.event import EventAnswer
 from touchline.contact.region import Region
 from touchline.contact.skin import Skin
 from touchline.contact.thresholds import Thresholds

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.errors import InputError
 from touchline.model.mechanism import Mechanism
 from touchline.model.robot import Robot
 from touchline.simulation.mujoco_model import Addition, build_model
@@ -56,9 +55,6 @@ class Plant:
         armature: reflected rotor inertia by joint [kg m2]; default: that of the joints whose
             torque is measured on the motor side.
         addition: see `build_model`.
-
-    Raises:
-        InputError: the robot has no joint.
     """
 
     def __init__(
@@ -69,8 +65,6 @@ class Plant:
         armature: Mapping[str, float] | None = None,
         addition: Addition | None = None,
     ) -> None:
-        if not robot.joint_names:
-            raise InputError(f"robot {robot.name}: has no joint, and only arms are simulated")
         self._mj: Any = import_module("mujoco")  # its stubs lack most names
         self.robot, self.rate = robot, rate
         joints = robot.description.joints

@@ -40,8 +40,10 @@ def read_setup(robot: Robot) -> Setup:
     """The file beside the robot's model where there is one; otherwise the middle of the ranges.
 
     Raises:
-        InputError: the file does not fit the robot.
+        InputError: the file does not fit the robot, or the robot has no joint.
     """
+    if not robot.joint_names:
+        raise InputError(f"robot {robot.name}: has no joint, and only arms are simulated")
     joints = [robot.mechanism.joints[name] for name in robot.joint_names]
     lower = np.array([max(j.lower, -np.pi if j.kind == "revolute" else -0.5) for j in joints])
     upper = np.array([min(j.upper, np.pi if j.kind == "revolute" else 0.5) for j in joints])
