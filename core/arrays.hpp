@@ -7,8 +7,10 @@
 #include <nanobind/nanobind.h>
 #include <numpy/arrayobject.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <initializer_list>
+#include <vector>
 
 namespace arrays {
 
@@ -61,5 +63,12 @@ class Out {
  private:
   nb::object object_;
 };
+
+// Numbers row by row as a new array.
+inline nb::object table(const std::vector<double>& values, std::size_t columns) {
+  Out out({values.size() / columns, columns});
+  std::copy(values.begin(), values.end(), out.data());
+  return out.release();
+}
 
 }  // namespace arrays

@@ -11,8 +11,9 @@
 
 #include "arrays.hpp"
 #include "classifier_bindings.hpp"
-#include "contact_bindings.hpp"
 #include "detector_bindings.hpp"
+#include "localizer_bindings.hpp"
+#include "mesh_bindings.hpp"
 #include "samples.hpp"
 #include "touchline/observer/observer.hpp"
 
@@ -207,7 +208,8 @@ NB_MODULE(TOUCHLINE_MODULE, m) {
   bind_enums(m);
   bind_rows(m);
   classification::bind(m);
-  contact::bind(m);
+  meshes::bind(m);
+  localization::bind(m);
   detection::bind(m);
   nb::class_<tl::Observer>(m, "Observer")
       .def("__init__",

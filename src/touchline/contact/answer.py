@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the numbers of native answers say (see `core/contact_bindings.hpp`).
+"""What the numbers of native answers say (see `core/answer_rows.hpp`).
 
 A row of a contact that is followed has the columns SAMPLE to RATE, then an answer; one of an event
 that ended has SAMPLE, SEGMENT and NUMBER, then the event.
