@@ -173,6 +173,14 @@ def test_one_contact_on_each_segment_is_as_one():
     assert len({onset for _, onset in scene.touches}) == 1
 
 
+@pytest.mark.parametrize("run", [36, 104])
+def test_joints_beside_a_branch_know_of_its_touch(run):
+    """Joints 6 and 7 of `sara-full` are outboard of where the touched handle branches off."""
+    trial = run_trial(Cell("sara-full", 3, begin="segments"), run)
+    assert [touch.link for touch in trial.touches] == ["link6", "tool", "handle"]
+    assert trial.found and set(trial.statuses) == {"located"}
+
+
 def test_touches_on_each_segment_are_sampled_where_all_can_be_reached():
     """The tool may be below the floor: another pose is drawn."""
     skin = Skin(tl.load_robot("sara"))

@@ -4,12 +4,13 @@
 import numpy as np
 import pytest
 from motion import Recording, first_order, ramp
+from oracle import PinocchioTwin
 from robots import describe, random_mechanism, random_pose, random_robot
 
 from touchline.estimation.observer import Observer
 from touchline.health import Health
 from touchline.model.description import JointDescription, SensorDescription
-from touchline.model.robot import Robot
+from touchline.model.robot import Robot, load_robot
 
 K = 50.0
 DT = 1e-3
@@ -99,6 +100,22 @@ def test_own_torque_and_parity_isolate_the_body():
     assert np.abs(estimate.segment_torque[-1, :4]).min() > 0.05
     assert np.abs(estimate.parity[:, :4]).max() < 2e-3  # joints inboard of both contacts
     assert np.abs(estimate.parity[-1, 4:]).min() > 0.05
+
+
+def test_parity_knows_of_branches_with_sensors_of_their_own():
+    """The handle of `sara-full` branches off inboard of joints 6 and 7, and loads the base."""
+    robot = load_robot("sara-full")
+    point, force = np.array([0.2, 0.1, 0.5]), np.array([3.0, 18.0, -9.0])
+    pushes = [
+        ("handle", lambda t: point, lambda t: ramp(t, 0.1) * force),
+        ("wrist", lambda t: point + 0.1, lambda t: ramp(t, 0.1) * -force),
+    ]
+    record = Recording(robot, np.arange(0.0, 0.3, 1e-3), pushes)
+    estimate = Observer(robot, K).run(*record.signals())
+    assert np.abs(estimate.parity).max() < 2e-3
+    twin = PinocchioTwin(robot.description, robot.mechanism)
+    if_outboard = force @ twin.jacobian_world(record.q[-1], "joint7", point)
+    assert np.abs(if_outboard[5:7]).min() > 0.3  # what the base sensor would say of these joints
 
 
 def test_sensor_wrench_is_the_sum_of_the_outboard_segments():

@@ -62,7 +62,8 @@ class Estimate:
     def parity(self) -> Array:
         """Joint torque minus what the sensor inboard says of it (n,) [Nm].
 
-        Zero unless something touches between that sensor and the joint, or a sensor errs.
+        Zero unless something touches between that sensor and the joint, or a sensor errs. Touches
+        on a branch with a sensor of its own, which the joint does not carry, are left out.
         """
         return self._part("parity")
 

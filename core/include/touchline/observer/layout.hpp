@@ -47,7 +47,8 @@ class Layout {
   std::vector<std::vector<int>> segments_outboard;   // per sensor: all of them
   std::vector<int> lines;                            // nodes that move, joint by joint
   // Per joint: the nearest six-axis sensor inboard, if any (and if no other joint mimics this
-  // one); the next ones outboard; those that the joint is read from.
+  // one), and after it the next ones outboard of that sensor on branches which the joint does not
+  // carry; the next ones outboard of the joint; those that the joint is read from.
   std::vector<std::vector<Projection>> inboard_sensors, outboard_sensors, source_sensors;
 
  private:
@@ -121,7 +122,11 @@ class Layout {
   std::vector<Projection> next_inboard(const JointRow& joint) const {
     const int sensor = joint.nodes.size() == 1 ? inboard(joint.nodes[0], true) : -1;
     if (sensor < 0) return {};
-    return {pair(0, sensor)};
+    std::vector<Projection> pairs{pair(0, sensor)};
+    for (int t : segments[segment_of_sensor[sensor]].successors) {
+      if (!is_outboard(sensors_[t].node, joint.nodes[0])) pairs.push_back(pair(0, t));
+    }
+    return pairs;
   }
 
   std::vector<Projection> next_outboard(const JointRow& joint) const {

@@ -142,6 +142,7 @@ class Observer {
                         : outboard.empty() ? projections_.zero()
                                            : projections_.at(outboard[0]));
     if (own && outboard.size() > 1) forks_.push_back(j);
+    if (parity && inboard.size() > 1) branches_.push_back(j);
     if (joints_[j].torque == Torque::from) sources_.push_back(j);
   }
 
@@ -295,6 +296,8 @@ class Observer {
       parity[j] = e[j] - projected[inboard_[j]];
     }
     for (std::size_t j : forks_) own[j] = e[j] - sum(layout_.outboard_sensors[j]);
+    for (std::size_t j : branches_)  // what loads the sensor, but neither the joint nor its segment
+      parity[j] += sum(layout_.inboard_sensors[j]) - projected[inboard_[j]];
     std::copy_n(channels_.balances.e(channels_.segment(0)), 6 * row_.segments,
                 filters.input(channels_.segment_filter(0)));
     for (std::size_t s = 0; s < sensors_.size(); ++s) {
@@ -330,7 +333,8 @@ class Observer {
   double* before_ = nullptr;
   std::vector<Lanes> packed_q_;  // positions, then velocities
   std::vector<char> sensor_present_;
-  std::vector<std::size_t> sources_, forks_;  // joints read from sensors; with several outboard
+  // Joints that are read from sensors; with several sensors outboard; with some on other branches.
+  std::vector<std::size_t> sources_, forks_, branches_;
   std::vector<std::size_t> outboard_, inboard_;   // per joint: where its projections stand
   std::vector<double> output_;
   Clock clock_;
