@@ -21,19 +21,21 @@ using namespace nb::literals;
 namespace tl = touchline;
 
 // One sample through observer and detector: the observer's row, the level of each segment, the
-// normalized rows, for how long each segment's baseline has been averaged.
+// normalized rows, their drifts, for how long each segment's baseline has been averaged.
 inline nb::tuple detect(tl::Observer& o, tl::Detector& d, double time, nb::handle q, nb::handle qd,
                  nb::handle tau, nb::handle wrench) {
   const tl::Sample in = samples::one(o, time, q, qd, tau, wrench);
   const double* row = o.step(in);
   d.step(row, in.q, in.qd);
   arrays::Out out({o.output().size()}), levels({d.levels().size()}), tests({d.rows().size()}),
-      quiet({d.quiet().size()});
+      drift({d.rows().size()}), quiet({d.quiet().size()});
   std::copy_n(row, o.output().size(), out.data());
   std::copy(d.levels().begin(), d.levels().end(), levels.data());
   std::copy(d.normalized().begin(), d.normalized().end(), tests.data());
+  std::copy(d.drift().begin(), d.drift().end(), drift.data());
   std::copy(d.quiet().begin(), d.quiet().end(), quiet.data());
-  return nb::make_tuple(out.release(), levels.release(), tests.release(), quiet.release());
+  return nb::make_tuple(out.release(), levels.release(), tests.release(), drift.release(),
+                        quiet.release());
 }
 
 // Runs samples `from` to `to` through observer and detector; calls `each(i)` after every one.
@@ -55,14 +57,17 @@ inline nb::tuple detect_run(tl::Observer& o, tl::Detector& d, nb::handle time, n
                      nb::handle qd, nb::handle tau, nb::handle wrench) {
   const samples::Many in = samples::many(o, time, q, qd, tau, wrench);
   arrays::Out out({in.rows, o.output().size()}), levels({in.rows, d.levels().size()}),
-      tests({in.rows, d.rows().size()}), quiet({in.rows, d.quiet().size()});
-  double *level = levels.data(), *x = tests.data(), *since = quiet.data();
+      tests({in.rows, d.rows().size()}), drift({in.rows, d.rows().size()}),
+      quiet({in.rows, d.quiet().size()});
+  double *level = levels.data(), *x = tests.data(), *y = drift.data(), *since = quiet.data();
   detect_all(o, d, in, 0, in.rows, out.data(), [&](std::size_t) {
     level = std::copy(d.levels().begin(), d.levels().end(), level);
     x = std::copy(d.normalized().begin(), d.normalized().end(), x);
+    y = std::copy(d.drift().begin(), d.drift().end(), y);
     since = std::copy(d.quiet().begin(), d.quiet().end(), since);
   });
-  return nb::make_tuple(out.release(), levels.release(), tests.release(), quiet.release());
+  return nb::make_tuple(out.release(), levels.release(), tests.release(), drift.release(),
+                        quiet.release());
 }
 
 // N samples, for those who set thresholds: levels (N, m), statistics (N, m, tests), and of every
@@ -135,12 +140,13 @@ inline void bind(nb::module_& m) {
           "__init__",
           [](tl::DetectionRow* self, int segment, int component, int joint, double contact,
              double collision, double baseline_limit, const std::vector<double>& slow,
-             const std::vector<double>& quick) {
+             const std::vector<double>& quick, const std::vector<double>& drift) {
             new (self) tl::DetectionRow{segment, component, joint, contact, collision,
-                                        baseline_limit, model_error(slow), model_error(quick)};
+                                        baseline_limit, model_error(slow), model_error(quick),
+                                        model_error(drift)};
           },
           "segment"_a, "component"_a, "joint"_a, "contact"_a, "collision"_a, "baseline_limit"_a,
-          "slow"_a, "quick"_a);
+          "slow"_a, "quick"_a, "drift"_a);
   nb::class_<tl::DetectionTimes>(m, "DetectionTimes")
       .def(
           "__init__",

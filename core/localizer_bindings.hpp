@@ -36,11 +36,12 @@ inline const double* data_or_null(const std::optional<In>& a) {
 
 inline Out locate(tl::Localizer& l, int segment, const In& row, const std::optional<In>& normalized,
                   const In& q, const std::optional<In>& qd,
-                  const std::optional<In>& quiet) {
+                  const std::optional<In>& drift, const std::optional<In>& quiet) {
   l.expect(segment, row.size(), normalized ? normalized->size() : l.tests(), q.size(),
            qd ? qd->size() : q.size());
   if (quiet && quiet->size() != l.segments()) throw std::invalid_argument("one number per segment");
-  l.set_state(q.data(), data_or_null(qd), data_or_null(quiet));
+  if (drift && drift->size() != l.tests()) throw std::invalid_argument("one drift per row");
+  l.set_state(q.data(), data_or_null(qd), data_or_null(drift), data_or_null(quiet));
   std::vector<double> out(kWidth);
   answer_rows::write(l, l.locate(segment, row.data(), data_or_null(normalized)), out.data());
   return array(out, 1, kWidth);
@@ -60,7 +61,7 @@ inline Out events(tl::Localizer& l) {
 // One sample on its way through the localizer.
 struct FollowedSample {
   double time;
-  const double *row, *normalized, *levels, *quiet, *q, *qd;
+  const double *row, *normalized, *drift, *levels, *quiet, *q, *qd;
 };
 
 // For each contact on a segment that is touched: its class and its answer; and for each event that
@@ -71,7 +72,7 @@ inline void follow(tl::Localizer& l, tl::Classifier& c, std::size_t i, const Fol
   bool ready = false;
   for (std::size_t g = 0; g < l.segments(); ++g) {
     const bool touched = x.levels[g] > 0.0;
-    if (touched && !ready) l.set_state(x.q, x.qd, x.quiet);
+    if (touched && !ready) l.set_state(x.q, x.qd, x.drift, x.quiet);
     ready = ready || touched;
     l.follow(static_cast<int>(g), touched, x.row, x.normalized, x.time, x.q);
     for (tl::Localizer::Memory* memory : l.ended()) {
@@ -89,13 +90,14 @@ inline void follow(tl::Localizer& l, tl::Classifier& c, std::size_t i, const Fol
 
 // N samples.
 inline nb::tuple follow_run(tl::Localizer& l, tl::Classifier& c, nb::handle time,
-                            nb::handle rows, nb::handle normalized, nb::handle levels,
-                            nb::handle quiet, nb::handle q, nb::handle qd) {
+                            nb::handle rows, nb::handle normalized, nb::handle drift,
+                            nb::handle levels, nb::handle quiet, nb::handle q, nb::handle qd) {
   const std::size_t n = l.joints(), m = l.segments(), r = l.tests(), width = l.width();
   const std::size_t count = arrays::length(time);
   const double* stamps = arrays::numbers(time, {count});
   FollowedSample x{0.0, arrays::numbers(rows, {count, width}),
-                   arrays::numbers(normalized, {count, r}), arrays::numbers(levels, {count, m}),
+                   arrays::numbers(normalized, {count, r}), arrays::numbers(drift, {count, r}),
+                   arrays::numbers(levels, {count, m}),
                    arrays::numbers(quiet, {count, m}), arrays::numbers(q, {count, n}),
                    arrays::numbers(qd, {count, n})};
   std::vector<double> answers, ended;
@@ -104,7 +106,8 @@ inline nb::tuple follow_run(tl::Localizer& l, tl::Classifier& c, nb::handle time
     for (std::size_t i = 0; i < count; ++i) {
       x.time = stamps[i];
       follow(l, c, i, x, answers, ended);
-      x = {0.0, x.row + width, x.normalized + r, x.levels + m, x.quiet + m, x.q + n, x.qd + n};
+      x = {0.0,         x.row + width, x.normalized + r, x.drift + r, x.levels + m,
+           x.quiet + m, x.q + n,       x.qd + n};
     }
   }
   return nb::make_tuple(arrays::table(answers, kClass + kWidth),
@@ -113,11 +116,12 @@ inline nb::tuple follow_run(tl::Localizer& l, tl::Classifier& c, nb::handle time
 
 // One sample.
 inline nb::tuple follow_sample(tl::Localizer& l, tl::Classifier& c, double time, nb::handle row,
-                               nb::handle normalized, nb::handle levels, nb::handle quiet,
-                               nb::handle q, nb::handle qd) {
+                               nb::handle normalized, nb::handle drift, nb::handle levels,
+                               nb::handle quiet, nb::handle q, nb::handle qd) {
   const std::size_t n = l.joints(), m = l.segments();
   const FollowedSample x{time, arrays::numbers(row, {l.width()}),
-                         arrays::numbers(normalized, {l.tests()}), arrays::numbers(levels, {m}),
+                         arrays::numbers(normalized, {l.tests()}),
+                         arrays::numbers(drift, {l.tests()}), arrays::numbers(levels, {m}),
                          arrays::numbers(quiet, {m}), arrays::numbers(q, {n}),
                          arrays::numbers(qd, {n})};
   std::vector<double> answers, ended;
@@ -185,20 +189,23 @@ inline void bind(nb::module_& m) {
            },
            "observer"_a, "tests"_a, "noise"_a, "surfaces"_a, "settings"_a,
            nb::keep_alive<1, 2>())
-      .def("wrench_covariance", [](tl::Localizer& l, const In& q, const In& row, int segment) {
-        l.expect(segment, row.size(), l.tests(), q.size(), q.size());
-        l.set_state(q.data(), nullptr, nullptr);
-        std::vector<double> out(36);
-        if (!l.wrench_covariance(segment, row.data(), out.data()))
-          throw std::invalid_argument("the segment has no wrench");
-        return array(out, 6, 6);
-      })
+      .def("wrench_covariance",
+           [](tl::Localizer& l, const In& q, const In& row, int segment,
+              const std::optional<In>& drift) {
+             l.expect(segment, row.size(), drift ? drift->size() : l.tests(), q.size(), q.size());
+             l.set_state(q.data(), nullptr, data_or_null(drift), nullptr);
+             std::vector<double> out(36);
+             if (!l.wrench_covariance(segment, row.data(), out.data()))
+               throw std::invalid_argument("the segment has no wrench");
+             return array(out, 6, 6);
+           },
+           "q"_a, "row"_a, "segment"_a, "drift"_a.none())
       .def("locate", &locate, "segment"_a, "row"_a, "normalized"_a.none(), "q"_a, "qd"_a.none(),
-           "quiet"_a.none())
+           "drift"_a.none(), "quiet"_a.none())
       .def("region", &region)
       .def("events", &events)
-      .def("follow", &follow_run, "classifier"_a, "time"_a, "rows"_a, "normalized"_a, "levels"_a, "quiet"_a,
-           "q"_a, "qd"_a)
+      .def("follow", &follow_run, "classifier"_a, "time"_a, "rows"_a, "normalized"_a, "drift"_a,
+           "levels"_a, "quiet"_a, "q"_a, "qd"_a)
       .def("follow_sample", &follow_sample);
 }
 

@@ -41,6 +41,8 @@ def localization(
     noise: tuple[Literal[0, 1, 2, 3], ...] = (0, 1, 2, 3),
     begin: tuple[Literal["apart", "together", "segments"], ...] = ("apart", "together"),
     speeds: tuple[float, ...] = (0.0,),
+    model_error: tuple[float, ...] = (0.0,),
+    calibrated: bool = True,
     runs: int = 1000,
     baselines: tuple[Literal["first", "nearest", "particles"], ...] = (
         "first",
@@ -61,6 +63,13 @@ def localization(
         begin: Several contacts begin 0.1 s apart, or at the same instant; segments: one on each
             segment of the arm at the same instant, beside each of them alone.
         speeds: Of every joint [rad/s]; 0 is an arm at rest.
+        model_error: Masses and inertias are off by this part of theirs (1 sigma), centres of mass
+            by as much of 0.1 m: 0.02 is a good model from CAD. The arm then swings, with these
+            speeds at most, and touches last 0.5 s; a further table tells how often one touch
+            passes for several while it lasts.
+        calibrated: Thresholds and model errors of such arms are those that `calibrate` finds in
+            six minutes of their motion without contact; otherwise those of an arm of which nothing
+            but its model is known.
         runs: Random poses and places per line of the tables.
         baselines: What runs along: the first entry of the line of force action, the surface
             nearest to the line, a contact particle filter (on 100 runs a line).
@@ -69,7 +78,10 @@ def localization(
     """
     from touchline.bench.localization.run import Plan, main
 
-    main(Plan(robots, contacts, noise, begin, speeds, runs, seed, baselines), out)
+    plan = Plan(
+        robots, contacts, noise, begin, speeds, runs, seed, baselines, model_error, calibrated
+    )
+    main(plan, out)
     return 0
 
 

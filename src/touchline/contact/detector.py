@@ -31,11 +31,14 @@ class Detection:
     Attributes:
         levels: (m,) the `Level` of each segment.
         normalized: (r,) each test's (residual - baseline) / contact threshold.
+        drift: (r,) one sigma of what the model's errors may have added to each residual since
+            its baseline, as the arm has moved on [N or Nm].
         quiet: (m,) over how long the baseline of each segment has been averaged [s].
     """
 
     levels: Array
     normalized: Array
+    drift: Array
     quiet: Array
 
     @staticmethod
@@ -44,6 +47,7 @@ class Detection:
         return Detection(
             np.array([sample.levels for sample in samples]),
             np.array([sample.normalized for sample in samples]),
+            np.array([sample.drift for sample in samples]),
             np.array([sample.quiet for sample in samples]),
         )
 

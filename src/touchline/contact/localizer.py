@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 RULES = ("likelihood", "paper")
 FRICTION = 0.8  # coefficient of the friction cone: skin and rubber
 TORQUE_ERROR = 0.02  # a joint's torque sensor is no better, and a touch is no point
+MODEL_ERROR = 0.02  # masses and inertias of a good model from CAD are no better
 
 
 class Localizer:
@@ -99,6 +100,7 @@ class Localizer:
             None if detection is None else detection.normalized,
             np.ascontiguousarray(q, float),
             None if qd is None else np.ascontiguousarray(qd, float),
+            None if detection is None else detection.drift,
             None if detection is None else detection.quiet,
         )
         return self.answer(row[0])
@@ -124,6 +126,7 @@ class Localizer:
             np.ascontiguousarray(time, float),
             estimate.rows,
             detection.normalized,
+            detection.drift,
             detection.levels,
             detection.quiet,
             np.ascontiguousarray(q, float),
@@ -145,6 +148,7 @@ class Localizer:
             time,
             estimate.rows,
             detection.normalized,
+            detection.drift,
             detection.levels,
             detection.quiet,
             q,
@@ -178,14 +182,23 @@ class Localizer:
         """Names the numbers of a native event."""
         return event_answer(row, self._names, self.robot)
 
-    def wrench_covariance(self, segment: str, q: ArrayLike, estimate: Estimate) -> Array:
+    def wrench_covariance(
+        self,
+        segment: str,
+        q: ArrayLike,
+        estimate: Estimate,
+        detection: Detection | None = None,
+    ) -> Array:
         """Covariance (6, 6) of a segment's filtered wrench, world axes, about the world origin.
 
         It follows from the noise figures of the description: readings through the filter, and
-        velocities through the momentum (theory: sqrt(K dt / 2) and K M sigma_qd).
+        velocities through the momentum (theory: sqrt(K dt / 2) and K M sigma_qd). To that comes
+        what the model's errors have added since the baseline, by the `drift` of a detection.
         """
         index = self.robot.segment_names.index(segment)
-        return self.core.wrench_covariance(np.ascontiguousarray(q, float), estimate.rows, index)
+        q = np.ascontiguousarray(q, float)
+        drift = None if detection is None else detection.drift
+        return self.core.wrench_covariance(q, estimate.rows, index, drift)
 
     def answer(self, row: Array) -> Answer:
         """Names the numbers of a native answer."""

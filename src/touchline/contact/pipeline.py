@@ -13,9 +13,10 @@ from touchline.contact.detector import Detection, Detector
 from touchline.contact.event import Event
 from touchline.contact.event_recorder import EventRecorder
 from touchline.contact.live_contact import LiveContact, LiveSample
-from touchline.contact.localizer import FRICTION, TORQUE_ERROR, Localizer
+from touchline.contact.localizer import FRICTION, MODEL_ERROR, TORQUE_ERROR, Localizer
 from touchline.contact.skin import Skin
 from touchline.contact.table import ContactTable
+from touchline.contact.thresholds import expect_drift, make_thresholds
 from touchline.contact.zones import Zones
 from touchline.estimation.observer import Estimate, Observer
 from touchline.model.robot import Robot
@@ -55,6 +56,8 @@ class Pipeline:
             localizer's weights.
         skin: the robot's surfaces, if already at hand.
         friction: coefficient of the cone in which pushes are looked for.
+        model_error: 1 sigma of the relative error of the model's masses and inertias, for the
+            localizer's weights where the robot is not calibrated; 0: the model is right.
     """
 
     def __init__(
@@ -68,10 +71,12 @@ class Pipeline:
         torque_error: float = TORQUE_ERROR,
         skin: Skin | None = None,
         friction: float = FRICTION,
+        model_error: float = MODEL_ERROR,
     ) -> None:
         self.robot = robot
         self.observer = Observer(robot, bandwidth, method)
-        self.detector = Detector(self.observer, period=period)
+        thresholds = expect_drift(robot, make_thresholds(robot, period), model_error)
+        self.detector = Detector(self.observer, thresholds, period)
         self.localizer = Localizer(
             self.observer,
             self.detector.thresholds,

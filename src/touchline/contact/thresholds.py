@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.contact.limits import sum_limits, theoretical, threshold
+from touchline.contact.model_drift import guess_drift
 from touchline.contact.residual_noise import residual_noise
 from touchline.model.description import (
     AXES,
@@ -33,7 +34,8 @@ class RowThreshold:
 
     `contact`, `collision` and `baseline_limit` are in N or Nm; wrenches are those in the frame of
     the segment's own sensor. A joint row has component -1, a wrench row has joint -1. `slow` and
-    `quick` are sigmas of the model's errors, see `RowCalibration`.
+    `quick` are sigmas of the model's errors, see `RowCalibration`; `drift` those that the localizer
+    reckons with: the calibrated `slow` ones, otherwise see `expect_drift`.
     """
 
     segment: int
@@ -44,6 +46,7 @@ class RowThreshold:
     baseline_limit: float
     slow: Vector = (0.0, 0.0, 0.0)
     quick: Vector = (0.0, 0.0, 0.0)
+    drift: Vector = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -110,6 +113,25 @@ def _calibration(robot: Robot, period: float) -> tuple[CalibrationDescription | 
     return given, None
 
 
+def expect_drift(robot: Robot, thresholds: Thresholds, error: float) -> Thresholds:
+    """The same tests; where they are not calibrated, the localizer reckons with a guess.
+
+    Args:
+        robot: the robot.
+        thresholds: its tests.
+        error: 1 sigma of the relative error of the model's masses and inertias; 0: it is right.
+    """
+    if thresholds.calibrated or error == 0.0:
+        return thresholds
+    torques, wrenches = guess_drift(robot, error)
+    rows = []
+    for row in thresholds.rows:
+        found = torques[row.joint] if row.component < 0 else wrenches[row.segment, row.component]
+        constant, speed, acceleration = found.tolist()
+        rows.append(replace(row, drift=(constant, speed, acceleration)))
+    return replace(thresholds, rows=tuple(rows))
+
+
 def without_limits(thresholds: Thresholds) -> Thresholds:
     """The same tests, which never fire: for those who look at the statistics."""
     never = {method: np.full_like(limits, np.inf) for method, limits in thresholds.limits.items()}
@@ -145,6 +167,7 @@ def _calibrated_row(
         baseline_limit=limit,
         slow=known.slow,
         quick=known.quick,
+        drift=known.slow,
     )
 
 

@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.estimation.samples import Samples
-from touchline.model.mechanism import Inertia, Mechanism
 from touchline.model.robot import Robot
-from touchline.model.transforms import rotation_rpy
 from touchline.simulation.readings import Readings
 
 Array = NDArray[np.float64]
@@ -134,28 +132,3 @@ class SensorNoise:
         turning = np.array([joints[name].kind == "revolute" for name in robot.joint_names])
         step = 2 * np.pi / 2**self.position_bits
         return np.where(turning, step * np.round(q / step), q)
-
-
-def perturbed(mechanism: Mechanism, fraction: float, rng: np.random.Generator) -> Mechanism:
-    """A mechanism whose inertias are not what the model says.
-
-    Args:
-        mechanism: as modelled.
-        fraction: 1 sigma of the relative error of masses and inertias; centres of mass move by
-            `fraction` times 0.1 m, axes of inertia turn by `fraction` rad.
-        rng: draws the errors.
-    """
-    links = {
-        name: replace(link, inertia=_perturbed_inertia(link.inertia, fraction, rng))
-        for name, link in mechanism.links.items()
-    }
-    return replace(mechanism, links=links)
-
-
-def _perturbed_inertia(body: Inertia, fraction: float, rng: np.random.Generator) -> Inertia:
-    scale = np.maximum(1.0 + fraction * rng.normal(size=2), 0.1)
-    R = rotation_rpy((fraction * rng.normal(size=3)).tolist())
-    shift = fraction * 0.1 * rng.normal(size=3) if body.mass else np.zeros(3)
-    # The inertia follows its mass, so that a body stays possible.
-    inertia = scale[0] * scale[1] * R @ body.inertia @ R.T
-    return Inertia(scale[0] * body.mass, body.com + shift, inertia)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot
 from touchline.simulation.control import (
     ComputedTorque,
@@ -16,7 +17,7 @@ from touchline.simulation.control import (
     sinusoids,
 )
 from touchline.simulation.mujoco_model import Addition
-from touchline.simulation.noise import SensorNoise, perturbed
+from touchline.simulation.noise import SensorNoise
 from touchline.simulation.plant import Plant
 from touchline.simulation.sensing import sense
 from touchline.simulation.setup import Setup

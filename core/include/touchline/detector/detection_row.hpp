@@ -37,6 +37,7 @@ struct DetectionRow {
   double contact, collision;  // thresholds [N or Nm]
   double baseline_limit;      // the largest residual that is taken for an offset [N or Nm]
   ModelError slow, quick;     // against the baseline and against the reference of `kReference`
+  ModelError drift;           // against the baseline, while a contact lasts
 };
 
 struct DetectionTimes {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "touchline/detector/activity.hpp"
+#include "touchline/detector/baseline_posture.hpp"
 #include "touchline/detector/detection_row.hpp"
 #include "touchline/detector/segment_tests.hpp"
 #include "touchline/model/posture.hpp"
@@ -26,11 +27,13 @@ class Detector {
         rows_(std::move(rows)),
         settings_(std::move(settings)),
         activity_(observer.row_layout().joints),
+        baseline_posture_(settings_.sum_limits.size(), observer.row_layout().joints),
         states_(rows_.size()),
         samples_(rows_.size()),
         segments_(settings_.sum_limits.size()),
         first_(segments_.size() + 1, 0),
         normalized_(rows_.size(), 0.0),
+        drift_(rows_.size(), 0.0),
         levels_(segments_.size(), 0),
         quiet_(segments_.size(), 0.0),
         statistics_(segments_.size() * settings_.tests.size(), 0.0) {
@@ -52,7 +55,7 @@ class Detector {
     const double dt = timed_ ? std::max(0.0, now - time_) : 0.0;
     timed_ = true;
     time_ = now;
-    if (joint_tests_ && dt > 0.0) follow_motion(q, qd, dt);
+    if (dt > 0.0) follow_motion(q, qd, dt);
     for (std::size_t g = 0; g < segments_.size(); ++g) {
       Segment& s = segments_[g];
       s.peak = s.sum = s.collision = 0.0;
@@ -62,11 +65,14 @@ class Detector {
       decide(g, dt);
     }
     for (std::size_t i = 0; i < rows_.size(); ++i) follow_offset(i, dt);
+    if (dt > 0.0 && sound_) follow_drift(q, dt);
   }
 
   const std::vector<DetectionRow>& rows() const { return rows_; }
   // Per row: (residual - baseline) / contact threshold; 0 where there is no settled residual.
   const std::vector<double>& normalized() const { return normalized_; }
+  // Per row: one sigma of what the model's errors may have added since the baseline [N or Nm].
+  const std::vector<double>& drift() const { return drift_; }
   const std::vector<int>& levels() const { return levels_; }  // per segment
   // Per segment: over how long its baseline has been averaged [s].
   const std::vector<double>& quiet() const { return quiet_; }
@@ -98,8 +104,10 @@ class Detector {
   void follow_motion(const double* q, const double* qd, double dt) {
     double sum = 0.0;
     for (int j = 0; j < observer_.row_layout().joints; ++j) sum += std::fabs(q[j]) + std::fabs(qd[j]);
-    if (!(sum < kAbsurd)) return;
+    sound_ = sum < kAbsurd;
+    if (!sound_) return;
     activity_.add(qd, dt);
+    if (!joint_tests_) return;
     since_ += dt;
     if (placed_ && since_ < kRefresh) return;
     posture_.set(q, nullptr);
@@ -228,22 +236,36 @@ class Detector {
     s.baseline = std::clamp(next, -row.baseline_limit, row.baseline_limit);
   }
 
+  // Drifts of the rows, from where the arm was while the baselines were averaged.
+  void follow_drift(const double* q, double dt) {
+    for (std::size_t g = 0; g < segments_.size(); ++g) {
+      if (levels_[g] == 0 && !segments_[g].pending && quiet_[g] > 0.0) {
+        const double tau = std::min(quiet_[g], settings_.times.baseline);
+        baseline_posture_.average(g, q, std::min(1.0, dt / tau));
+      }
+      const double way2 = baseline_posture_.distance2(g, q);
+      for (std::size_t i = first_[g]; i < first_[g + 1]; ++i)
+        drift_[i] = std::sqrt(drifted(rows_[i], activity(), way2));
+    }
+  }
+
   const Observer& observer_;
   Posture posture_;
   const double* row_ = nullptr;
   std::vector<DetectionRow> rows_;
   DetectionSettings settings_;
   ActivityMeter activity_;
+  BaselinePosture baseline_posture_;
   std::vector<RowState> states_;
   std::vector<RowSample> samples_;
   std::vector<Segment> segments_;
   std::vector<std::size_t> first_;  // per segment: its first row; they stand together
   std::vector<SegmentTests> tests_;
-  std::vector<double> normalized_;
+  std::vector<double> normalized_, drift_;
   std::vector<int> levels_;
   std::vector<double> quiet_, statistics_;
   double time_ = 0.0, since_ = 0.0;
-  bool timed_ = false, placed_ = false, joint_tests_ = false;
+  bool timed_ = false, placed_ = false, joint_tests_ = false, sound_ = false;
 };
 
 }  // namespace touchline

@@ -63,10 +63,11 @@ class Localizer {
       throw std::invalid_argument("an array has a size that does not belong to this robot");
   }
 
-  // The configuration of the sample, and for how long the baseline of each segment has been
-  // averaged; `qd` and `quiet` may be null.
-  void set_state(const double* q, const double* qd, const double* quiet) {
-    measurement_.set_state(q, qd, quiet);
+  // The configuration of the sample; what the model's errors may have added to each row of the
+  // detector since its baseline; for how long the baseline of each segment has been averaged. All
+  // but `q` may be null.
+  void set_state(const double* q, const double* qd, const double* drift, const double* quiet) {
+    measurement_.set_state(q, qd, drift, quiet);
     said_ = 0;
   }
 

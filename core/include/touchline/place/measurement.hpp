@@ -13,6 +13,7 @@
 #include "touchline/model/posture.hpp"
 #include "touchline/observer/observer.hpp"
 #include "touchline/place/baseline_offsets.hpp"
+#include "touchline/place/lasting_noise.hpp"
 #include "touchline/place/quadratic.hpp"
 #include "touchline/place/row_noise.hpp"
 #include "touchline/place/segment_rows.hpp"
@@ -24,25 +25,29 @@ class Measurement {
   Measurement(const Observer& observer, std::vector<DetectionRow> tests, NoiseFigures noise)
       : observer_(observer),
         posture_(observer.tree(), observer.row_layout().joints),
-        offsets_(observer, posture_, std::move(tests)),
+        offsets_(observer, posture_, tests),
         rows_(observer, posture_),
         layout_(observer.row_layout()),
+        lasting_(observer, posture_, std::move(tests), noise.wrench_error, noise.torque_error),
         noise_(observer, posture_, std::move(noise), 6 + layout_.joints + 6 * layout_.sensors) {
     const std::size_t most = rows_.most(), size = 6 + most;
     used_.resize(most);
     own_.resize(most);
     outboard_.resize(most);
     covariance_.resize(size * size);
+    lasting_covariance_.resize(size * size);
     factor_.resize(size * size);
     design_.resize(size * 7);
   }
 
-  // The configuration of the sample; `qd` may be null.
-  // And for how long the baseline of each segment has been averaged [s], or null.
-  void set_state(const double* q, const double* qd, const double* quiet) {
+  // The configuration of the sample; `qd` may be null. What the model's errors may have added to each
+  // row of the detector since its baseline, and for how long the baseline of each segment has been
+  // averaged [s]; or null.
+  void set_state(const double* q, const double* qd, const double* drift, const double* quiet) {
     posture_.set(q, qd);
     speed2_ = 0.0;
     for (int j = 0; qd != nullptr && j < layout_.joints; ++j) speed2_ += qd[j] * qd[j];
+    drift_ = drift;
     quiet_ = quiet;
   }
 
@@ -60,7 +65,8 @@ class Measurement {
     count_ = 0;
     for (const SegmentRow& r : rows_.of(g)) take(r);
     size_ = (has_wrench_ ? 6 : 0) + count_;
-    return size_ > 0 && weigh() && (normalized == nullptr || take_out_offsets());
+    lasts_ = lasting_.find(g, drift_);
+    return size_ > 0 && weigh() && (normalized == nullptr || take_out_offsets()) && add_lasting();
   }
 
   // The largest of a segment's normalized rows.
@@ -76,7 +82,7 @@ class Measurement {
   const double* wrench() const { return wrench_; }
   // Do changes tell of new contacts? With joint torques alone there is no pitch, and few equations
   // or none are left over: what a model's errors leave looks like one more contact.
-  bool can_be_followed() const { return has_wrench_ || noise_.exact_torques(); }
+  bool can_be_followed() const { return has_wrench_ || lasting_.exact_torques(); }
   // What a contact's growth shows in: its force, or without a wrench the size of all torques.
   Vec3 load() const {
     if (has_wrench_) return {wrench_[0], wrench_[1], wrench_[2]};
@@ -136,8 +142,11 @@ class Measurement {
     return count;
   }
 
-  // The lower triangle of the covariance of all rows.
+  // The lower triangle of the covariance of all rows; and of the part of it that no mean over time
+  // takes away, valid where `lasts()`.
   void covariance(double* out) const { std::copy_n(covariance_.data(), size_ * size_, out); }
+  const double* lasting_covariance() const { return lasting_covariance_.data(); }
+  bool lasts() const { return lasts_; }
 
   // To the scale of the noise: independent rows of variance one.
   void whiten(double* rows, int stride) const { solve_lower(factor_.data(), size_, rows, stride); }
@@ -215,6 +224,21 @@ class Measurement {
   // Takes the offsets out if there are any: what noise alone explains is none, and would only add
   // its own noise. The baseline, a mean over `quiet` [s], is surer than one sample.
   bool take_out_offsets() {
+    const double rest = offsets_.variance(segment_, quiet_ != nullptr ? quiet_[segment_] : 0.0);
+    if (!lasts_ && !noticeable(rest)) return true;
+    const int first = has_wrench_ ? 6 : 0;
+    for (int i = 0; i < first; ++i) wrench_[i] -= offsets_.wrench()[i];
+    for (int i = 0; i < count_; ++i) {
+      own_[i] -= offset_of(*used_[i]);
+      outboard_[i] -= offset_of(*used_[i]);
+    }
+    for (int i = 0; i < size_ * size_; ++i) covariance_[i] *= 1.0 + rest;
+    for (int i = 0; i < size_ * size_; ++i) factor_[i] *= std::sqrt(1.0 + rest);
+    return true;
+  }
+
+  // Are offsets, which have the part `rest` of the variance of a sample, more than noise?
+  bool noticeable(double rest) {
     const int first = has_wrench_ ? 6 : 0;
     double* d = design_.data();
     std::copy(offsets_.wrench(), offsets_.wrench() + first, d);
@@ -222,16 +246,7 @@ class Measurement {
     solve_lower(factor_.data(), size_, d);
     double distance = 0.0;
     for (int i = 0; i < size_; ++i) distance += d[i] * d[i];
-    const double rest = offsets_.variance(segment_, quiet_ != nullptr ? quiet_[segment_] : 0.0);
-    if (distance < rest * chi2_limit(size_, kOffset)) return true;
-    for (int i = 0; i < first; ++i) wrench_[i] -= offsets_.wrench()[i];
-    for (int i = 0; i < count_; ++i) {
-      own_[i] -= offset_of(*used_[i]);
-      outboard_[i] -= offset_of(*used_[i]);
-    }
-    if (!weigh()) return false;
-    for (int i = 0; i < size_ * size_; ++i) factor_[i] *= std::sqrt(1.0 + rest);
-    return true;
+    return distance >= rest * chi2_limit(size_, kOffset);
   }
 
   double offset_of(const SegmentRow& r) const {
@@ -254,23 +269,30 @@ class Measurement {
     ++count_;
   }
 
-  // The covariance of all rows, from the sources of noise, and its Cholesky factor.
+  // The covariance of all rows by white noise, and its Cholesky factor.
   bool weigh() {
     noise_.clear();
     const int first = has_wrench_ ? 6 : 0;
-    if (has_wrench_) {
-      noise_.add_wrench(0, observer_.layout().segments[segment_],
-                        {{wrench_[0], wrench_[1], wrench_[2]}, {wrench_[3], wrench_[4], wrench_[5]}});
-    }
+    if (has_wrench_) noise_.add_wrench(0, observer_.layout().segments[segment_]);
     for (int i = 0; i < count_; ++i) {
       const SegmentRow& r = *used_[i];
       if (r.joint >= 0) {
-        noise_.add_joint(first + i, r.joint, own_[i]);
+        noise_.add_joint(first + i, r.joint);
       } else {
-        noise_.add_axis(first + i, r.sensor, r.axis, own_[i]);
+        noise_.add_axis(first + i, r.sensor, r.axis);
       }
     }
     noise_.covariance(size_, has_wrench_ ? 3 : 0, speed2_, covariance_.data());
+    return lasts_ || factor();
+  }
+
+  // And with the errors that last.
+  bool add_lasting() {
+    if (!lasts_) return true;
+    lasting_.covariance(observer_.layout().segments[segment_].sensor,
+                        {{wrench_[0], wrench_[1], wrench_[2]}, {wrench_[3], wrench_[4], wrench_[5]}},
+                        used_.data(), own_.data(), count_, size_, lasting_covariance_.data());
+    for (int i = 0; i < size_ * size_; ++i) covariance_[i] += lasting_covariance_[i];
     return factor();
   }
 
@@ -284,17 +306,18 @@ class Measurement {
   BaselineOffsets offsets_;
   SegmentRows rows_;
   RowLayout layout_;
+  LastingNoise lasting_;
   RowNoise noise_;
 
   int segment_ = 0, count_ = 0, size_ = 0;
-  const double *row_ = nullptr, *quiet_ = nullptr;
-  bool has_wrench_ = false;
+  const double *row_ = nullptr, *drift_ = nullptr, *quiet_ = nullptr;
+  bool has_wrench_ = false, lasts_ = false;
   double speed2_ = 0.0;  // sum of squares of the joints' velocities
   double wrench_[6] = {}, raw_wrench_[6] = {};
   std::vector<const SegmentRow*> used_;
   std::vector<double> own_;       // if the contact is inboard of the joint
   std::vector<double> outboard_;  // if it is outboard, less what the wrench says
-  std::vector<double> covariance_, factor_, design_;
+  std::vector<double> covariance_, lasting_covariance_, factor_, design_;
 };
 
 }  // namespace touchline

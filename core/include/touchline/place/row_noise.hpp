@@ -26,36 +26,30 @@ class RowNoise {
         sources_(6 * sensors_ + 2 * joints_),
         coefficients_(rows * sources_) {}
 
-  // Are torques as good as their noise figures say?
-  bool exact_torques() const { return figures_.torque_error == 0.0; }
-
   void clear() { std::fill(coefficients_.begin(), coefficients_.end(), 0.0); }
 
-  // Rows `at` to `at + 5`: the wrench of a segment [world], loaded by `load`.
-  void add_wrench(int at, const Segment& segment, const Spatial& load) {
+  // Rows `at` to `at + 5`: the wrench of a segment [world].
+  void add_wrench(int at, const Segment& segment) {
     const Gains g = gains(observer_.sensors()[segment.sensor].bandwidth);
-    add_sensor(at, segment.sensor, g, 1.0, load_error(segment.sensor, load));
-    for (int t : segment.successors) add_sensor(at, t, g, -1.0, LoadError{});
+    add_sensor(at, segment.sensor, g, 1.0);
+    for (int t : segment.successors) add_sensor(at, t, g, -1.0);
   }
 
-  // A row that is one axis of a sensor and reads `value`.
-  void add_axis(int at, int sensor, int axis, double value) {
+  // A row that is one axis of a sensor.
+  void add_axis(int at, int sensor, int axis) {
     double* out = row(at);
     const Gains g = gains(observer_.sensors()[sensor].bandwidth);
-    const double load = figures_.wrench_error * value;
-    const double filtered = g.reading * figures_.wrench[6 * sensor + axis];
-    out[6 * sensor + axis] = std::sqrt(filtered * filtered + load * load);
+    out[6 * sensor + axis] = g.reading * figures_.wrench[6 * sensor + axis];
     const int node = observer_.sensors()[sensor].node;
     add_velocity(posture_.axis(node, axis), node, g.velocity, out);
   }
 
-  // A row that is a joint's torque, less what the sensors outboard of it say, and reads `value`.
-  void add_joint(int at, int j, double value) {
+  // A row that is a joint's torque, less what the sensors outboard of it say.
+  void add_joint(int at, int j) {
     double* out = row(at);
     const JointRow& joint = observer_.joints()[j];
     const Gains g = gains(joint.bandwidth);
-    const double load = figures_.torque_error * value, filtered = g.reading * figures_.tau[j];
-    out[6 * sensors_ + j] = std::sqrt(filtered * filtered + load * load);
+    out[6 * sensors_ + j] = g.reading * figures_.tau[j];
     for (int node : joint.nodes) add_velocity(posture_.subspace(node), node, g.velocity, out);
     for (const Projection& pair : observer_.layout().outboard_sensors[j]) {
       const Spatial& s = posture_.subspace(observer_.layout().lines[pair.line]);
@@ -98,24 +92,11 @@ class RowNoise {
             (1.0 - a) / dt * std::sqrt(2.0 / (1.0 + a))};
   }
 
-  // The error of gains and model, which grows with the load, by the sensor's axes.
-  struct LoadError {
-    double force = 0.0, moment = 0.0;
-  };
-  LoadError load_error(int sensor, const Spatial& load) const {
-    const Spatial w = wrench_to_child(posture_.pose(observer_.sensors()[sensor].node), load);
-    return {figures_.wrench_error * std::sqrt(dot(w.linear, w.linear)),
-            figures_.wrench_error * std::sqrt(dot(w.angular, w.angular))};
-  }
-
-  void add_sensor(int at, int s, const Gains& g, double sign, const LoadError& error) {
+  void add_sensor(int at, int s, const Gains& g, double sign) {
     const int node = observer_.sensors()[s].node;
-    for (int a = 0; a < 6; ++a) {
-      const double filtered = g.reading * figures_.wrench[6 * s + a];
-      const double load = a < 3 ? error.force : error.moment;
+    for (int a = 0; a < 6; ++a)
       add_column(at, 6 * s + a, unit_wrench(node, a),
-                 sign * std::sqrt(filtered * filtered + load * load));
-    }
+                 sign * g.reading * figures_.wrench[6 * s + a]);
     for (int i = 0; i < joints_; ++i)
       add_column(at, 6 * sensors_ + joints_ + i, posture_.momentum(node, i),
                  sign * g.velocity * figures_.qd[i]);

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from touchline.bench.touches import Signals, Touch, TouchSampler, add_noise
 from touchline.contact.zones import Zones
 from touchline.estimation.dynamics import contact_loads, inverse_dynamics
+from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot
-from touchline.simulation.noise import perturbed
 
 Array = NDArray[np.float64]
 

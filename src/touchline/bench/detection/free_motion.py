@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from touchline.estimation.dynamics import inverse_dynamics
 from touchline.estimation.samples import Samples
+from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot
-from touchline.simulation.noise import perturbed
 
 Array = NDArray[np.float64]
 

@@ -20,6 +20,9 @@ class Cell:
         speed: of every joint [rad/s]; 0: at rest.
         alone: with "segments", the name of the only segment that is touched, at the same place of
             the same pose; "" for all of them.
+        model_error: 1 sigma of the relative errors of the masses and inertias that the pipeline is
+            told; the arm then swings, with `speed` at most.
+        calibrated: is it calibrated on motion of the same arm without contact?
     """
 
     arm: str
@@ -28,6 +31,8 @@ class Cell:
     begin: Begin = "apart"
     speed: float = 0.0
     alone: str = ""
+    model_error: float = 0.0
+    calibrated: bool = True
 
     @property
     def turning(self) -> bool:
@@ -50,7 +55,12 @@ class Cell:
     @property
     def motion(self) -> str:
         """What the arm does, in words."""
-        return f"{self.speed:g} rad/s" if self.speed else "at rest"
+        most = "up to " if self.model_error else ""
+        motion = f"{most}{self.speed:g} rad/s" if self.speed else "at rest"
+        if not self.model_error:
+            return motion
+        how = "" if self.calibrated else ", uncalibrated"
+        return f"{motion}, {100 * self.model_error:g} % off{how}"
 
     def each_alone(self, segments: tuple[str, ...]) -> list["Cell"]:
         """The touches of this cell one at a time; nothing where there is but one."""

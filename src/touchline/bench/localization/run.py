@@ -9,7 +9,7 @@ cone, sensors at 1 kHz with white noise; all of it through the real pipeline.
 import os
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 from time import perf_counter
@@ -19,7 +19,13 @@ import numpy as np
 from touchline.bench.localization.arm import ARMS
 from touchline.bench.localization.baselines import BASELINES
 from touchline.bench.localization.cell import Begin, Cell
-from touchline.bench.localization.scene import arm_and_skin, make_scene, touched_segments
+from touchline.bench.localization.course import course_table
+from touchline.bench.localization.scene import (
+    arm_and_skin,
+    make_scene,
+    told_and_real,
+    touched_segments,
+)
 from touchline.bench.localization.segment_table import segment_tables
 from touchline.bench.localization.table import (
     baseline_table,
@@ -50,6 +56,9 @@ class Plan:
         runs: per cell.
         seed: of all that is random.
         baselines: names of those that run along.
+        model_error: 1 sigma of the relative errors of masses and inertias; 0: the model is right.
+        calibrated: is the pipeline calibrated on motion of the same arms, if they are not as
+            modelled?
     """
 
     robots: tuple[str, ...] = ARMS
@@ -60,6 +69,8 @@ class Plan:
     runs: int = 1000
     seed: int = 0
     baselines: tuple[str, ...] = tuple(BASELINES)
+    model_error: tuple[float, ...] = (0.0,)
+    calibrated: bool = True
 
     def cells(self) -> list[Cell]:
         """Every combination that there is.
@@ -72,21 +83,23 @@ class Plan:
             for arm in self.robots
             for tier in self.noise
             for speed in self.speeds
-            for cell in self._of(arm, tier, speed)
+            for error in self.model_error
+            for cell in self._of(arm, tier, speed, error)
         ]
 
-    def _of(self, arm: str, tier: int, speed: float) -> list[Cell]:
+    def _of(self, arm: str, tier: int, speed: float, error: float) -> list[Cell]:
+        base = Cell(arm, 1, tier, speed=speed, model_error=error, calibrated=self.calibrated)
         cells: list[Cell] = []
         timings: list[Begin] = [begin for begin in self.begin if begin != "segments"]
         if 1 in self.contacts and timings:
-            cells.append(Cell(arm, 1, tier, speed=speed))
+            cells.append(base)
         for begin in timings:
-            cells += [Cell(arm, n, tier, begin, speed) for n in self.contacts if n > 1]
+            cells += [replace(base, contacts=n, begin=begin) for n in self.contacts if n > 1]
         if "segments" in self.begin:
             segments = touched_segments(arm_and_skin(arm, tier)[0])
             if not segments:
                 raise InputError(f"--begin segments: {arm} has no six-axis sensor, so no segment")
-            each = Cell(arm, len(segments), tier, "segments", speed)
+            each = replace(base, contacts=len(segments), begin="segments")
             cells += [*each.each_alone(segments), each]
         return cells
 
@@ -129,7 +142,8 @@ def update_time(cell: Cell, seed: int = 0, runs: int = TIMED) -> float:
     for run in range(runs):
         scene = make_scene(cell, run, seed)
         s = scene.signals
-        pipeline = make_pipeline(*arm_and_skin(cell.arm, cell.tier))
+        robot, _, skin = told_and_real(cell, run)
+        pipeline = make_pipeline(robot, skin, model_error=cell.model_error)
         begun = max(onset for _, onset in scene.touches) + 0.02
         for sample in zip(s.time, s.q, s.qd, s.tau, s.wrench, strict=True):
             start = perf_counter()
@@ -146,10 +160,13 @@ def main(plan: Plan | None = None, out: Path | None = None, processes: int | Non
 
     plan = plan or Plan()
     check_least(1, runs=plan.runs)
-    check_least(0, seed=plan.seed, **{"speeds": min(plan.speeds, default=0.0)})
+    check_least(0, seed=plan.seed, speeds=min(plan.speeds, default=0.0))
+    check_least(0, **{"model-error": min(plan.model_error, default=0.0)})
     cells = plan.cells()
     if not cells:
-        raise InputError("nothing to run: one of robots, contacts, noise, begin, speeds is empty")
+        raise InputError(
+            "nothing to run: one of robots, contacts, noise, begin, speeds, model-error is empty"
+        )
     prepare_results(out)
     for arm in plan.robots:
         arm_and_skin(arm, plan.noise[0])  # a missing model is told before the work
@@ -162,7 +179,7 @@ def main(plan: Plan | None = None, out: Path | None = None, processes: int | Non
     trials.sort(key=lambda trial: (order[trial.cell], trial.run))
     times = {cell: update_time(cell, plan.seed, min(TIMED, plan.runs)) for cell in cells}
     parts = [tables(trials, times), segment_tables(trials, times), published()]
-    parts += [rank_table(trials), baseline_table(trials), failures(trials)]
+    parts += [course_table(trials), rank_table(trials), baseline_table(trials), failures(trials)]
     text = "\n\n".join(part for part in parts if part)
     print(text)
     if out is not None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from touchline.bench.localization.arm import load_arm
 from touchline.bench.localization.cell import Cell
 from touchline.bench.localization.moving import moving_signals
+from touchline.bench.localization.wrong_model import RUNS, wrong_model
 from touchline.bench.touches import (
     Signals,
     Touch,
@@ -29,6 +30,9 @@ Array = NDArray[np.float64]
 FORCE = 20.0  # N
 FIRST, APART = 0.55, 0.1  # s: the first onset, after settling and a quiet half second, then each
 FRICTION = 0.5
+# Of an arm that is not as its model: s, until the first onset, and of touching; Hz, of its swing.
+LATER, LONGER, SWING = 2.0, 0.5, 0.5
+ARMS_OFF = 16  # arms with errors of their own
 
 
 @dataclass(frozen=True)
@@ -50,6 +54,16 @@ def arm_and_skin(arm: str, tier: int) -> tuple[Robot, Skin]:
     return robot, Skin(robot)
 
 
+def told_and_real(cell: Cell, run: int) -> tuple[Robot, Robot, Skin]:
+    """What the pipeline is told of the arm of a run, the arm that moves, and its surfaces."""
+    robot, skin = arm_and_skin(cell.arm, cell.tier)
+    if not cell.model_error:
+        return robot, robot, skin
+    number = run // RUNS % ARMS_OFF
+    told, real = wrong_model(cell.arm, cell.tier, cell.model_error, number)
+    return told if cell.calibrated else robot, real, skin
+
+
 def touched_segments(robot: Robot) -> tuple[str, ...]:
     """Those that begin at a six-axis sensor."""
     return tuple(name for name in robot.segment_names if name != "root")
@@ -60,19 +74,20 @@ def make_scene(cell: Cell, run: int, seed: int = 0) -> Scene:
 
     Tiers, timing, and whether a touch is alone do not change pose and places.
     """
-    robot, skin = arm_and_skin(cell.arm, cell.tier)
+    _, robot, skin = told_and_real(cell, run)
     chance = np.random.default_rng([seed, run, cell.contacts, *cell.arm.encode()])
     touches = _sample(cell, robot, skin, chance)
     step = APART if cell.begin == "apart" else 0.0
-    onsets = [(touch, FIRST + i * step) for i, touch in enumerate(touches)]
-    duration = onsets[-1][1] + APART
+    first, last, swing = (LATER, LONGER, SWING) if cell.model_error else (FIRST, APART, 0.0)
+    onsets = [(touch, first + i * step) for i, touch in enumerate(touches)]
+    duration = onsets[-1][1] + last
     if cell.alone:
         onsets = [pair for pair in onsets if pair[0].patch.segment == cell.alone]
     noise = np.random.default_rng([seed, run, cell.tier, 1]) if cell.tier else None
     if not cell.speed:
         return Scene(onsets, resting_signals(robot, touches[0].q, onsets, duration, noise))
     signals = moving_signals(
-        robot, onsets, duration, cell.speed, chance, noise, turning=cell.turning
+        robot, onsets, duration, cell.speed, chance, noise, swing=swing, turning=cell.turning
     )
     return Scene(onsets, signals, cell.turning)
 

@@ -39,9 +39,9 @@ def segment_tables(trials: Sequence[Trial], times: dict[Cell, float]) -> str:
 
 
 def _rows(trials: Sequence[Trial], times: dict[Cell, float]) -> Iterator[Row]:
-    """Speed by speed and segment by segment: alone, then all at once; then all segments."""
-    for speed in dict.fromkeys(trial.cell.speed for trial in trials):
-        own = [trial for trial in trials if trial.cell.speed == speed]
+    """Motion by motion and segment by segment: alone, then all at once; then all segments."""
+    for motion in dict.fromkeys(trial.cell.motion for trial in trials):
+        own = [trial for trial in trials if trial.cell.motion == motion]
         segments = list(dict.fromkeys(touch.segment for t in own for touch in t.touches))
         for segment in [*segments, EVERY] if len(segments) > 1 else segments:
             yield from _pair(own, segment, times)

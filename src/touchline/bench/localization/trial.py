@@ -7,12 +7,13 @@ import numpy as np
 
 from touchline.bench.localization.baselines import baseline_places
 from touchline.bench.localization.cell import Cell
+from touchline.bench.localization.course import Course, follow_course
 from touchline.bench.localization.matching import distances, match
 from touchline.bench.localization.scene import (
     FRICTION,
     Scene,
-    arm_and_skin,
     make_scene,
+    told_and_real,
     true_places,
 )
 from touchline.bench.localization.touched import NEAR, Touched, judge, last_answers
@@ -29,7 +30,7 @@ class Trial:
 
     `rank` is the number of independent equations of a pair on one segment, which needs ten; 0
     where the touches do not share one. `baselines` are names and errors [m].
-    `statuses` are those of all contacts at the last sample.
+    `statuses` are those of all contacts at the last sample, `course` tells of all samples.
     """
 
     cell: Cell
@@ -40,6 +41,7 @@ class Trial:
     events: int
     statuses: tuple[str, ...]
     rank: int
+    course: Course
     baselines: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
     @property
@@ -66,9 +68,9 @@ class Trial:
 
 def run_trial(cell: Cell, run: int, seed: int = 0, baselines: tuple[str, ...] = ()) -> Trial:
     """One run through the whole pipeline, and through the named `BASELINES`."""
-    robot, skin = arm_and_skin(cell.arm, cell.tier)
+    robot, _, skin = told_and_real(cell, run)
     scene = make_scene(cell, run, seed)
-    pipeline = make_pipeline(robot, skin)
+    pipeline = make_pipeline(robot, skin, model_error=cell.model_error)
     s = scene.signals
     estimate, detection = pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
     touches = tuple(judge(pipeline, scene, with_region=cell.begin != "segments"))
@@ -83,6 +85,7 @@ def run_trial(cell: Cell, run: int, seed: int = 0, baselines: tuple[str, ...] = 
         len(pipeline.events),
         tuple(answer.status or "" for answer in answers),
         pair_rank(robot, [touch.body for touch in touches]),
+        follow_course(pipeline, scene),
         tuple(
             (name, errors)
             for name in baselines
@@ -103,13 +106,22 @@ def _baseline(
     return tuple(np.nan if k is None else float(apart[i, k]) for i, k in enumerate(mine))
 
 
-def make_pipeline(robot: Robot, skin: Skin, rule: str = "likelihood") -> Pipeline:
+def make_pipeline(
+    robot: Robot, skin: Skin, rule: str = "likelihood", model_error: float = 0.0
+) -> Pipeline:
     """The pipeline as the benchmark uses it.
 
-    It is told what is true of the benchmark: errors are those of the noise figures alone, and how
-    large the friction cone is.
+    It is told what is true of the benchmark: sensors err by the noise figures alone, how wrong the
+    model is (where calibration does not tell), and how large the friction cone is.
     """
-    return Pipeline(robot, skin=skin, rule=rule, torque_error=0.0, friction=FRICTION)
+    return Pipeline(
+        robot,
+        skin=skin,
+        rule=rule,
+        torque_error=0.0,
+        friction=FRICTION,
+        model_error=model_error,
+    )
 
 
 def pair_rank(robot: Robot, bodies: list[str]) -> int:

@@ -24,6 +24,7 @@ def _flat(trial: Trial) -> list[dict]:
         "named": trial.named,
         "events": trial.events,
         "found": trial.found,
+        **vars(trial.course),
     }
     rows = []
     for i, touch in enumerate(trial.touches):

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Arms whose inertias are not as the model says, calibrated on their own motion without contact.
+
+Every so many runs have an arm of their own. Each is calibrated as by `touchline calibrate`: on
+minutes of random motion within its joint limits, with the sensors and the noise of the benchmark.
+"""
+
+from functools import lru_cache
+
+from touchline.bench.detection.free_motion import (
+    MotionMaker,
+    generator,
+    imperfect,
+    random_trajectory,
+)
+from touchline.bench.localization.arm import load_arm
+from touchline.contact import calibration as cal
+from touchline.model.robot import Robot
+
+RUNS = 25  # that share an arm
+MINUTES = 6  # of motion, in recordings of one minute
+RATE = 1000.0  # Hz
+
+
+@lru_cache(maxsize=4)
+def wrong_model(arm: str, tier: int, error: float, number: int) -> tuple[Robot, Robot]:
+    """An arm as described, and as it is.
+
+    Args:
+        arm: its name.
+        tier: of noise.
+        error: 1 sigma of the relative errors of masses and inertias (see `imperfect`).
+        number: of the arm: each has errors of its own.
+
+    Returns:
+        The robot with the model as it stands in its file, calibrated, and the robot that moves.
+    """
+    robot = load_arm(arm, tier)
+    real = imperfect(robot, error, 1000 + number)
+    maker = MotionMaker(robot, real, RATE)
+
+    def recordings():
+        for minute in range(MINUTES):
+            rng = generator(number, minute)
+            yield [maker.samples(random_trajectory(robot, rng), rng)]
+
+    period, methods = 1.0 / RATE, robot.description.detection.method
+    rows = cal.fit_rows(robot, period, cal.collect_residuals(robot, period, recordings()))
+    robot = cal.with_methods(robot, *methods, min_duration=0.0)
+    found = cal.collect_statistics(robot, period, rows, recordings(), methods)
+    tails = cal.fit_tails(robot, found, methods)
+    return cal.with_calibration(robot, cal.describe(found.hours, period, rows, tails)), real

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The localizer knows what errors of the model add as the arm moves on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import touchline as tl
+from touchline.bench.localization.cell import Cell
+from touchline.bench.localization.course import follow_course
+from touchline.bench.localization.scene import make_scene, told_and_real
+from touchline.bench.localization.trial import run_trial
+from touchline.contact.detector import Detector
+from touchline.contact.localizer import Localizer
+from touchline.contact.model_drift import WAY, guess_drift
+from touchline.contact.pipeline import Pipeline
+from touchline.contact.thresholds import expect_drift, make_thresholds
+from touchline.estimation.dynamics import gravity_loads
+from touchline.model.perturbed import perturbed
+from touchline.model.robot import Robot
+from touchline.model.transforms import move_wrench
+
+OFF = Cell("sara", tier=1, speed=1.0, model_error=0.02)
+CONSTANT, SPEED, ACCELERATION = 0.3, 0.05, 0.02
+
+
+@pytest.fixture(scope="module")
+def sara():
+    return tl.load_robot("sara")
+
+
+def expecting(thresholds, *drift):
+    return replace(thresholds, rows=tuple(replace(r, drift=drift) for r in thresholds.rows))
+
+
+def drift_of(robot, q, qd, *drift):
+    """Drifts (N, r) of every row at 1 kHz, and the rows."""
+    observer = tl.Observer(robot)
+    thresholds = expecting(make_thresholds(robot), *drift)
+    found = Detector(observer, thresholds)
+    n, k = q.shape[1], len(robot.sensor_names)
+    weight = gravity_loads(robot, q)
+    signals = np.arange(len(q)) * 1e-3, q, qd, weight.torque, weight.wrench.reshape(-1, k, 6)
+    assert signals[3].shape == (len(q), n)
+    return found.run(*signals)[1].drift, thresholds.rows
+
+
+def test_one_touch_of_a_wrong_model_in_motion_is_one():
+    """Masses and inertias are 2 % off: the same touches, without what is known of that."""
+    for run in (0, 30):
+        trial = run_trial(OFF, run)
+        assert trial.found
+        assert trial.course.samples > 400
+        assert trial.course.several == trial.course.wrong == 0
+        robot, _, skin = told_and_real(OFF, run)
+        blind = Pipeline(robot, skin=skin, torque_error=0.0, friction=0.5)
+        thresholds = expecting(blind.detector.thresholds, 0.0, 0.0, 0.0)
+        blind.detector = Detector(blind.observer, thresholds)
+        blind.recorder.detector = blind.detector
+        scene = make_scene(OFF, run)
+        s = scene.signals
+        blind.run(s.time, s.q, s.qd, s.tau, s.wrench)
+        assert follow_course(blind, scene).several > 100
+
+
+def test_an_arm_at_rest_keeps_what_its_baseline_took_out(sara):
+    q = np.tile(np.linspace(-0.5, 0.7, 7), (300, 1))
+    drift, _ = drift_of(sara, q, np.zeros_like(q), CONSTANT, SPEED, ACCELERATION)
+    np.testing.assert_array_equal(drift[200:], 0.0)
+
+
+def test_drift_grows_with_the_way_since_the_baseline_and_with_motion(sara):
+    """Slowly on, then back: weight comes and goes with the pose, friction with motion."""
+    t = np.arange(3000)[:, None] * 1e-3
+    ramp = np.clip(t - 0.4, 0.0, 1.0)
+    q = np.linspace(-0.5, 0.7, 7) + 0.3 * ramp
+    qd = np.where((t > 0.4) & (t < 1.4), 0.3, 0.0) * np.ones(7)
+    drift, rows = drift_of(sara, q, qd, CONSTANT, 0.0, 0.0)
+    wrench = np.array([row.component >= 0 for row in rows])
+    half = np.sqrt(7) * 0.15 / WAY * CONSTANT
+    # The baseline follows: within the half second it has come at most some way along.
+    assert (drift[900][wrench] > 0.5 * half).all() and (drift[900][wrench] <= half).all()
+    np.testing.assert_allclose(drift[900][~wrench], CONSTANT, rtol=0.2)
+    assert (drift[2900] < drift[1400]).all()  # it goes on averaging where the arm has come to rest
+    moving, _ = drift_of(sara, q, qd, 0.0, SPEED, 0.0)
+    np.testing.assert_allclose(moving[900], SPEED * 7 * 0.3**2, rtol=0.02)
+    quick, _ = drift_of(sara, q, qd + np.maximum(t - 2.0, 0.0), 0.0, 0.0, ACCELERATION)
+    np.testing.assert_allclose(quick[2900], ACCELERATION * np.sqrt(7), rtol=0.02)
+
+
+def test_drift_enters_the_wrench_in_the_frame_of_its_sensor(sara):
+    rng = np.random.default_rng(0)
+    q = rng.uniform(-1.0, 1.0, 7)
+    weight = gravity_loads(sara, q)
+    observer = tl.Observer(sara)
+    thresholds = make_thresholds(sara)
+    localizer = Localizer(observer, thresholds, torque_error=0.0)
+    detector = Detector(observer, thresholds)
+    for i in range(300):
+        found = detector.update(1e-3 * i, q, 0 * q, weight.torque, weight.wrench.reshape(-1, 6))
+    estimate, detection = found
+    drift = rng.uniform(0.1, 1.0, len(thresholds.rows))
+    detection = replace(detection, drift=drift)
+    for name in sara.sensor_names:
+        plain = localizer.wrench_covariance(name, q, estimate)
+        wider = localizer.wrench_covariance(name, q, estimate, detection)
+        g = sara.segment_names.index(name)
+        own = np.array([
+            d for row, d in zip(thresholds.rows, drift, strict=True)
+            if row.segment == g and row.component >= 0
+        ])  # fmt: skip
+        X = move_wrench(sara.sensor_poses(q)[sara.sensor_names.index(name)])
+        np.testing.assert_allclose(wider - plain, X @ np.diag(own**2) @ X.T, atol=1e-9)
+
+
+def test_a_guess_stands_in_for_a_calibration(sara):
+    """Of other arms that are off as much: weight on the way, row by row within a factor of two."""
+    torques, wrenches = guess_drift(sara, 0.02)
+    rng = np.random.default_rng(5)
+    q = rng.uniform(-1.5, 1.5, (100, 7))
+    way = rng.normal(size=q.shape)
+    on = q + WAY * way / np.linalg.norm(way, axis=1, keepdims=True)
+    squares = np.zeros((2, 7))
+    for _ in range(12):
+        off = Robot(sara.description, perturbed(sara.mechanism, 0.02, rng))
+        errors = [gravity_loads(off, x).wrench - gravity_loads(sara, x).wrench for x in (q, on)]
+        torque = [gravity_loads(off, x).torque - gravity_loads(sara, x).torque for x in (q, on)]
+        squares[0, :6] += np.mean((errors[1] - errors[0])[:, 0] ** 2, axis=0) / 12
+        squares[1] += np.mean((torque[1] - torque[0]) ** 2, axis=0) / 12
+    base = sara.segment_names.index("base")
+    # The base sensor stands still, so that all of its segment's weight is in the same two moments.
+    ratio = np.sqrt(squares[0, 3:5]) / wrenches[base, 3:5, 0]
+    assert ((ratio > 0.5) & (ratio < 2.0)).all()
+    np.testing.assert_allclose(wrenches[base, [0, 1, 2, 5], 0], 0.0, atol=1e-9)
+    assert np.sqrt(squares[1, 1]) / torques[1, 0] == pytest.approx(1.0, abs=0.6)
+    thresholds = make_thresholds(sara)
+    assert expect_drift(sara, thresholds, 0.0) is thresholds
+    guessed = expect_drift(sara, thresholds, 0.02)
+    assert all(max(row.drift) > 0 for row in guessed.rows)
+    assert [replace(row, drift=(0.0, 0.0, 0.0)) for row in guessed.rows] == list(thresholds.rows)
+
+
+def test_a_calibrated_robot_brings_its_own():
+    told, _, _ = told_and_real(OFF, 0)
+    known = told.description.detection.calibration.rows
+    thresholds = make_thresholds(told)
+    assert {row.drift for row in thresholds.rows} == {row.slow for row in known.values()}
+    assert expect_drift(told, thresholds, 0.02) is thresholds
