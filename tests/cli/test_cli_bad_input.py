@@ -19,6 +19,7 @@ from free_motion import free_motion
 import touchline as tl
 from touchline.cli import main
 from touchline.logs import write_table
+from touchline.logs.truth import read_truth
 
 
 @pytest.fixture(scope="module")
@@ -359,3 +360,82 @@ def test_gzip_that_is_none(capsys, tmp_path):
 def test_a_benchmark_is_told_what_it_cannot_do(arguments, message, capsys):
     assert main(["bench", *arguments.split()]) == 2
     assert re.search(message, capsys.readouterr().err)
+
+
+@pytest.mark.parametrize("name", ["log.csv", "log.parquet"])
+def test_a_folder_that_is_called_like_a_table(capsys, tmp_path, name):
+    (tmp_path / name).mkdir()
+    assert "holds no rosbag2" in refused(capsys, tmp_path / name, tmp_path / "r")
+
+
+def test_a_name_that_no_file_can_have(capsys, log, tmp_path):
+    name = "x" * 300
+    for arguments in (
+        ["analyze", f"{name}.csv", "--robot", "sara", "--out", str(tmp_path / "r")],
+        ["analyze", str(log), "--robot", "sara", "--out", str(tmp_path / name)],
+        ["check", name],
+    ):
+        assert main(arguments) == 2
+        assert "File name too long" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["simulate", "three_touches", "--out", "x.parquet"],
+        ["demo", "--no-browser", "--duration", "1"],
+        ["demo", "--headless", "--duration", "4"],
+        ["reproduce", "fig4", "--out", "x"],
+    ],
+)
+def test_a_seed_is_not_negative(capsys, tmp_path, monkeypatch, command):
+    monkeypatch.chdir(tmp_path)
+    assert main([*command, "--seed", "-1"]) == 2
+    assert "--seed -1: must be at least 0" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_port_is_a_port(capsys):
+    for port in ("-1", "65536"):
+        assert main(["demo", "--no-browser", "--duration", "1", "--port", port]) == 2
+        assert "must be from 0 to 65535" in capsys.readouterr().err
+
+
+def test_more_than_memory_holds(capsys, tmp_path):
+    out = ["--out", str(tmp_path / "x.parquet")]
+    assert main(["simulate", "free_motion", *out, "--seconds", "1e9"]) == 1
+    assert "not enough memory" in capsys.readouterr().err
+
+
+def test_readings_beyond_all_reason(capsys, log):
+    table = pq.read_table(log)
+    for name in table.column_names:
+        if name != "time":
+            huge = pa.array(1e300 * np.array(table.column(name)))
+            table = table.set_column(table.column_names.index(name), name, huge)
+    pq.write_table(table, log)
+    assert main(["check", "sara", str(log)]) == 1
+    assert "findings:" in capsys.readouterr().out
+
+
+def with_truth(path, links, metadata):
+    """Adds a true contact in every sample; `links` are the numbers of what it touches."""
+    table = pq.read_table(path)
+    for part in ("x", "y", "z", "fx", "fy", "fz"):
+        table = table.append_column(f"truth.contact.0.{part}", pa.array(np.ones(len(table))))
+    table = table.append_column("truth.contact.0.link", pa.array(np.full(len(table), links)))
+    pq.write_table(table.replace_schema_metadata(metadata), path)
+
+
+@pytest.mark.parametrize(
+    ("links", "metadata"),
+    [(99, {"a": '{"truth.links": ["link1"]}'}), (np.inf, None), (0, None), (0, {"author": "me"})],
+)
+def test_a_truth_that_cannot_be_read_is_none(log, tmp_path, links, metadata):
+    with_truth(log, links, metadata)
+    assert analyze(log, tmp_path / "r") == 0
+
+
+def test_a_truth_beside_what_others_left_is_read(log):
+    with_truth(log, 0, {"author": "me", "robot": '{"truth.links": ["link1"]}'})
+    assert [contact.link for contact in read_truth(log)] == ["link1"]

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+UNREAL = 1e12  # in any unit: no reading of a sensor
 TUKEY = 4.7  # standard deviations beyond which a point does not count (95 % efficiency)
 NEAR = 0.12  # a factor within this fraction of a named one is that one
 
@@ -62,7 +63,7 @@ def robust_line(X: Array, y: Array, rounds: int = 30) -> Line | None:
     Returns:
         None where there are too few points.
     """
-    use = np.isfinite(y) & np.isfinite(X).all(axis=1)
+    use = (np.abs(y) < UNREAL) & (np.abs(X) < UNREAL).all(axis=1)
     X, y = X[use], y[use]
     if len(y) < max(3, 2 * X.shape[1]):
         return None
@@ -77,8 +78,8 @@ def robust_line(X: Array, y: Array, rounds: int = 30) -> Line | None:
             weight = np.minimum(1.0, 1.5 * spread / np.maximum(np.abs(rest), 1e-300))
         else:
             weight = np.clip(1 - (rest / (TUKEY * spread)) ** 2, 0, None) ** 2
-    covariance = spread**2 * np.linalg.pinv((X * weight[:, None]).T @ X)
-    return Line(beta, np.sqrt(np.diag(covariance)), spread)
+    inverse = np.linalg.pinv((X * weight[:, None]).T @ X)
+    return Line(beta, spread * np.sqrt(np.diag(inverse)), spread)
 
 
 def named_factor(value: float, factors: dict[float, str]) -> str | None:

@@ -7,6 +7,7 @@ from typing import Annotated
 from tyro.conf import arg
 
 from touchline.errors import InputError
+from touchline.numbers import check_least, check_positive
 
 HEADLESS_DURATION = 12.0  # s
 
@@ -43,10 +44,11 @@ def demo(
         port: The first port that is tried.
         browser: Open the page in the browser.
     """
+    check_least(0, seed=seed)
     if headless:
         return _print(HEADLESS_DURATION if duration is None else duration, out, seed)
-    if duration is not None and not duration > 0.0:
-        raise InputError(f"--duration {duration}: must be a positive number")
+    if duration is not None:
+        check_positive(duration=duration)
     return _show(host, port, seed, browser, duration)
 
 

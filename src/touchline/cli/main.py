@@ -86,6 +86,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has seen enough
         sys.stdout = None
         return 0
+    except MemoryError as error:
+        return _complain(f"not enough memory: {error}", 1)
+    except OSError as error:  # no room, no permission, a name that no file can have
+        if error.filename is None:
+            return _complain(str(error), 1)
+        return _complain(f"{error.filename}: {error.strerror}", 2)
 
 
 def _dispatch(arguments: list[str]) -> int:

@@ -6,6 +6,8 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
+from touchline.numbers import check_least
+
 Name = Literal["fig4", "fig5", "fig6", "applications"]
 
 
@@ -32,6 +34,7 @@ def reproduce(
     from touchline.reproduce.run import reproduce as run
     from touchline.reproduce.run import summary_text
 
+    check_least(0, seed=seed)
     experiments = run(names, out, seed)
     print(summary_text(experiments, out))
     return 0 if all(c.holds for e in experiments for c in e.checks) else 1

@@ -7,6 +7,7 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 
 from touchline.errors import InputError
+from touchline.numbers import check_least, check_positive
 
 
 def simulate(
@@ -50,13 +51,15 @@ def simulate(
     from touchline.simulation.record import simulate_to_log
     from touchline.simulation.scene import Run
 
-    _check_numbers(rate=rate, physics=physics, seconds=seconds, force=force)
-    if not (0.0 <= model_error < 1.0 and (speed is None or 0.0 <= speed < float("inf"))):
-        raise InputError("--speed: allowed: 0 or more; --model-error: 0 to below 1")
-    if physics % rate:
-        raise InputError(f"--rate {rate:g}: does not divide --physics {physics:g}")
     given = {"seconds": seconds, "speed": speed, "force": force}
     options = {name: value for name, value in given.items() if value is not None}
+    positive = {name: value for name, value in options.items() if name != "speed"}
+    check_positive(rate=rate, physics=physics, **positive)
+    check_least(0, seed=seed, speed=options.get("speed", 0.0))
+    if not 0.0 <= model_error < 1.0:
+        raise InputError(f"--model-error {model_error:g}: must be from 0 to below 1")
+    if physics % rate:
+        raise InputError(f"--rate {rate:g}: does not divide --physics {physics:g}")
     model = load_robot(robot)
     sensors = SensorNoise() if noise else None
     settings = Run(seed, rate, physics, noise=sensors, model_error=model_error)
@@ -66,9 +69,3 @@ def simulate(
     touched = f"touched: {', '.join(links)}" if links else "nothing touches the arm"
     print(f"{out}: {len(simulated.samples)} samples at {rate:g} Hz of {model.name}; {touched}")
     return 0
-
-
-def _check_numbers(**options: float | None) -> None:
-    for name, value in options.items():
-        if value is not None and not 0.0 < value < float("inf"):
-            raise InputError(f"--{name} {value:g}: must be a positive number")

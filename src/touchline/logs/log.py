@@ -98,6 +98,10 @@ def _open_source(path: Path, description: RobotDescription) -> Source:
     name = path.name.lower()
     if path.is_file() and not path.stat().st_size:
         raise InputError(f"{path}: the file is empty")
+    if path.is_dir() or name.endswith(BAGS):
+        from touchline.logs.rosbag import RosbagSource
+
+        return RosbagSource(path, description, naming)
     if name.endswith(".parquet"):
         from touchline.logs.parquet import ParquetSource
 
@@ -106,10 +110,6 @@ def _open_source(path: Path, description: RobotDescription) -> Source:
         from touchline.logs.csvfile import CsvSource
 
         return CsvSource(path, description, naming)
-    if path.is_dir() or name.endswith(BAGS):
-        from touchline.logs.rosbag import RosbagSource
-
-        return RosbagSource(path, description, naming)
     raise InputError(
         f"{path}: not a known kind of log; tables end in {', '.join(TABLES)}, recordings in "
         f"{', '.join(BAGS)} (a rosbag2 folder holds a metadata.yaml)"

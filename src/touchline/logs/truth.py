@@ -2,6 +2,7 @@
 """What really touched the robot of a simulated log; never read by what estimates."""
 
 import json
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -62,16 +63,25 @@ def read_truth(log: Path) -> list[TrueContact]:
     if log.suffix != ".parquet":
         return []
     schema = pq.read_schema(log)
-    slots = sorted({int(n.split(".")[2]) for n in schema.names if n.startswith("truth.contact.")})
-    if not slots:
-        return []
-    links: list[str] = next(
-        value["truth.links"]
-        for value in map(json.loads, (schema.metadata or {}).values())
-        if isinstance(value, dict) and "truth.links" in value
-    )
+    slots = [i for i in range(len(schema.names)) if set(_columns(i)) <= set(schema.names)]
+    links = _links(schema.metadata or {})
     contacts = [contact for slot in slots for contact in _contacts(log, slot, links)]
     return sorted(contacts, key=lambda contact: contact.time[0])
+
+
+def _columns(slot: int) -> list[str]:
+    prefix = f"truth.contact.{slot}"
+    return [f"{prefix}.link", *(f"{prefix}.{part}{axis}" for part in ("", "f") for axis in "xyz")]
+
+
+def _links(metadata: dict[bytes, bytes]) -> list[str]:
+    """The names that the numbers of links mean; none where nobody has left them."""
+    for value in metadata.values():
+        with suppress(ValueError):  # others leave what they like
+            found = json.loads(value)
+            if isinstance(found, dict) and "truth.links" in found:
+                return found["truth.links"]
+    return []
 
 
 def _contacts(log: Path, slot: int, links: list[str]) -> list[TrueContact]:
@@ -82,13 +92,13 @@ def _contacts(log: Path, slot: int, links: list[str]) -> list[TrueContact]:
         table = pq.read_table(log, columns=list(names))
         return np.stack([np.asarray(table.column(name), float) for name in names], axis=1)
 
-    prefix = f"truth.contact.{slot}"
-    link = np.nan_to_num(columns(f"{prefix}.link")[:, 0], nan=-1.0).astype(int)
+    number, *axes = _columns(slot)
+    told = columns(number)[:, 0]
+    link = np.where((told >= 0) & (told < len(links)), told, -1).astype(int)
     edges = np.flatnonzero(np.diff(link, prepend=-1, append=-1))
     spans = [(i, j) for i, j in zip(edges[:-1], edges[1:], strict=True) if link[i] >= 0]
     if not spans:
         return []
-    axes = [f"{prefix}.{part}{axis}" for part in ("", "f") for axis in "xyz"]
     rows = columns("time", *axes)
     found = []
     for i, j in spans:

@@ -73,6 +73,8 @@ def _own_names(host: str) -> frozenset[str]:
 
 def _free_port(host: str, port: int) -> int:
     """The first port that can be listened at; viser itself would hang where there is none."""
+    if not 0 <= port < 65536:
+        raise InputError(f"--port {port}: must be from 0 to 65535")
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     problem: OSError | None = None
     for candidate in [port] if port == 0 else range(port, min(port + PORTS, 65536)):
@@ -81,8 +83,8 @@ def _free_port(host: str, port: int) -> int:
             try:
                 trial.bind((host, candidate))
                 return candidate
-            except (OSError, OverflowError) as error:
-                problem = error if isinstance(error, OSError) else OSError(str(error))
+            except OSError as error:
+                problem = error
     raise InputError(f"--host {host} --port {port}: cannot listen there: {problem}")
 
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from touchline.bench.classification.interactions import BEGIN, Interaction, InteractionSampler
-from touchline.bench.request import check_least, prepare_results
+from touchline.bench.request import prepare_results
 from touchline.bench.tables import Row, aligned
 from touchline.bench.touches import TouchSampler
 from touchline.contact.event import Event
@@ -25,6 +25,7 @@ from touchline.contact.pipeline import Pipeline
 from touchline.contact.skin import Skin
 from touchline.model.description import ZONES
 from touchline.model.robot import Robot, load_robot
+from touchline.numbers import check_least
 
 KINDS = ("contact", "collision")
 CHUNK = 20

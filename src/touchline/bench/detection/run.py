@@ -27,9 +27,10 @@ from touchline.bench.detection.work import (
     joined,
     pieces,
 )
-from touchline.bench.request import check_least, prepare_results
+from touchline.bench.request import prepare_results
 from touchline.contact.calibration import fit_tails
 from touchline.errors import InputError
+from touchline.numbers import check_least
 
 FORCES = (2.0, 5.0, 10.0, 20.0, 50.0)  # N
 TRIALS = 200  # pushes of each force

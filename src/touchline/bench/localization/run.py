@@ -36,8 +36,9 @@ from touchline.bench.localization.table import (
 )
 from touchline.bench.localization.trial import Trial, make_pipeline, run_trial
 from touchline.bench.localization.trials_file import write_trials
-from touchline.bench.request import check_least, prepare_results
+from touchline.bench.request import prepare_results
 from touchline.errors import InputError
+from touchline.numbers import check_least
 
 CHUNK = 25  # runs handed to a process at once
 TIMED = 6  # runs whose updates are timed

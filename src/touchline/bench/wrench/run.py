@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from touchline.bench.request import check_least, prepare_results
+from touchline.bench.request import prepare_results
 from touchline.bench.wrench.methods import METHODS, Method
 from touchline.bench.wrench.scenarios import Scenario, scenarios
 from touchline.bench.wrench.scores import DEFAULT, MARGIN, TIE, Outcome, run_scenario
@@ -17,6 +17,7 @@ from touchline.bench.wrench.stage import Stage
 from touchline.bench.wrench.tables import link_table, scenario_table, tally, write_tables
 from touchline.errors import InputError
 from touchline.model.robot import load_robot
+from touchline.numbers import check_least
 
 ROBOT = "sara-full"  # a torque sensor in every joint, without which the classical route is lost
 RULES = f"""\

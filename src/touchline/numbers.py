@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Numbers that a user asks for, checked before the work."""
+
+from touchline.errors import InputError
+
+
+def check_least(least: float, **options: float) -> None:
+    """Checks numbers.
+
+    Raises:
+        InputError: one is below `least`, infinite or NaN.
+    """
+    for name, value in options.items():
+        if not least <= value < float("inf"):
+            raise InputError(f"--{name} {value:g}: must be at least {least:g}")
+
+
+def check_positive(**options: float) -> None:
+    """Checks numbers.
+
+    Raises:
+        InputError: one is not positive, or infinite.
+    """
+    for name, value in options.items():
+        if not 0.0 < value < float("inf"):
+            raise InputError(f"--{name} {value:g}: must be a positive number")
