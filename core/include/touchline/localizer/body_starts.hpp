@@ -37,10 +37,9 @@ class BodyStarts {
 
   // To where the body is now.
   void pose(const PairView& view, int body) {
-    const int node = view.node(body);
     for (std::size_t i = 0; i < own_.size(); ++i) {
-      points_[i] = view.surfaces().to_world(own_[i].point, node);
-      normals_[i] = view.surfaces().turn_to_world(own_[i].normal, node);
+      points_[i] = view.to_world(own_[i].point, body);
+      normals_[i] = view.turn_to_world(own_[i].normal, body);
       earlier_[i] = view.earlier(points_[i], body);
     }
   }

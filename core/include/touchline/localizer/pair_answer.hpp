@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "touchline/localizer/pair_search.hpp"
+#include "touchline/localizer/pair_parts.hpp"
 #include "touchline/place/answer.hpp"
 
 namespace touchline {
@@ -49,19 +49,56 @@ class PairAnswer {
     answer.degrees = std::max(1, rows - PairSearch::kUnknowns);
   }
 
-  // All that may be touched, where the contacts cannot be told apart: one region for each link,
-  // then the widest ones in two.
+  // All that may be touched, where the contacts cannot be told apart: as a first look has it.
   void name_all(const PairSearch& pairs, Answer& a) {
+    begin(pairs.count() > 0 ? pairs[0].rank : 0, PairStarts::kReach, a);
+    pairs.starts().regions([&](int surface, const Vec3& point, double cost) {
+      add(surface, point, cost);
+    });
+    gather(a);
+  }
+
+  // The same, as a walk over all that explains has it.
+  void name_all(const PairParts& parts, const LinkSurfaces& surfaces, Answer& a) {
+    begin(parts.rank(), parts.reach(), a);
+    for (int i = 0; i < parts.count(); ++i) {
+      const PairParts::Part& part = parts[i];
+      if (parts.explains(part))
+        add(part.surface, surfaces.to_world(part.point, surfaces[part.surface].node), part.cost);
+    }
+    gather(a);
+  }
+
+ private:
+  static constexpr double kSeparable = 0.9;  // probability of pairs that are told apart
+  static constexpr double kSure = 0.95;      // and of one that is located
+  static constexpr int kCells = 512;
+
+  // Part of a link that may be touched, and the region that it belongs to.
+  struct Cell {
+    int surface;
+    Vec3 point;
+    double cost;
+    int region;
+  };
+
+  void begin(int rank, double reach, Answer& a) {
     a.status = Status::not_separable;
     a.count = cells_ = 0;
-    a.rank = pairs.count() > 0 ? pairs[0].rank : 0;
+    a.rank = rank;
     a.unknowns = PairSearch::kUnknowns;
-    double least = std::numeric_limits<double>::infinity();
-    pairs.starts().regions([&](int, const Vec3&, double cost) { least = std::min(least, cost); });
-    pairs.starts().regions([&](int surface, const Vec3& point, double cost) {
-      if (cells_ == kCells) return;
-      cell_[cells_++] = {surface, point, std::exp(0.5 * (least - cost)), -1};
-    });
+    reach_ = reach;
+    least_ = std::numeric_limits<double>::infinity();
+  }
+
+  void add(int surface, const Vec3& point, double cost) {
+    if (cells_ == kCells) return;
+    cell_[cells_++] = {surface, point, cost, -1};
+    least_ = std::min(least_, cost);
+  }
+
+  // One region for each link, then the widest ones in two.
+  void gather(Answer& a) {
     for (int i = 0; i < cells_ && a.count < Answer::kCandidates; ++i) {
       bool known = false;
       for (int k = 0; k < a.count; ++k) known = known || a.candidates[k].surface == cell_[i].surface;
@@ -76,18 +113,6 @@ class PairAnswer {
     }
   }
 
- private:
-  static constexpr double kSeparable = 0.9;  // probability of pairs that are told apart
-  static constexpr double kSure = 0.95;      // and of one that is located
-  static constexpr int kCells = 512;
-
-  // Part of a link that may be touched, and the region that it belongs to.
-  struct Cell {
-    int surface;
-    Vec3 point;
-    double weight;
-    int region;
-  };
   void centre(Answer& a, int cell) {
     Candidate& k = a.candidates[a.count++];
     k = Candidate{};
@@ -125,9 +150,10 @@ class PairAnswer {
       }
       if (cell_[i].region < 0) continue;
       Candidate& k = a.candidates[cell_[i].region];
-      k.radius = std::max(k.radius, least + PairStarts::kReach);
-      k.weight += cell_[i].weight;
-      sum += cell_[i].weight;
+      k.radius = std::max(k.radius, least + reach_);
+      const double weight = std::exp(0.5 * (least_ - cell_[i].cost));
+      k.weight += weight;
+      sum += weight;
     }
     for (int k = 0; k < a.count; ++k) a.candidates[k].weight /= sum;
   }
@@ -153,6 +179,7 @@ class PairAnswer {
   const LocalizerSettings& settings_;
   Cell cell_[kCells];
   int cells_ = 0;
+  double reach_ = 0.0, least_ = 0.0;
 };
 
 }  // namespace touchline

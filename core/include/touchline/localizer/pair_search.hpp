@@ -10,7 +10,7 @@
 #include <cmath>
 #include <limits>
 
-#include "touchline/localizer/pair_fit.hpp"
+#include "touchline/localizer/pair_descent.hpp"
 #include "touchline/localizer/pair_starts.hpp"
 #include "touchline/place/approach.hpp"
 
@@ -26,6 +26,7 @@ class PairSearch {
         settings_(settings),
         view_(posture, surfaces, rows, segments),
         fit_(view_, settings),
+        descent_(view_, fit_),
         starts_(surfaces, settings, rows, segments) {}
 
   // Searches segment g, which `measurement` has read and whose rows are `lag` [s] old. The
@@ -42,36 +43,19 @@ class PairSearch {
 
   int count() const { return count_; }
   const Pair& operator[](int i) const { return solutions_[i]; }
-  // The parts of the segment that may be touched.
+  // What was searched, and where it began.
+  const PairView& view() const { return view_; }
   const PairStarts& starts() const { return starts_; }
 
  private:
   static constexpr int kSteps = 24;        // of a refinement
-  static constexpr double kFarthest = 0.04;  // that a step goes [m]
   static constexpr double kSame = 0.01;    // solutions nearer than this are one [m]
   static constexpr double kWindow = 25.0;  // of cost: beyond it a solution weighs nothing
   static constexpr double kHopeless = 1e5;  // cost after a third of the steps
 
   void refine(Pair s) {
-    fit_.solve_forces(s);
-    double damping = 1e-3;
-    for (int i = 0; i < kSteps && damping < 1e6; ++i) {
-      Pair next = s;
-      const double length = step(next, damping);
-      if (length < 1e-5) break;
-      fit_.solve_forces(next);
-      if (next.cost < s.cost) {
-        const bool flat = s.cost - next.cost < 1e-3 * s.cost && length < 1e-3;
-        s = next;
-        damping = std::max(1e-6, 0.2 * damping);
-        if (flat) break;
-      } else {
-        damping *= 8.0;
-      }
-      if (i == kSteps / 3 && s.cost > kHopeless) return;
-    }
-    if (s.cost > chi2_limit(view_.rows(), settings_.pitch_limit) + kWindow) return;
-    add(s);
+    descent_.descend(s, kSteps, kHopeless, false);
+    if (s.cost < chi2_limit(view_.rows(), settings_.pitch_limit) + kWindow) add(s);
   }
 
   // Where the line of either force enters its body elsewhere, it explains as well.
@@ -89,37 +73,11 @@ class PairSearch {
           other.ends[k].surface = surface;
           other.ends[k].point = point;
           other.ends[k].normal = normal;
-          fit_.solve_forces(other);
+          fit_.solve_forces(other, false);
           if (other.cost < s.cost + kWindow) add(other);
         });
       }
     }
-  }
-
-  // One damped Gauss-Newton step of the points; its length [m].
-  double step(Pair& s, double damping) {
-    double H[kUnknowns * kUnknowns], x[kUnknowns];
-    fit_.information(s, H, x);
-    for (int i = 6; i < kUnknowns; ++i) H[i * (kUnknowns + 1)] *= 1.0 + damping;
-    if (!cholesky(H, kUnknowns)) return 0.0;
-    solve_cholesky(H, kUnknowns, x);
-    double length = 0.0;
-    for (int k = 0; k < 2; ++k) {
-      PairEnd& e = s.ends[k];
-      Vec3 a, b;
-      tangents(e.normal, a, b);
-      Vec3 way = x[6 + 2 * k] * a + x[7 + 2 * k] * b;
-      const double size = norm(way);
-      if (size > kFarthest) way = (kFarthest / size) * way;
-      // The surface is no farther from there than where it was left.
-      const SurfacePoint p =
-          surfaces_.nearest(e.surface, e.point + way, std::min(size, kFarthest) + 1e-6);
-      if (p.face < 0) return 0.0;
-      length = std::max(length, norm(p.point - e.point));
-      e.point = p.point;
-      e.normal = p.normal;
-    }
-    return length;
   }
 
   void add(const Pair& s) {
@@ -141,7 +99,7 @@ class PairSearch {
     for (int i = 0; i < count_; ++i) {
       Pair& s = solutions_[i];
       double H[kUnknowns * kUnknowns], g[kUnknowns];
-      fit_.information(s, H, g);
+      fit_.information(s, H, g, false);
       s.weight = -std::numeric_limits<double>::infinity();
       if (!cholesky(H, kUnknowns)) continue;
       s.weight = -0.5 * (s.cost + log_determinant(H, kUnknowns));
@@ -176,6 +134,7 @@ class PairSearch {
   const LocalizerSettings& settings_;
   PairView view_;
   PairFit fit_;
+  PairDescent descent_;
   PairStarts starts_;
   Pair solutions_[kSolutions];
   int count_ = 0;

@@ -34,7 +34,9 @@ class PairStarts {
       for (const Body& body : surfaces.bodies(g)) starts_.back().emplace_back(surfaces, body);
       most = std::max(most, starts_.back().size());
     }
-    costs_.resize(most * kBlocks);
+    bodies_most_ = static_cast<int>(most);
+    costs_.resize(most * most * kBlocks);
+    partners_.resize(costs_.size());
   }
 
   // Finds the best pairs of points of the segment.
@@ -66,8 +68,27 @@ class PairStarts {
     for (int b = 0; view_ != nullptr && b < view_->bodies(); ++b) {
       const BodyStarts& starts = (*bodies_)[b];
       for (int i = 0; i < starts.count(); ++i) {
-        const double cost = lane(costs_[b * kBlocks + i / kLanes], i % kLanes);
+        double cost = kInfinity;
+        for (int other = 0; other < view_->bodies(); ++other)
+          cost = std::min(cost, lane(costs_[at(b, other, i)], i % kLanes));
         if (cost < kPlausible) visit(starts.surface(i), starts.points()[i], cost);
+      }
+    }
+  }
+
+  // Calls `visit(pair, end)` for the best pair of each point with each body, where it may be touched.
+  template <class Visit>
+  void plausible(Visit&& visit) const {
+    for (int a = 0; view_ != nullptr && a < view_->bodies(); ++a) {
+      for (int b = 0; b < view_->bodies(); ++b) {
+        for (int i = 0; i < (*bodies_)[a].count(); ++i) {
+          const double cost = lane(costs_[at(a, b, i)], i % kLanes);
+          if (!(cost < kPlausible)) continue;
+          const int j = static_cast<int>(lane(partners_[at(a, b, i)], i % kLanes));
+          Pair pair = a <= b ? placed(a, i, b, j) : placed(b, j, a, i);
+          pair.cost = cost;
+          visit(pair, a <= b ? 0 : 1);
+        }
       }
     }
   }
@@ -158,26 +179,35 @@ class PairStarts {
   void try_start(int a, int i, int b, double square, Pair* best) {
     StartBeside one(lanes_[0], i, square);
     const StartLanes& others = lanes_[1];
-    Lanes& own = costs_[a * kBlocks + i / kLanes];
+    Lanes &own = costs_[at(a, b, i)], &partner = partners_[at(a, b, i)];
+    const int k = i % kLanes;
     for (int block = a == b ? (i + 1) / kLanes : 0; block < others.blocks(); ++block) {
       Lanes cost = one.misfit(others, block);
-      for (int k = 0; a == b && k < kLanes && block * kLanes + k <= i; ++k)
-        set_lane(cost, k, kInfinity);
-      Lanes& reach = costs_[b * kBlocks + block];
-      const double enough = std::max(best[kPerBodies - 1].cost, lane(own, i % kLanes));
+      for (int j = 0; a == b && j < kLanes && block * kLanes + j <= i; ++j)
+        set_lane(cost, j, kInfinity);
+      Lanes& reach = costs_[at(b, a, block * kLanes)];
+      const double enough = std::max(best[kPerBodies - 1].cost, lane(own, k));
       if (!any_below(cost, larger(reach, all_lanes(enough)))) continue;
       Lanes f[6], n[3];
       one.forces(others, block, f);
       for (int c = 0; c < 3; ++c) n[c] = all_lanes(one.normal()[c]);
       cost += soft_cone(f, n) + soft_cone(f + 3, others.normal(block));
+      Lanes& theirs = partners_[at(b, a, block * kLanes)];
+      theirs = cost < reach ? all_lanes(i) : theirs;
       reach = smaller(reach, cost);
-      set_lane(own, i % kLanes, std::min(lane(own, i % kLanes), smallest(cost)));
-      for (int k = 0; k < kLanes; ++k) {
-        if (lane(cost, k) < best[kPerBodies - 1].cost)
-          keep(best, make(a, i, b, block * kLanes + k, f, lane(cost, k)));
+      for (int j = 0; j < kLanes; ++j) {
+        if (lane(cost, j) < lane(own, k)) {
+          set_lane(own, k, lane(cost, j));
+          set_lane(partner, k, block * kLanes + j);
+        }
+        if (lane(cost, j) < best[kPerBodies - 1].cost)
+          keep(best, make(a, i, b, block * kLanes + j, f, lane(cost, j)));
       }
     }
   }
+
+  // Where the costs of start i of body a with those of body b stand.
+  int at(int a, int b, int i) const { return (a * bodies_most_ + b) * kBlocks + i / kLanes; }
 
   Lanes soft_cone(const Lanes* f, const Lanes* normal) const {
     const Lanes size = root(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
@@ -189,20 +219,29 @@ class PairStarts {
   }
 
   Pair make(int a, int i, int b, int j, const Lanes* f, double cost) const {
-    Pair rough;
+    Pair rough = placed(a, i, b, j);
     rough.cost = cost;
-    const int bodies[2] = {a, b}, starts[2] = {i, j}, k = j % kLanes;
+    for (int e = 0; e < 2; ++e) {
+      const Lanes* own = f + 3 * e;
+      const int k = j % kLanes;
+      rough.ends[e].force = {lane(own[0], k), lane(own[1], k), lane(own[2], k)};
+    }
+    return rough;
+  }
+
+  Pair placed(int a, int i, int b, int j) const {
+    Pair pair;
+    const int bodies[2] = {a, b}, starts[2] = {i, j};
     for (int e = 0; e < 2; ++e) {
       const BodyStarts& of = (*bodies_)[bodies[e]];
-      PairEnd& end = rough.ends[e];
+      PairEnd& end = pair.ends[e];
       end.surface = of.surface(starts[e]);
       end.body = bodies[e];
       end.node = view_->node(bodies[e]);
       end.point = of.points()[starts[e]];
       end.normal = of.normals()[starts[e]];
-      end.force = {lane(f[3 * e], k), lane(f[3 * e + 1], k), lane(f[3 * e + 2], k)};
     }
-    return rough;
+    return pair;
   }
 
   // Keeps the best few of two bodies, apart from each other.
@@ -232,7 +271,9 @@ class PairStarts {
   std::vector<std::vector<BodyStarts>> starts_;  // per segment and body
   StartLanes lanes_[2];
   std::vector<double> white_, target_, factor_;
-  std::vector<Lanes> costs_;  // of the best pair that each start is part of
+  // Of the best pair of each start with each body, and with which of its starts.
+  std::vector<Lanes> costs_, partners_;
+  int bodies_most_ = 0;
   Pair found_[kFollowed];
   const PairView* view_ = nullptr;
   std::vector<BodyStarts>* bodies_ = nullptr;

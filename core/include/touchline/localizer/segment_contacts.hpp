@@ -48,6 +48,7 @@ struct SegmentContacts {
   double searched = -1.0, next_search = 0.0;
   int twin = -1;        // number of the second, once it is reported
   bool paired = false;
+  bool walked = false;  // are they all that explain, or a first look at it?
   JointEstimate pair;
   Answer inseparable;
 

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <algorithm>
+#include <memory>
+#include <vector>
 
 #include "touchline/localizer/known_fit.hpp"
 #include "touchline/localizer/pair_answer.hpp"
@@ -22,24 +24,30 @@ class Twins {
         known_(known),
         reports_(reports),
         pairs_(measurement.posture(), surfaces, settings, rows, segments),
-        said_(settings) {}
+        said_(settings) {
+    for (int g = 0; g < segments; ++g)
+      parts_.push_back(std::make_unique<PairParts>(pairs_.view(), settings));
+  }
 
   // One contact explains nothing, from the beginning: looks for two, again and again while their
   // forces rise, then ever more rarely.
   void follow(SegmentContacts& s, const Answer& one, const SegmentSample& now) {
     const double time = now.time;
     if (s.apart < 0.0) {
-      s.apart = time;
-      s.next_search = time;
+      s.apart = s.next_search = time;
+      s.walked = false;
+      parts_[now.segment]->drop();
     }
     if (time >= s.next_search) {
       pairs_.search(now.segment, now.lag, measurement_);
-      take(s, one, now.lag);
+      take(s, one, now);
       s.searched = time;
       const double least = SegmentContacts::kRefit * now.brief();
       s.next_search = time + std::max(least, 0.5 * (time - s.apart));
     } else if (s.paired) {
       if (known_.explain_freely(s.pair)) fit_.accept(s.pair, known_.change(), 0.0);
+    } else {
+      walk(s, *parts_[now.segment]);
     }
     if (!s.paired) {
       reports_.end(s.twin);
@@ -68,18 +76,39 @@ class Twins {
   }
 
  private:
+  static constexpr int kSteps = 250;  // of a walk over what explains, in one sample
+  static constexpr double kRisen = 2.0;  // times 1 / K, until forces are worth it
+
   // Takes the outcome of a search over.
-  void take(SegmentContacts& s, const Answer& one, double lag) {
-    s.inseparable = one;
+  void take(SegmentContacts& s, const Answer& one, const SegmentSample& now) {
+    PairParts& parts = *parts_[now.segment];
     s.paired = said_.separable(pairs_, measurement_.size());
-    if (!s.paired) return said_.name_all(pairs_, s.inseparable);
+    if (!s.paired) {
+      if (!s.walked) {
+        s.inseparable = one;
+        said_.name_all(pairs_, s.inseparable);
+      }
+      if (!parts.working() && now.time - s.apart >= kRisen * now.brief()) parts.begin(pairs_);
+      return;
+    }
+    s.walked = false;
+    parts.drop();
     s.pair.count = 0;
     for (int k = 0; k < 2; ++k) {
       said_.name(pairs_, k, measurement_.size(), answer_);
-      s.pair.add(found_contact(-1, answer_, surfaces_, s.age, lag), settings_.force_scale);
+      s.pair.add(found_contact(-1, answer_, surfaces_, s.age, now.lag), settings_.force_scale);
     }
     fit_.begin(measurement_, s.pair);
     fit_.judge(s.pair);
+  }
+
+  // Goes on with what explains as well; what was said before stands until all is met.
+  void walk(SegmentContacts& s, PairParts& parts) {
+    if (!parts.working()) return;
+    parts.work(kSteps);
+    if (parts.working() || parts.count() == 0) return;
+    said_.name_all(parts, surfaces_, s.inseparable);
+    s.walked = true;
   }
 
   const LinkSurfaces& surfaces_;
@@ -89,6 +118,7 @@ class Twins {
   KnownFit& known_;
   Reports& reports_;
   PairSearch pairs_;
+  std::vector<std::unique_ptr<PairParts>> parts_;  // per segment
   PairAnswer said_;
   Answer answer_;
 };
