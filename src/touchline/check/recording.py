@@ -68,6 +68,7 @@ def _compare(
         "recording",
         f"  {len(windows)} pieces compared with the model, the arm at rest in {int(still.sum())} "
         "of them",
+        "  taken as untouched: a contact looks like a wrong gain, load or bias",
     )
     rows = make_thresholds(robot, stamps.period).rows
     names = robot.segment_names

@@ -22,6 +22,7 @@ def touch_columns(touches: Sequence[Touched], time: float) -> Row:
     error = np.array([touch.error for touch in touches])
     known = error[np.isfinite(error)]
     level = np.array([touch.level for touch in touches])
+    force = rms(np.array([touch.force_error for touch in touches]))
     return (
         percent(np.mean([touch.found_body == touch.body for touch in touches])),
         percent(np.mean(error > GROSS)),
@@ -29,7 +30,7 @@ def touch_columns(touches: Sequence[Touched], time: float) -> Row:
         millimetres(rms(known)),
         millimetres(rms(known[known < NEAR])),
         _lag(np.array([touch.lag for touch in touches])),
-        f"{rms(np.array([touch.force_error for touch in touches])):.3f}",
+        f"{force:.3f}" if np.isfinite(force) else "-",
         percent(np.mean(level[np.isfinite(level)] < 0.9)) if np.isfinite(level).any() else "-",
         percent(np.mean([touch.status != "located" for touch in touches])),
         f"{1e6 * time:.0f}" if np.isfinite(time) else "-",
