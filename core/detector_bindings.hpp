@@ -123,6 +123,23 @@ inline void check_detector(const tl::Observer& o, const std::vector<tl::Detectio
   if (!good) throw std::invalid_argument("the detector's settings do not fit the observer");
 }
 
+// What noise leaves in rows at joint positions q, per sample: variances of their loads by the
+// readings, and of their momenta by the velocities.
+inline nb::tuple row_variances(const tl::Observer& o, const std::vector<tl::DetectionRow>& rows,
+                               const tl::NoiseFigures& noise, nb::handle q) {
+  const std::size_t size = rows.size();
+  tl::Posture posture(o.tree(), o.row_layout().joints);
+  tl::RowCovariance covariance(o, rows, noise);
+  posture.set(arrays::numbers(q, {static_cast<std::size_t>(o.row_layout().joints)}), nullptr);
+  covariance.evaluate(posture);
+  arrays::Out reading({size}), momentum({size});
+  for (std::size_t i = 0; i < size; ++i) {
+    reading.data()[i] = covariance.reading()[i * (size + 1)];
+    momentum.data()[i] = covariance.momentum()[i * (size + 1)];
+  }
+  return nb::make_tuple(reading.release(), momentum.release());
+}
+
 inline tl::ModelError model_error(const std::vector<double>& v) {
   if (v.size() != 3) throw std::invalid_argument("three numbers are needed");
   return {v[0], v[1], v[2]};
@@ -182,6 +199,7 @@ inline void bind(nb::module_& m) {
           },
           "observer"_a, "rows"_a, "settings"_a, nb::keep_alive<1, 2>())
       .def("baseline", &tl::Detector::baseline, "row"_a);
+  m.def("row_variances", &row_variances, "observer"_a, "rows"_a, "noise"_a, "q"_a);
   m.def("detect", &detect);
   m.def("detect_run", &detect_run);
   m.def("detect_details", &detect_details, "observer"_a, "detector"_a, "time"_a, "q"_a, "qd"_a,

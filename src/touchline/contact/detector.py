@@ -8,9 +8,9 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.contact.residual_noise import native_noise
 from touchline.contact.thresholds import Thresholds, make_thresholds
 from touchline.estimation.observer import Estimate, Observer
-from touchline.model.robot import Robot
 from touchline.native import core
 
 Array = NDArray[np.float64]
@@ -73,17 +73,6 @@ class Details:
     quick: Array
     noise: Array
     activity: Array
-
-
-def native_noise(
-    robot: Robot, period: float, wrench_error: float = 0.0, torque_error: float = 0.0
-) -> core.NoiseFigures:
-    """The noise figures of a robot's description in the words of the native core."""
-    noise = robot.description.noise
-    sensors = [x for name in robot.sensor_names for x in noise.sensors[name]]
-    return core.noise_figures(
-        list(noise.qd), list(noise.tau), sensors, period, wrench_error, torque_error
-    )
 
 
 class Detector:

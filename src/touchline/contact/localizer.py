@@ -6,9 +6,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from touchline.contact.answer import ENDED, NUMBER, Answer, Names, event_answer
 from touchline.contact.classification import Classifier
-from touchline.contact.detector import Detection, native_noise
+from touchline.contact.detector import Detection
 from touchline.contact.event import EventAnswer
 from touchline.contact.region import Region
+from touchline.contact.residual_noise import native_noise
 from touchline.contact.skin import Skin
 from touchline.contact.thresholds import Thresholds
 from touchline.estimation.observer import Estimate, Observer

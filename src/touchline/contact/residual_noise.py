@@ -5,36 +5,56 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.model.robot import Robot
-from touchline.model.transforms import move_wrench
+from touchline.native import core
 
 Array = NDArray[np.float64]
 
-CONFIGURATIONS = 64  # sampled for the largest effect of velocity noise
+CONFIGURATIONS = 64  # sampled for the largest effect of noise
+
+
+def native_noise(
+    robot: Robot, period: float, wrench_error: float = 0.0, torque_error: float = 0.0
+) -> core.NoiseFigures:
+    """The noise figures of a robot's description in the words of the native core."""
+    noise = robot.description.noise
+    sensors = [x for name in robot.sensor_names for x in noise.sensors[name]]
+    return core.noise_figures(
+        list(noise.qd), list(noise.tau), sensors, period, wrench_error, torque_error
+    )
 
 
 def residual_noise(robot: Robot, period: float) -> tuple[Array, dict[str, Array]]:
     """Standard deviations of the filtered residuals, the largest over sampled configurations.
 
-    Torque and wrench noise per sample is low-passed, factor sqrt(K dt / 2); velocity noise enters
-    through the momentum as K times the momentum it makes (theory: K M sigma_qd).
+    Noise per sample of readings is low-passed, factor sqrt(K dt / 2); velocity noise enters
+    through the momentum as K times the momentum it makes (theory: K M sigma_qd). A joint's
+    residual is that of its own segment: the noise of six-axis sensors outboard, which tell what
+    lies beyond, is in it with their distance from the axis.
 
     Returns:
         (n,) [Nm] for the joints and per segment (6,) [N, Nm] in its sensor's frame.
     """
-    noise = robot.description.noise
-    n, k = len(robot.joint_names), len(robot.sensor_names)
-    K = np.array(robot.description.bandwidth_joints)
-    joint_var = np.square(noise.tau) * np.minimum(1.0, K * period / 2)
-    momentum_var = np.zeros(n)
-    segments = {name: np.zeros(6) for name in robot.segment_names if name != "root"}
+    n = len(robot.joint_names)
+    segments = [name for name in robot.segment_names if name != "root"]
+    indices = [robot.segment_names.index(name) for name in segments]
+    # Neither thresholds nor the segment of a joint's row matter here.
+    rows = [core.DetectionRow(0, -1, j, 1.0, 1.0, 1.0, [0.0] * 3, [0.0] * 3) for j in range(n)]
+    rows += [
+        core.DetectionRow(g, axis, -1, 1.0, 1.0, 1.0, [0.0] * 3, [0.0] * 3)
+        for g in indices
+        for axis in range(6)
+    ]
+    K = np.array(
+        [*robot.description.bandwidth_joints]
+        + [robot.description.bandwidth_sensors[name] for name in segments for _ in range(6)]
+    )
+    noise, kernel = native_noise(robot, period), robot.kernel()
+    worst = np.zeros(len(rows))
     for q in _configurations(robot):
-        momenta = [robot.terms(q, speed)[0] for speed in np.diag(noise.qd)]
-        columns = np.array(momenta).reshape(n, n + 6 * k).T
-        momentum_var = np.maximum(momentum_var, np.square(K[:, None] * columns[:n]).sum(axis=1))
-        for name, so_far in segments.items():
-            variance = _segment_variance(robot, name, q, columns[n:].reshape(k, 6, n), period)
-            segments[name] = np.maximum(so_far, variance)
-    return np.sqrt(joint_var + momentum_var), {s: np.sqrt(v) for s, v in segments.items()}
+        reading, momentum = core.row_variances(kernel, rows, noise, q)
+        worst = np.maximum(worst, reading * np.minimum(1.0, K * period / 2) + K**2 * momentum)
+    sigma = np.sqrt(worst)
+    return sigma[:n], dict(zip(segments, sigma[n:].reshape(-1, 6), strict=True))
 
 
 def _configurations(robot: Robot) -> Array:
@@ -45,20 +65,3 @@ def _configurations(robot: Robot) -> Array:
     return rng.uniform(
         np.minimum(lower, upper), np.maximum(lower, upper), (CONFIGURATIONS, len(joints))
     )
-
-
-def _segment_variance(robot: Robot, segment: str, q: Array, momenta: Array, period: float) -> Array:
-    """Variance (6,) of a segment's wrench in its sensor's frame, at one configuration."""
-    noise = robot.description.noise
-    bandwidth = robot.description.bandwidth_sensors[segment]
-    poses = robot.sensor_poses(q)
-    own = robot.sensor_names.index(segment)
-    momentum = momenta[own].copy()
-    reading = np.square(noise.sensors[segment])
-    for successor in robot.successors(segment):
-        other = robot.sensor_names.index(successor)
-        move = move_wrench(np.linalg.inv(poses[own]) @ poses[other])
-        momentum -= move @ momenta[other]
-        reading = reading + np.square(move) @ np.square(noise.sensors[successor])
-    filtered = reading * min(1.0, bandwidth * period / 2)
-    return filtered + np.square(bandwidth * momentum).sum(axis=1)
