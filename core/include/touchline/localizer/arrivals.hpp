@@ -125,9 +125,7 @@ class Arrivals {
       if (!takes_back(k, a, single_.surfaces(), settings_.place_radius)) continue;
       for (int i = 0; i < before.count; ++i) reports_.add(before.known[i]);
       reports_.change_force(c, k.force + a.force);
-      reports_.end(s.newcomer);
-      s.newcomer = -1;
-      s.is_placed = false;
+      s.is_placed = false;  // what was suspected ends when all is explained
       return true;
     }
     return false;
