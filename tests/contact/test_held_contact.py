@@ -4,7 +4,8 @@
 import numpy as np
 import pytest
 
-from touchline.bench.localization.trial import FRICTION, arm_and_skin, make_pipeline
+from touchline.bench.localization.scene import FRICTION, arm_and_skin
+from touchline.bench.localization.trial import make_pipeline
 from touchline.bench.touches import TouchSampler, resting_signals
 from touchline.contact.answer import STATUS
 

@@ -37,13 +37,8 @@ def residual_noise(robot: Robot, period: float) -> tuple[Array, dict[str, Array]
     n = len(robot.joint_names)
     segments = [name for name in robot.segment_names if name != "root"]
     indices = [robot.segment_names.index(name) for name in segments]
-    # Neither thresholds nor the segment of a joint's row matter here.
-    rows = [core.DetectionRow(0, -1, j, 1.0, 1.0, 1.0, [0.0] * 3, [0.0] * 3) for j in range(n)]
-    rows += [
-        core.DetectionRow(g, axis, -1, 1.0, 1.0, 1.0, [0.0] * 3, [0.0] * 3)
-        for g in indices
-        for axis in range(6)
-    ]
+    rows = [_row(0, -1, j) for j in range(n)]
+    rows += [_row(g, axis, -1) for g in indices for axis in range(6)]
     K = np.array(
         [*robot.description.bandwidth_joints]
         + [robot.description.bandwidth_sensors[name] for name in segments for _ in range(6)]
@@ -55,6 +50,12 @@ def residual_noise(robot: Robot, period: float) -> tuple[Array, dict[str, Array]
         worst = np.maximum(worst, reading * np.minimum(1.0, K * period / 2) + K**2 * momentum)
     sigma = np.sqrt(worst)
     return sigma[:n], dict(zip(segments, sigma[n:].reshape(-1, 6), strict=True))
+
+
+def _row(segment: int, component: int, joint: int) -> core.DetectionRow:
+    """Neither thresholds nor the segment of a joint's row matter here."""
+    none = [0.0] * 3
+    return core.DetectionRow(segment, component, joint, 1.0, 1.0, 1.0, none, none, none)
 
 
 def _configurations(robot: Robot) -> Array:
