@@ -220,12 +220,13 @@ class Measurement {
 
  private:
   static constexpr double kOffset = 3.0;  // sigmas of a normal variable: beyond, it is no noise
+  static constexpr double kSure = 0.1;    // of the variance of a sample, in a baseline of 20 / K
 
   // Takes the offsets out if there are any: what noise alone explains is none, and would only add
-  // its own noise. The baseline, a mean over `quiet` [s], is surer than one sample.
+  // its own noise, unless a model has errors and the baseline, a mean over `quiet` [s], is sure.
   bool take_out_offsets() {
     const double rest = offsets_.variance(segment_, quiet_ != nullptr ? quiet_[segment_] : 0.0);
-    if (!lasts_ && !noticeable(rest)) return true;
+    if (!(lasts_ && rest < kSure) && !noticeable(rest)) return true;
     const int first = has_wrench_ ? 6 : 0;
     for (int i = 0; i < first; ++i) wrench_[i] -= offsets_.wrench()[i];
     for (int i = 0; i < count_; ++i) {
@@ -239,6 +240,7 @@ class Measurement {
 
   // Are offsets, which have the part `rest` of the variance of a sample, more than noise?
   bool noticeable(double rest) {
+    if (lasts_ && !factor()) return false;  // else it has been done
     const int first = has_wrench_ ? 6 : 0;
     double* d = design_.data();
     std::copy(offsets_.wrench(), offsets_.wrench() + first, d);
