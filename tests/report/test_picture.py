@@ -14,6 +14,7 @@ import touchline as tl
 from touchline.contact.contact import Candidate
 from touchline.contact.event import Event
 from touchline.report.event_pictures import EventPoses, event_pictures, event_scene
+from touchline.report.facts import event_doubt, event_where
 from touchline.report.figure import labels, svg_picture
 from touchline.report.picture import Camera, Scene, png_bytes
 from touchline.report.render.raster import rasterize
@@ -303,6 +304,23 @@ def test_an_event_without_a_place_claims_none(robot):
     assert text.count("<svg") == 2 and "ambiguous" in text
     assert len(text) < 4.0e4
     assert re.search(r">5\.0 N</text>", text)
+
+
+def test_what_is_not_known_is_said_in_words():
+    event = Event(id=0, segment="base", level="contact", detected=1.0, status="not_separable")
+    event.rank, event.unknowns = 7, 10
+    assert event_where(event) == "several contacts"
+    words = event_doubt(event)
+    assert "More than one contact on base" in words and "(7 equations, 10 unknowns)" in words
+    assert "part of its link" not in words
+    event.candidates = (Candidate("link1", "link1", 0.4, np.zeros(3), 0.21),)
+    assert "up to 21 cm away" in event_doubt(event)
+    event.status, event.candidates = "ambiguous", ()
+    assert "any of the marked places" in event_doubt(event)
+    event.status = "wrench_only"
+    assert "its place is not" in event_doubt(event)
+    event.status, event.link = "located", "link1"
+    assert event_doubt(event) == "" and event_where(event) == "link1"
 
 
 def test_the_arm_is_drawn_as_it_stood(robot):

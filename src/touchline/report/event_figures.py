@@ -11,6 +11,7 @@ from touchline.contact.event import Event
 from touchline.report.analysis import Analysis
 from touchline.report.event_pictures import caption, event_pictures, event_scene, truth_of
 from touchline.report.event_windows import Window
+from touchline.report.facts import event_doubt
 from touchline.report.html import note, section
 from touchline.report.picture import SIGMAS
 from touchline.report.plots import joined, plot
@@ -121,9 +122,11 @@ def _event_plots(analysis: Analysis, event: Event, window: Window) -> str:
 def _figure(
     analysis: Analysis, event: Event, pictures: dict[int, str], plots: dict[int, str]
 ) -> str:
+    doubt = event_doubt(event)
+    words = caption(event, analysis.origin) + (f". {doubt}" if doubt else "")
     return (
         f'<figure class="event-figure" id="event-{event.id}"><figcaption><b>{event.id}</b> '
-        f"{escape(caption(event, analysis.origin))}</figcaption>"
+        f"{escape(words)}</figcaption>"
         f"{pictures.get(event.id, '')}{plots.get(event.id, '')}</figure>"
     )
 

@@ -148,10 +148,31 @@ def one_digit(value: float) -> float:
 
 def event_where(event: Event) -> str:
     """The best word there is for where an event was: a link, else the most distal loaded joint."""
-    link = getattr(event, "link", None)
-    if link is not None:
-        return str(link)
+    if event.link is not None:
+        return event.link
+    if event.status == "not_separable":
+        return "several contacts"
     return f"beyond {event.joint}" if event.joint else ""
+
+
+def event_doubt(event: Event) -> str:
+    """What is known of an event that is not located, and what is not, in sentences."""
+    equations = f" ({event.rank} equations, {event.unknowns} unknowns)" if event.rank else ""
+    radius = max((candidate.radius for candidate in event.candidates), default=0.0)
+    words = {
+        "ambiguous": "One contact at any of the marked places explains the measurements"
+        f"{equations}; the percentages say how likely each is.",
+        "not_separable": f"More than one contact on {event.segment} at the same time{equations}: "
+        "the arrow is the sum of their forces, and the measurements do not tell the places apart.",
+        "wrench_only": "The force is known, its place is not: no push at a point of the surface "
+        "explains the measurements.",
+    }.get(event.status, "")
+    if radius > 0.0:
+        words += (
+            " A mark stands for the part of its link around it that may be touched, up to "
+            f"{100 * radius:.0f} cm away, and the percentage for how much speaks for it."
+        )
+    return words
 
 
 def detection_fact(robot: Robot, thresholds: Thresholds) -> str:

@@ -284,7 +284,6 @@ def _event(found: dict[str, Any]) -> Event:
         if values[name] is not None:
             values[name] = np.array(values[name], float)
     values["candidates"] = tuple(
-        Candidate(c["link"], c["body"], c["probability"], np.array(c["position"], float))
-        for c in values["candidates"]
+        Candidate(**c | {"position": np.array(c["position"], float)}) for c in values["candidates"]
     )
     return Event(**values)
