@@ -20,6 +20,7 @@ from touchline.bench.localization.arm import ARMS
 from touchline.bench.localization.baselines import BASELINES
 from touchline.bench.localization.cell import Begin, Cell
 from touchline.bench.localization.course import course_table
+from touchline.bench.localization.rank_table import rank_table
 from touchline.bench.localization.scene import (
     arm_and_skin,
     make_scene,
@@ -31,7 +32,6 @@ from touchline.bench.localization.table import (
     baseline_table,
     failures,
     published,
-    rank_table,
     tables,
 )
 from touchline.bench.localization.trial import Trial, make_pipeline, run_trial

@@ -72,28 +72,6 @@ def published() -> str:
     return aligned([head, *PUBLISHED], text_columns=(5,))
 
 
-def rank_table(trials: Iterable[Trial]) -> str:
-    """Pairs that begin together, by the rank of their equations; empty without such pairs."""
-    pairs = [
-        trial for trial in trials if trial.cell.begin == "together" and trial.cell.contacts == 2
-    ]
-    if not pairs:
-        return ""
-    rows: list[Row] = [
-        ("arm", "noise", "rank", "pairs", "found", "truth in the set", "confidently wrong")
-    ]
-    keys = sorted({(trial.cell.arm, trial.cell.tier, trial.rank) for trial in pairs})
-    for arm, tier, rank in keys:
-        own = [t for t in pairs if (t.cell.arm, t.cell.tier, t.rank) == (arm, tier, rank)]
-        rates = [[t.found for t in own], [t.in_set for t in own],
-                 [t.confidently_wrong for t in own]]  # fmt: skip
-        shares = [f"{100 * np.mean(rate):.2f} %" for rate in rates]
-        name = str(rank) if rank else "apart"
-        rows.append((arm, str(TIERS[tier]), name, str(len(own)), *shares))
-    legend = "rank: independent equations of a pair on one segment; two contacts need 10"
-    return f"{aligned(rows, text_columns=(0, 1))}\n{legend}"
-
-
 def baseline_table(trials: Iterable[Trial]) -> str:
     """Every baseline beside our estimator on the same runs; empty without baselines."""
     rows: list[Row] = [("arm", "noise", "contacts", "begin", "method", "runs", "found", "> 10 cm",

@@ -7,6 +7,7 @@ import numpy as np
 
 from touchline.bench.localization.baselines import baseline_places
 from touchline.bench.localization.cell import Cell
+from touchline.bench.localization.compatible import surface_shares
 from touchline.bench.localization.course import Course, follow_course
 from touchline.bench.localization.matching import distances, match
 from touchline.bench.localization.scene import (
@@ -22,6 +23,8 @@ from touchline.contact.pipeline import Pipeline
 from touchline.contact.skin import Skin
 from touchline.estimation.observer import Estimate
 from touchline.model.robot import Robot
+
+UNKNOWNS = 10  # of two contacts
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,8 @@ class Trial:
     rank: int
     course: Course
     baselines: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    named_surface: float = np.nan
+    allowed_surface: float = np.nan
 
     @property
     def found(self) -> bool:
@@ -76,6 +81,10 @@ def run_trial(cell: Cell, run: int, seed: int = 0, baselines: tuple[str, ...] = 
     touches = tuple(judge(pipeline, scene, with_region=cell.begin != "segments"))
     answers = [answer for _, answer in last_answers(pipeline, scene)]
     named = sum(answer.position is not None for answer in answers)
+    rank = pair_rank(robot, [touch.body for touch in touches])
+    surfaces = (np.nan, np.nan)
+    if 0 < rank < UNKNOWNS and cell.begin == "together" and not cell.speed and not cell.model_error:
+        surfaces = surface_shares(skin, [t for t, _ in scene.touches], answers, FRICTION, run)
     return Trial(
         cell,
         run,
@@ -84,13 +93,14 @@ def run_trial(cell: Cell, run: int, seed: int = 0, baselines: tuple[str, ...] = 
         named,
         len(pipeline.events),
         tuple(answer.status or "" for answer in answers),
-        pair_rank(robot, [touch.body for touch in touches]),
+        rank,
         follow_course(pipeline, scene),
         tuple(
             (name, errors)
             for name in baselines
             if (errors := _baseline(name, skin, scene, estimate, detection, run)) is not None
         ),
+        *surfaces,
     )
 
 
