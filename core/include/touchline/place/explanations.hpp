@@ -39,10 +39,10 @@ class Explanations {
   Explanations& operator=(const Explanations&) = delete;
 
   // Finds all that may explain segment g; `measurement` has read it. `mean(node)`: where a body was
-  // when it felt what the wrench speaks of, and `doubt`: which part of the way since is not known.
+  // when it felt what the wrench speaks of, and `doubt`: what is not known of that.
   // `again`: what was found by a search a moment ago serves once more.
   template <class MeanOf>
-  void find(int g, MeanOf&& mean, double doubt, Measurement& measurement, bool again) {
+  void find(int g, MeanOf&& mean, const Doubt& doubt, Measurement& measurement, bool again) {
     count_ = used_ = 0;
     found_ = &starts_[g];
     again_ = again;

@@ -45,8 +45,6 @@ class Measurement {
   // averaged [s]; or null.
   void set_state(const double* q, const double* qd, const double* drift, const double* quiet) {
     posture_.set(q, qd);
-    speed2_ = 0.0;
-    for (int j = 0; qd != nullptr && j < layout_.joints; ++j) speed2_ += qd[j] * qd[j];
     drift_ = drift;
     quiet_ = quiet;
   }
@@ -284,7 +282,7 @@ class Measurement {
         noise_.add_axis(first + i, r.sensor, r.axis);
       }
     }
-    noise_.covariance(size_, has_wrench_ ? 3 : 0, speed2_, covariance_.data());
+    noise_.covariance(size_, has_wrench_ ? 3 : 0, covariance_.data());
     return lasts_ || factor();
   }
 
@@ -314,7 +312,6 @@ class Measurement {
   int segment_ = 0, count_ = 0, size_ = 0;
   const double *row_ = nullptr, *drift_ = nullptr, *quiet_ = nullptr;
   bool has_wrench_ = false, lasts_ = false;
-  double speed2_ = 0.0;  // sum of squares of the joints' velocities
   double wrench_[6] = {}, raw_wrench_[6] = {};
   std::vector<const SegmentRow*> used_;
   std::vector<double> own_;       // if the contact is inboard of the joint

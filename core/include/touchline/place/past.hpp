@@ -20,6 +20,12 @@ struct Mean {
   Vec3 moment;  // the rest, at the body's origin [Nm]
 };
 
+// What is not known of where a body was: a part of the way it has come since, and so much per
+// squared angle that it has turned [m].
+struct Doubt {
+  double way, turn;
+};
+
 // Of a body that has long moved with a steady twist (about the world origin) and felt a steady
 // force: exp(-a V), averaged with K exp(-K a), is (1 + V / K)^-1. `lag`: 1 / K [s].
 inline Mean steady_mean(const Pose& now, const Spatial& twist, double lag) {

@@ -52,9 +52,8 @@ struct View {
     return {now + onward(line.origin - before), (1.0 / norm(direction)) * direction};
   }
 
-  // The body is at `here`, and was at `mean` when it felt the filtered wrench of `force` [N]. The
-  // way come since is known but for the part `doubt`.
-  void allow_for_motion(const Pose& here, const Mean& mean, double force, double doubt) {
+  // The body is at `here`, and was at `mean` when it felt the filtered wrench of `force` [N].
+  void allow_for_motion(const Pose& here, const Mean& mean, double force, const Doubt& doubt) {
     const Mat3& R = here.R;
     const Mat3& M = mean.pose.R;
     now = here.p;
@@ -62,9 +61,11 @@ struct View {
     back = {M * Vec3{R.x.x, R.y.x, R.z.x}, M * Vec3{R.x.y, R.y.y, R.z.y},
             M * Vec3{R.x.z, R.y.z, R.z.z}};  // M R^T
     q.shift({{}, mean.moment});
-    const double way = norm(now - before) + kReach * norm(back.x - Vec3{1.0, 0.0, 0.0}) +
-                       kReach * norm(back.y - Vec3{0.0, 1.0, 0.0});
-    const double moment = doubt * way * force;
+    const Vec3 x = back.x - Vec3{1.0, 0.0, 0.0}, y = back.y - Vec3{0.0, 1.0, 0.0},
+               z = back.z - Vec3{0.0, 0.0, 1.0};
+    const double way = norm(now - before) + kReach * (norm(x) + norm(y));
+    const double angle2 = 0.5 * (dot(x, x) + dot(y, y) + dot(z, z));
+    const double moment = (doubt.way * way + doubt.turn * angle2) * force;
     if (moment > 1e-6) width = loosen(q, moment);
   }
 
