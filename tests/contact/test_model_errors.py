@@ -9,8 +9,8 @@ import pytest
 import touchline as tl
 from touchline.bench.localization.cell import Cell
 from touchline.bench.localization.course import follow_course
-from touchline.bench.localization.scene import make_scene, told_and_real
-from touchline.bench.localization.trial import run_trial
+from touchline.bench.localization.scene import make_scene, told_and_real, true_places
+from touchline.bench.localization.trial import make_pipeline, run_trial
 from touchline.contact.detector import Detector
 from touchline.contact.localizer import Localizer
 from touchline.contact.model_drift import WAY, guess_drift
@@ -147,3 +147,28 @@ def test_a_calibrated_robot_brings_its_own():
     thresholds = make_thresholds(told)
     assert {row.drift for row in thresholds.rows} == {row.slow for row in known.values()}
     assert expect_drift(told, thresholds, 0.02) is thresholds
+
+
+def judged(cell, run):
+    """The event of a single touch and the last sample's answer, with how far off the event is."""
+    robot, _, skin = told_and_real(cell, run)
+    pipeline = make_pipeline(robot, skin, model_error=cell.model_error)
+    scene = make_scene(cell, run)
+    s = scene.signals
+    pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+    (event,) = pipeline.events
+    answer = pipeline.localizer.answer(pipeline.contacts.answers[-1])
+    row = np.searchsorted(s.time, event.time_of_position)
+    off = np.linalg.norm(event.position - true_places(robot, scene, s.q[row])[0])
+    return event.position_std, np.sqrt(np.trace(answer.covariance)), off
+
+
+@pytest.mark.parametrize("run", [0, 25])
+def test_an_error_that_lasts_does_not_average_away(run):
+    """White noise does: half a second of it is worth 25 looks, 0.1 s five."""
+    event, sample, off = judged(OFF, run)
+    assert event > 0.5 * sample
+    assert off < 3.0 * event
+    event, sample, off = judged(replace(OFF, model_error=0.0), run)
+    assert event < 0.6 * sample
+    assert off < 4.0 * event

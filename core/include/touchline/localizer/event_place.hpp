@@ -73,12 +73,14 @@ class EventPlace {
     place->last += probability;
   }
 
-  void close(double variance) {
+  // `variance` of the sample's best place, of which the part `lasting` is that of the next as well.
+  void close(double variance, double lasting) {
     for (int i = 0; i < count_; ++i)
       places_[i].evidence += independence_ * std::log(std::clamp(places_[i].last, kFloor, 1.0));
     missed_ += independence_ * std::log(kFloor);
     if (std::isfinite(variance)) {
-      variance_ += variance;
+      variance_ += (1.0 - lasting) * variance;
+      lasting_ += lasting * variance;
       ++explained_;
     }
   }
@@ -116,10 +118,11 @@ class EventPlace {
   bool mostly_unexplained() const { return 2 * unexplained_ > samples_; }
   int frequent(int a, int b) const { return statuses_[a] >= statuses_[b] ? a : b; }
 
-  // Of the mean over the event.
+  // Of the mean over the event, which takes away only what differs from sample to sample.
   double variance() const {
     if (explained_ == 0) return std::nan("");
-    return variance_ / explained_ / (1.0 + (explained_ - 1) * independence_);
+    const double looks = 1.0 + (explained_ - 1) * independence_;
+    return (variance_ / looks + lasting_) / explained_;
   }
 
  private:
@@ -146,7 +149,8 @@ class EventPlace {
   Place places_[kPlaces];
   int count_ = 0, samples_ = 0, explained_ = 0, unexplained_ = 0;
   int statuses_[5] = {};
-  double peak_ = 0.0, time_ = 0.0, independence_ = 1.0, missed_ = 0.0, variance_ = 0.0;
+  double peak_ = 0.0, time_ = 0.0, independence_ = 1.0, missed_ = 0.0;
+  double variance_ = 0.0, lasting_ = 0.0;  // sums over the explained samples
 };
 
 }  // namespace touchline

@@ -192,7 +192,7 @@ class Localizer {
       m.event.add(k.surface, single_.surfaces().to_node(k.point, surfaces()[k.surface].node),
                   k.weight, k.along[0] + k.along[2], settings_.place_radius);
     }
-    m.event.close(explained ? answer.spread * answer.spread : kNaN);
+    m.event.close(explained ? answer.spread * answer.spread : kNaN, answer.lasting);
   }
 
   double steady_lag(int g) const {

@@ -17,6 +17,7 @@ struct Answer {
   Vec3 force;
   double covariance[9] = {};  // of the first candidate's point
   double spread = 0.0;        // root of its trace
+  double lasting = 0.0;       // part of it (squared) that the next samples have in common
   double pitch = 0.0;         // in standard deviations
   double chi2 = 0.0;
   int degrees = 0;  // of freedom of chi2

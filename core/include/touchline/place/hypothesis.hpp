@@ -202,6 +202,25 @@ class ForceFitter {
     }
   }
 
+  // Variance of the place of a contact, both directions along the surface together, by errors that
+  // have the part `lasting` (6, 6) of the information; `P` (5, 5) is the inverse of `information`.
+  static double place_variance(const double* lasting, const double* P, const Vec3& point,
+                               const Vec3& normal, const Vec3& force) {
+    Vec3 along[2];
+    tangents(normal, along[0], along[1]);
+    double sum = 0.0;
+    for (int c = 3; c < 5; ++c) {
+      const double* x = P + 5 * c;
+      const Vec3 df{x[0], x[1], x[2]}, way = x[3] * along[0] + x[4] * along[1];
+      double w[6];
+      store(Spatial{df, cross(point, df) + cross(way, force)}, w);
+      for (int a = 0; a < 6; ++a) {
+        for (int b = 0; b < 6; ++b) sum += w[a] * lasting[6 * a + b] * w[b];
+      }
+    }
+    return sum;
+  }
+
  private:
   static constexpr double kSlant = 0.3, kSlantSigma = 0.2;  // of pushes from the normal [rad]
 

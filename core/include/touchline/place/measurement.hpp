@@ -38,6 +38,7 @@ class Measurement {
     lasting_covariance_.resize(size * size);
     factor_.resize(size * size);
     design_.resize(size * 7);
+    column_.resize(size * 2);
   }
 
   // The configuration of the sample; `qd` may be null. What the model's errors may have added to each
@@ -185,22 +186,7 @@ class Measurement {
 
   // What all rows say of one contact on the body of `node`.
   Quadratic quadratic(int node) {
-    const int first = has_wrench_ ? 6 : 0;
-    double* d = design_.data();  // rows of six, then the measured number
-    for (int i = 0; i < first; ++i) {
-      for (int k = 0; k < 6; ++k) d[7 * i + k] = i == k ? 1.0 : 0.0;
-      d[7 * i + 6] = wrench_[i];
-    }
-    for (int i = 0; i < count_; ++i) {
-      double* line = d + 7 * (first + i);
-      const bool loaded = rows_.subspace(*used_[i], node, line);
-      line[6] = own_[i];
-      if (loaded && has_wrench_ && std::isfinite(outboard_[i])) {
-        line[6] = outboard_[i];
-        for (int k = 0; k < 6; ++k) line[6] += line[k] * raw_wrench_[k];
-      }
-    }
-    for (int k = 0; k < 7; ++k) solve_lower(factor_.data(), size_, d + k, 7);
+    const double* d = design(node);
     Quadratic result{};
     for (int i = 0; i < size_; ++i) {
       const double* line = d + 7 * i;
@@ -216,9 +202,57 @@ class Measurement {
     return result;
   }
 
+  // The part (6, 6) of the information on a wrench on the body of `node` by which the errors that last
+  // weigh: D^T S^-1 L S^-1 D, with S the covariance of all rows and L that of these errors.
+  void lasting_information(int node, double* out) {
+    const double* d = design(node);
+    const double *F = factor_.data(), *L = lasting_covariance_.data();
+    double* x = column_.data();
+    std::fill(out, out + 36, 0.0);
+    double* y = x + size_;
+    for (int a = 0; a < 6; ++a) {  // L S^-1 D, column by column
+      for (int i = size_ - 1; i >= 0; --i) {
+        double sum = d[7 * i + a];
+        for (int k = i + 1; k < size_; ++k) sum -= F[k * size_ + i] * x[k];
+        x[i] = sum / F[i * size_ + i];
+      }
+      for (int i = 0; i < size_; ++i) {
+        y[i] = 0.0;
+        for (int k = 0; k < size_; ++k)
+          y[i] += L[std::max(i, k) * size_ + std::min(i, k)] * x[k];
+      }
+      solve_lower(F, size_, y);
+      for (int i = 0; i < size_; ++i) {
+        for (int b = 0; b < 6; ++b) out[6 * b + a] += d[7 * i + b] * y[i];
+      }
+    }
+  }
+
  private:
   static constexpr double kOffset = 3.0;  // sigmas of a normal variable: beyond, it is no noise
   static constexpr double kSure = 0.1;    // of the variance of a sample, in a baseline of 20 / K
+
+  // What a wrench on the body of `node` does to all rows, and what they read: rows of seven, to the
+  // scale of the noise.
+  const double* design(int node) {
+    const int first = has_wrench_ ? 6 : 0;
+    double* d = design_.data();
+    for (int i = 0; i < first; ++i) {
+      for (int k = 0; k < 6; ++k) d[7 * i + k] = i == k ? 1.0 : 0.0;
+      d[7 * i + 6] = wrench_[i];
+    }
+    for (int i = 0; i < count_; ++i) {
+      double* line = d + 7 * (first + i);
+      const bool loaded = rows_.subspace(*used_[i], node, line);
+      line[6] = own_[i];
+      if (loaded && has_wrench_ && std::isfinite(outboard_[i])) {
+        line[6] = outboard_[i];
+        for (int k = 0; k < 6; ++k) line[6] += line[k] * raw_wrench_[k];
+      }
+    }
+    for (int k = 0; k < 7; ++k) solve_lower(factor_.data(), size_, d + k, 7);
+    return d;
+  }
 
   // Takes the offsets out if there are any: what noise alone explains is none, and would only add
   // its own noise, unless a model has errors and the baseline, a mean over `quiet` [s], is sure.
@@ -316,7 +350,7 @@ class Measurement {
   std::vector<const SegmentRow*> used_;
   std::vector<double> own_;       // if the contact is inboard of the joint
   std::vector<double> outboard_;  // if it is outboard, less what the wrench says
-  std::vector<double> covariance_, lasting_covariance_, factor_, design_;
+  std::vector<double> covariance_, lasting_covariance_, factor_, design_, column_;
 };
 
 }  // namespace touchline

@@ -22,7 +22,8 @@ class SingleContact {
       : observer_(observer),
         posture_(posture),
         settings_(settings),
-        found_(observer, posture, settings, std::move(surfaces)) {}
+        found_(observer, posture, settings, std::move(surfaces)),
+        lasting_(observer.row_layout().segments, 0.0) {}
 
   // The contact on segment g, which `measurement` has read; its wrench is `lag` [s] old. `again`: it
   // was looked for a moment ago, and the same places are looked at.
@@ -82,6 +83,9 @@ class SingleContact {
       found_.find(g, mean, doubt, measurement, again);
       weigh();
       conclude(g, measurement);
+      if (!measurement.lasts()) lasting_[g] = 0.0;
+      if (measurement.lasts() && !again && answer_.count > 0) lasting_[g] = lasting(measurement);
+      answer_.lasting = lasting_[g];
     }
     return answer_;
   }
@@ -124,6 +128,21 @@ class SingleContact {
     double sum = 0.0;
     for (Candidate& k : found_) sum += k.weight = std::exp(k.weight - reached);
     for (Candidate& k : found_) k.weight /= sum;
+  }
+
+  // Which part of the variance of the best place is by errors that last.
+  double lasting(Measurement& measurement) const {
+    const Candidate& best = answer_.candidates[0];
+    const View& view = found_.view(best);
+    const Vec3 place = view.earlier(best.point);
+    double B[36], P[25], g[5], work[25];
+    found_.fitter().information(view.q, place, best.normal, best.fit.force, P, g);
+    const double all = best.along[0] + best.along[2];
+    if (!invert(P, 5, work) || !(all > 0.0)) return 0.0;
+    measurement.lasting_information(view.node, B);
+    const double part =
+        ForceFitter::place_variance(B, P, place, best.normal, best.fit.force) / all;
+    return std::clamp(part, 0.0, 1.0);
   }
 
   // The last two by two of (L L^T)^-1.
@@ -264,6 +283,7 @@ class SingleContact {
   const LocalizerSettings& settings_;
   Explanations found_;
   bool beside_free_forces_ = false;
+  std::vector<double> lasting_;  // per segment: see `Answer`
   Answer answer_;
 };
 
