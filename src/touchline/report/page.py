@@ -17,6 +17,7 @@ from touchline.report.curves import Panel
 from touchline.report.event_figures import figures
 from touchline.report.facts import event_where, health_facts, joint_facts, segment_facts
 from touchline.report.html import Cell, note, section, table
+from touchline.report.lanes import lanes
 from touchline.report.outputs import strict
 from touchline.report.plots import joined, plot
 from touchline.report.robot_section import robot_section
@@ -247,6 +248,9 @@ def _data(analysis: Analysis) -> dict[str, Any]:
     used, start = traces.used, traces.start
     end = start + used * traces.width
     columns = range(traces.low.shape[1])
+    events = analysis.events[:MOST_SHADED]
+    ends = [(end if event.cleared is None else event.cleared) for event in events]
+    bars = [(e.segment, e.detected, last) for e, last in zip(events, ends, strict=True)]
     return {
         "start": start,
         "origin": analysis.origin,
@@ -262,10 +266,11 @@ def _data(analysis: Analysis) -> dict[str, Any]:
                 "segment": event.segment,
                 "level": event.level,
                 "from": event.detected - start,
-                "to": (end if event.cleared is None else event.cleared) - start,
+                "to": last - start,
+                "lane": lane,
                 "title": f"{event.id}: {event.level}, {event_where(event) or event.segment}",
             }
-            for event in analysis.events[:MOST_SHADED]
+            for event, last, lane in zip(events, ends, lanes(bars), strict=True)
         ],
     }
 

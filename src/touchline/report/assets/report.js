@@ -209,8 +209,11 @@
       const label = { x: LEFT - 8, y: TOP + row * each + 14, "text-anchor": "end" };
       node("text", label, plot.svg).textContent = name;
       for (const event of data.events)
-        if (event.segment === name)
-          shade(plot.svg, frame, event, TOP + row * each + 4, each - 8, "strip");
+        if (event.segment === name) {
+          const [lane, lanes] = event.lane, high = (each - 8) / lanes;
+          const gap = lanes > 1 ? 1 : 0;
+          shade(plot.svg, frame, event, TOP + row * each + 4 + lane * high, high - gap, "strip");
+        }
     });
   };
 
