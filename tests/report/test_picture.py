@@ -309,9 +309,9 @@ def test_an_event_without_a_place_claims_none(robot):
 def test_what_is_not_known_is_said_in_words():
     event = Event(id=0, segment="base", level="contact", detected=1.0, status="not_separable")
     event.rank, event.unknowns = 7, 10
-    assert event_where(event) == "several contacts"
+    assert event_where(event) == "no single push"
     words = event_doubt(event)
-    assert "More than one contact on base" in words and "(7 equations, 10 unknowns)" in words
+    assert "No single push on base explains" in words and "(7 equations, 10 unknowns)" in words
     assert "part of its link" not in words
     event.candidates = (Candidate("link1", "link1", 0.4, np.zeros(3), 0.21),)
     assert "up to 21 cm away" in event_doubt(event)

@@ -151,7 +151,7 @@ def event_where(event: Event) -> str:
     if event.link is not None:
         return event.link
     if event.status == "not_separable":
-        return "several contacts"
+        return "no single push"
     return f"beyond {event.joint}" if event.joint else ""
 
 
@@ -162,8 +162,9 @@ def event_doubt(event: Event) -> str:
     words = {
         "ambiguous": "One contact at any of the marked places explains the measurements"
         f"{equations}; the percentages say how likely each is.",
-        "not_separable": f"More than one contact on {event.segment} at the same time{equations}: "
-        "the arrow is the sum of their forces, and the measurements do not tell the places apart.",
+        "not_separable": f"No single push on {event.segment} explains the measurements{equations}: "
+        "there are several contacts at the same time, or one that pulls or twists. The arrow is the "
+        "sum of the forces; their places cannot be told.",
         "wrench_only": "The force is known, its place is not: no push at a point of the surface "
         "explains the measurements.",
     }.get(event.status, "")

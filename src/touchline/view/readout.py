@@ -10,7 +10,11 @@ from touchline.view.judge import Verdict
 
 LEVEL_COLOURS = ("#e6e8eb", "#f5a623", "#d0021b")
 LEVEL_WORDS = ("nothing", "contact", "collision")
-STATUS_WORDS = {"not_separable": "no single push", "wrench_only": "force only"}
+STATUS_WORDS = {
+    "not_separable": "no single push",
+    "wrench_only": "force only",
+    "ambiguous": "one of several places",
+}
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from touchline.contact.contact import Contact
 from touchline.contact.event import Event
 from touchline.view.contacts import ContactScene, candidates
 from touchline.view.player import Player
+from touchline.view.readout import STATUS_WORDS
 from touchline.view.replay import Replay
 from touchline.view.scene import RobotScene, dress
 from touchline.view.server import PageServer
@@ -204,7 +205,7 @@ def _sentence(contact: Contact) -> str:
     if contact.position_std is not None:
         parts.append(f"\N{PLUS-MINUS SIGN} {1e3 * contact.position_std:.1f} mm")
     if contact.status != "located":
-        parts.append(contact.status.replace("_", " "))
+        parts.append(STATUS_WORDS.get(contact.status, contact.status))
     likely = candidates(contact)
     if len(likely) > 1:
         parts += [f"{100 * c.probability:.0f} % {c.link}" for c in likely[:NAMED]]
