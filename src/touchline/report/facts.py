@@ -163,8 +163,8 @@ def event_doubt(event: Event) -> str:
         "ambiguous": "One contact at any of the marked places explains the measurements"
         f"{equations}; the percentages say how likely each is.",
         "not_separable": f"No single push on {event.segment} explains the measurements{equations}: "
-        "there are several contacts at the same time, or one that pulls or twists. The arrow is the "
-        "sum of the forces; their places cannot be told.",
+        "there are several contacts at the same time, or one that pulls or twists. The arrow is "
+        "the sum of the forces; their places cannot be told.",
         "wrench_only": "The force is known, its place is not: no push at a point of the surface "
         "explains the measurements.",
     }.get(event.status, "")
