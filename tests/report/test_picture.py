@@ -312,6 +312,9 @@ def test_what_is_not_known_is_said_in_words():
     assert event_where(event) == "no single push"
     words = event_doubt(event)
     assert "No single push on base explains" in words and "(7 equations, 10 unknowns)" in words
+    assert "two contacts or more" in words
+    event.unknowns = 15
+    assert "three contacts or more" in event_doubt(event)
     assert "part of its link" not in words
     event.candidates = (Candidate("link1", "link1", 0.4, np.zeros(3), 0.21),)
     assert "up to 21 cm away" in event_doubt(event)

@@ -104,12 +104,12 @@ class Answer:
 
     @property
     def rank(self) -> int | None:
-        """Independent equations, of the `unknowns`, where they do not suffice."""
+        """Independent equations, for the `unknowns`, where none is left over."""
         return int(self._row[RANK]) or None
 
     @property
     def unknowns(self) -> int | None:
-        """Two for each place, three for each force, where the equations do not suffice."""
+        """Two for each place, three for each force, where no equation is left over."""
         return int(self._row[UNKNOWNS]) or None
 
     @property

@@ -11,6 +11,7 @@ from touchline.contact.line import line_point
 Array = NDArray[np.float64]
 
 STATUSES = ("located", "ambiguous", "not_separable", "wrench_only")
+UNKNOWNS = 5  # of one contact
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,13 @@ class Candidate:
     probability: float
     position: Array
     radius: float = 0.0
+
+
+def least_contacts(status: str, unknowns: int | None) -> int | None:
+    """How many contacts there are at least, where an answer has a status and so many unknowns."""
+    if status in ("located", "ambiguous"):
+        return 1
+    return unknowns // UNKNOWNS if unknowns else None
 
 
 @dataclass(frozen=True)
@@ -47,9 +55,9 @@ class Contact:
         zone: "structure", "end_effector" or "handle"; None while that is open.
         clamped: whether forces on two sides oppose each other; None where that is not known.
         rate: at which the force grows [N/s].
-        rank: where the independent equations at hand do not suffice, for one contact (joint torques
-            alone) or to tell two apart: how many there are, of the `unknowns` (two for each place,
-            three for each force).
+        rank: where no equation is left over, for one contact (joint torques alone) or for several
+            that begin together: how many independent ones there are, for the `unknowns` (two for
+            each place, three for each force). With fewer than unknowns no place is named.
     """
 
     segment: str
@@ -70,6 +78,24 @@ class Contact:
     rate: float | None = None
     rank: int | None = None
     unknowns: int | None = None
+
+    @property
+    def at_least(self) -> int | None:
+        """How many pushes explain what is measured, at least; None where that is not known.
+
+        One where a place is named. Contacts that cannot be told apart are one `Contact`, for two
+        or, where no two explain, three at least.
+        """
+        return least_contacts(self.status, self.unknowns)
+
+    @property
+    def may_be_more(self) -> bool:
+        """Would one contact more explain as well?
+
+        So it is where no equation is left over. Then `candidates` hold all that may be touched if
+        there are just so many contacts as `at_least` says, and not of necessity if there are more.
+        """
+        return self.status == "not_separable" or self.rank is not None
 
     @property
     def size(self) -> float:

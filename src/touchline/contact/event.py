@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.contact import Candidate
+from touchline.contact.contact import Candidate, least_contacts
 
 Array = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ class Event(EventAnswer):
         zone: "structure", "end_effector" or "handle"; None while that is open.
         clamped: whether forces on two sides opposed each other; None where that is not known.
         rate: largest rate of the segment's force [N/s].
-        rank: where equations do not suffice: independent ones at hand, of the `unknowns`.
+        rank: where no equation is left over: independent ones at hand, for the `unknowns`.
     """
 
     id: int
@@ -77,6 +77,11 @@ class Event(EventAnswer):
     rate: float | None = None
     rank: int | None = None
     unknowns: int | None = None
+
+    @property
+    def at_least(self) -> int | None:
+        """How many pushes explain what is measured, at least, as of a `touchline.Contact`."""
+        return least_contacts(self.status, self.unknowns)
 
     def as_json(self) -> dict[str, Any]:
         """The event as in `events.json`."""

@@ -163,7 +163,7 @@ def event_doubt(event: Event) -> str:
         "ambiguous": "One contact at any of the marked places explains the measurements"
         f"{equations}; the percentages say how likely each is.",
         "not_separable": f"No single push on {event.segment} explains the measurements{equations}: "
-        "there are several contacts at the same time, or one that pulls or twists. The arrow is "
+        f"there are {_at_least(event)} at the same time, or one that pulls or twists. The arrow is "
         "the sum of the forces; their places cannot be told.",
         "wrench_only": "The force is known, its place is not: no push at a point of the surface "
         "explains the measurements.",
@@ -174,6 +174,11 @@ def event_doubt(event: Event) -> str:
             f"{100 * radius:.0f} cm away, and the percentage for how much speaks for it."
         )
     return words
+
+
+def _at_least(event: Event) -> str:
+    numbers = {2: "two contacts or more", 3: "three contacts or more"}
+    return numbers.get(event.at_least or 0, "several contacts")
 
 
 def detection_fact(robot: Robot, thresholds: Thresholds) -> str:

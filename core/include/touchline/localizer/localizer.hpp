@@ -186,7 +186,7 @@ class Localizer {
     const bool explained =
         answer.status == Status::located || answer.status == Status::ambiguous;
     if (!m.event.open(static_cast<int>(answer.status), explained)) return;
-    m.undetermined = answer.unknowns > 0;
+    m.undetermined = answer.rank < answer.unknowns;
     for (int i = 0; i < answer.count; ++i) {
       const Candidate& k = answer.candidates[i];
       m.event.add(k.surface, single_.surfaces().to_node(k.point, surfaces()[k.surface].node),

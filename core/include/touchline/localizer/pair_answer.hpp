@@ -47,11 +47,14 @@ class PairAnswer {
     answer.status = sure ? Status::located : Status::ambiguous;
     answer.chi2 = best.chi2;
     answer.degrees = std::max(1, rows - PairSearch::kUnknowns);
+    if (best.rank > PairSearch::kUnknowns) return;
+    answer.rank = best.rank;  // none is left over, that would speak against a third contact
+    answer.unknowns = PairSearch::kUnknowns;
   }
 
   // All that may be touched, where the contacts cannot be told apart: as a first look has it.
   void name_all(const PairSearch& pairs, Answer& a) {
-    begin(pairs.count() > 0 ? pairs[0].rank : 0, PairStarts::kReach, a);
+    begin(pairs.count() > 0 ? pairs[0].rank : 0, 2, PairStarts::kReach, a);
     pairs.starts().regions([&](int surface, const Vec3& point, double cost) {
       add(surface, point, cost);
     });
@@ -60,7 +63,7 @@ class PairAnswer {
 
   // The same, as a walk over all that explains has it.
   void name_all(const PairParts& parts, const LinkSurfaces& surfaces, Answer& a) {
-    begin(parts.rank(), parts.reach(), a);
+    begin(parts.rank(), 2, parts.reach(), a);
     for (int i = 0; i < parts.count(); ++i) {
       const PairParts::Part& part = parts[i];
       if (parts.explains(part))
@@ -69,10 +72,13 @@ class PairAnswer {
     gather(a);
   }
 
+  // No two contacts explain: three at least. Nothing is known of their places.
+  void name_none(const PairSearch& pairs, Answer& a) { begin(pairs.view().most_rank(), 3, 0.0, a); }
+
  private:
   static constexpr double kSeparable = 0.9;  // probability of pairs that are told apart
   static constexpr double kSure = 0.95;      // and of one that is located
-  static constexpr int kCells = 512;
+  static constexpr int kCells = 512, kEach = 5;  // unknowns of each contact
 
   // Part of a link that may be touched, and the region that it belongs to.
   struct Cell {
@@ -82,11 +88,11 @@ class PairAnswer {
     int region;
   };
 
-  void begin(int rank, double reach, Answer& a) {
+  void begin(int rank, int contacts, double reach, Answer& a) {
     a.status = Status::not_separable;
     a.count = cells_ = 0;
     a.rank = rank;
-    a.unknowns = PairSearch::kUnknowns;
+    a.unknowns = kEach * contacts;
     reach_ = reach;
     least_ = std::numeric_limits<double>::infinity();
   }

@@ -36,7 +36,7 @@ class PairParts {
     view_ = search.view();
     limit_ = chi2_limit(view_.rows(), settings_.pitch_limit);
     rank_ = search.count() > 0 ? search[0].rank : 0;
-    best_ = std::numeric_limits<double>::infinity();
+    best_ = cone_ = std::numeric_limits<double>::infinity();
     apart_ = kApart;
     count_ = steps_ = 0;
     drop();
@@ -66,7 +66,7 @@ class PairParts {
   double reach() const { return std::max(kReach, kWide * apart_); }
   // Is it one of a pair that explains as well as the best, within the noise?
   bool explains(const Part& part) const {
-    return part.cost < best_ + kWindow && part.cone < kTold;
+    return part.cost < best_ + kWindow && part.cone < cone_ + kTold;
   }
 
  private:
@@ -95,6 +95,7 @@ class PairParts {
   void take(const Pair& s) {
     if (!(s.chi2 < std::min(limit_, best_ + kWindow)) || s.cost - s.chi2 > kPassed) return;
     best_ = std::min(best_, s.cost);
+    cone_ = std::min(cone_, s.cost - s.chi2);
     bool fresh[2];
     for (int k = 0; k < 2; ++k) fresh[k] = add(s, k);
     for (int k = 0; k < 2; ++k) {
@@ -165,7 +166,7 @@ class PairParts {
   std::vector<Task> waiting_;  // a ring
   Part parts_[kMost];
   int head_ = 0, waits_ = 0, count_ = 0, steps_ = 0, rank_ = 0;
-  double limit_ = 0.0, best_ = 0.0, apart_ = kApart;
+  double limit_ = 0.0, best_ = 0.0, cone_ = 0.0, apart_ = kApart;
 };
 
 }  // namespace touchline

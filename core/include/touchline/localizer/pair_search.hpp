@@ -34,7 +34,8 @@ class PairSearch {
   void search(int g, double lag, const Measurement& measurement) {
     count_ = 0;
     starts_.clear();
-    if (!view_.take(g, lag, measurement)) return;
+    searched_ = view_.take(g, lag, measurement);
+    if (!searched_) return;
     starts_.find(view_);
     for (int i = 0; i < starts_.count(); ++i) refine(starts_[i]);
     for (int i = 0, n = count_; i < n; ++i) enter(solutions_[i]);
@@ -43,6 +44,8 @@ class PairSearch {
 
   int count() const { return count_; }
   const Pair& operator[](int i) const { return solutions_[i]; }
+  // Would two contacts have been found, if there were any?
+  bool exhaustive() const { return searched_ && view_.has_wrench(); }
   // What was searched, and where it began.
   const PairView& view() const { return view_; }
   const PairStarts& starts() const { return starts_; }
@@ -138,6 +141,7 @@ class PairSearch {
   PairStarts starts_;
   Pair solutions_[kSolutions];
   int count_ = 0;
+  bool searched_ = false;
 };
 
 }  // namespace touchline

@@ -103,6 +103,15 @@ class PairView {
     }
     return count;
   }
+  // Of any two bodies.
+  int most_rank() const {
+    int most = 0;
+    for (int a = 0; a < bodies(); ++a) {
+      for (int b = a; b < bodies(); ++b) most = std::max(most, rank(a, b));
+    }
+    return most;
+  }
+  bool has_wrench() const { return has_wrench_; }
 
  private:
   const Posture* posture_;

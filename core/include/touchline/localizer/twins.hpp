@@ -88,7 +88,10 @@ class Twins {
         s.inseparable = one;
         said_.name_all(pairs_, s.inseparable);
       }
-      if (!parts.working() && now.time - s.apart >= kRisen * now.brief()) parts.begin(pairs_);
+      if (!parts.working() && now.time - s.apart >= kRisen * now.brief()) {
+        parts.begin(pairs_);
+        conclude(s, parts);
+      }
       return;
     }
     s.walked = false;
@@ -106,9 +109,18 @@ class Twins {
   void walk(SegmentContacts& s, PairParts& parts) {
     if (!parts.working()) return;
     parts.work(kSteps);
-    if (parts.working() || parts.count() == 0) return;
-    said_.name_all(parts, surfaces_, s.inseparable);
-    s.walked = true;
+    conclude(s, parts);
+  }
+
+  void conclude(SegmentContacts& s, const PairParts& parts) {
+    if (parts.working()) return;
+    if (parts.count() > 0) {
+      said_.name_all(parts, surfaces_, s.inseparable);
+      s.walked = true;
+    } else if (pairs_.exhaustive()) {
+      said_.name_none(pairs_, s.inseparable);
+      s.walked = true;
+    }
   }
 
   const LinkSurfaces& surfaces_;

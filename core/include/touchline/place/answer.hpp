@@ -21,7 +21,8 @@ struct Answer {
   double pitch = 0.0;         // in standard deviations
   double chi2 = 0.0;
   int degrees = 0;  // of freedom of chi2
-  // Where they do not suffice, for one contact or to tell two apart: equations, and unknowns.
+  // Where no equation is left over, for one contact or for several that began together: how many
+  // there are, and unknowns, five of each contact.
   int rank = 0, unknowns = 0;
 };
 

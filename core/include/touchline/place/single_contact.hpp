@@ -175,7 +175,7 @@ class SingleContact {
     } else {
       answer_.force = best.fit.force;
       const int equations = measurement.equations(node_of(best));
-      if (equations < kUnknowns) {
+      if (equations <= kUnknowns) {
         answer_.rank = equations;
         answer_.unknowns = kUnknowns;
       }
