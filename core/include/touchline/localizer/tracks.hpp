@@ -110,8 +110,8 @@ class Tracks {
       if (explains(s.contacts)) accept(s);
       return;
     }
-    if (explains(s.contacts)) {
-      report(known.serial, a);
+    if (explains(s.contacts)) {  // where no single force does, now and then, that is noise
+      a.status == Status::not_separable ? report(known) : report(known.serial, a);
       return;
     }
     arrivals_.begin(s, now_);
