@@ -34,21 +34,21 @@ def test_the_page_is_served_until_it_is_interrupted():
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     command = [sys.executable, "-u", "-m", "touchline", "demo", "--no-browser", "--port", str(port)]
-    demo = subprocess.Popen(
+    with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=os.environ
-    )
-    try:
-        lines = []
-        while not lines or "http://" not in lines[-1]:
-            lines.append(demo.stdout.readline())
-            assert lines[-1], "".join(lines)
-        url = re.search(r"http://\S+", lines[-1]).group()
-        assert url.startswith("http://127.0.0.1:")
-        with urllib.request.urlopen(url, timeout=10) as answer:
-            assert answer.status == 200 and b"<html" in answer.read()
-        time.sleep(0.2)
-        demo.send_signal(signal.SIGINT)
-        rest, _ = demo.communicate(timeout=20)
-        assert demo.returncode == 0 and "Traceback" not in rest
-    finally:
-        demo.kill()
+    ) as demo:
+        try:
+            lines = []
+            while not lines or "http://" not in lines[-1]:
+                lines.append(demo.stdout.readline())
+                assert lines[-1], "".join(lines)
+            url = re.search(r"http://\S+", lines[-1]).group()
+            assert url.startswith("http://127.0.0.1:")
+            with urllib.request.urlopen(url, timeout=10) as answer:
+                assert answer.status == 200 and b"<html" in answer.read()
+            time.sleep(0.2)
+            demo.send_signal(signal.SIGINT)
+            rest, _ = demo.communicate(timeout=60)
+            assert demo.returncode == 0 and "Traceback" not in rest
+        finally:
+            demo.kill()

@@ -164,9 +164,12 @@ def test_the_next_port_is_taken_where_one_is_busy(server):
         assert other.page.get_port() != busy
 
 
-@pytest.mark.parametrize(("host", "port"), [("203.0.113.1", 8080), ("127.0.0.1", 70000)])
-def test_an_address_that_is_not_ours_is_an_error(host, port):
-    with pytest.raises(InputError, match="--host"):
+@pytest.mark.parametrize(
+    ("host", "port", "named"),
+    [("203.0.113.1", 8080, "--host"), ("127.0.0.1", 70000, "--port 70000: must be from 0")],
+)
+def test_an_address_that_is_not_ours_is_an_error(host, port, named):
+    with pytest.raises(InputError, match=named):
         PageServer("test", host=host, port=port)
 
 
