@@ -172,3 +172,13 @@ def test_an_error_that_lasts_does_not_average_away(run):
     event, sample, off = judged(replace(OFF, model_error=0.0), run)
     assert event < 0.6 * sample
     assert off < 4.0 * event
+
+
+def test_places_that_are_held_get_no_surer_than_the_model_allows():
+    """Two contacts, 0.1 s apart, held for half a second beside each other."""
+    for run in range(4):
+        trial = run_trial(replace(OFF, contacts=2), run)
+        assert trial.course.several == 0
+        errors = np.array([touch.error for touch in trial.touches])
+        assert np.median(errors) > 3e-4
+        assert (errors < 4.0 * np.array([touch.std for touch in trial.touches])).all()

@@ -79,14 +79,17 @@ struct JointEstimate {
     }
   }
 
-  // The places' own covariances, from the joint one; none is sharper than surfaces are.
+  // The places' own covariances, from the joint one; none is sharper than surfaces are, or than the
+  // errors allow that the samples have in common.
   void spread() {
     const int n = size();
     for (int c = 0; c < count; ++c) {
       double* P = covariance + (kEach * c + 3) * (n + 1);
       P[0] = std::max(P[0], kSharpest);
       P[n + 1] = std::max(P[n + 1], kSharpest);
-      known[c].place = {P[0], P[1], P[n + 1]};
+      const Spread seen{P[0], P[1], P[n + 1]}, lasting = known[c].lasting;
+      const double rest = std::max(0.0, lasting.trace() - seen.trace());
+      known[c].place = rest > 0.0 ? seen + (rest / lasting.trace()) * lasting : seen;
     }
   }
 

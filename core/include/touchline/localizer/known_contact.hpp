@@ -40,12 +40,17 @@ struct Spread {
   double a = 0.0, b = 0.0, c = 0.0;  // 00, 01, 11
   double trace() const { return a + c; }
 };
+inline Spread operator*(double s, const Spread& x) { return {s * x.a, s * x.b, s * x.c}; }
+inline Spread operator+(const Spread& x, const Spread& y) {
+  return {x.a + y.a, x.b + y.b, x.c + y.c};
+}
 
 struct KnownContact {
   int serial = -1, surface = -1, node = -1;
   Vec3 point, normal;  // in the frame of the node
   Vec3 force;          // in world [N]
   Spread place;        // in the tangents of `normal`
+  Spread lasting;      // of it, by errors that all samples have in common: it gets no smaller
   double lag = 0.0;    // how old that is which the force speaks of [s]
   Age age;
   // How much of a force that has changed the filter does not show yet [N]. After a step at x = K t
@@ -101,6 +106,7 @@ inline void keep(const Answer& answer, const LinkSurfaces& surfaces, KnownContac
            turn[i][1] * (best.along[1] * turn[k][0] + best.along[2] * turn[k][1]);
   };
   known.place = {element(0, 0), element(0, 1), element(1, 1)};
+  known.lasting = answer.lasting * known.place;
 }
 
 // A contact of that number, at the place where it has been found.
@@ -152,6 +158,7 @@ inline void report(const KnownContact& known, const LinkSurfaces& surfaces, Answ
     }
   }
   answer.spread = std::sqrt(known.place.trace());
+  answer.lasting = std::min(1.0, known.lasting.trace() / known.place.trace());
 }
 
 inline bool placed(const Answer& a) {
