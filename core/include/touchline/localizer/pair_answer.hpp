@@ -78,7 +78,9 @@ class PairAnswer {
  private:
   static constexpr double kSeparable = 0.9;  // probability of pairs that are told apart
   static constexpr double kSure = 0.95;      // and of one that is located
-  static constexpr int kCells = 512, kEach = 5;  // unknowns of each contact
+  static constexpr int kCells = 512;
+  static constexpr int kEach = 5;   // unknowns of each contact
+  static constexpr int kTurns = 3;  // of regions that share cells out among them
 
   // Part of a link that may be touched, and the region that it belongs to.
   struct Cell {
@@ -116,6 +118,25 @@ class PairAnswer {
       if (far < 0) break;
       centre(a, far);
       assign(a);
+    }
+    for (int turn = 0; turn < kTurns; ++turn) {
+      for (int k = 0; k < a.count; ++k) recentre(a, k);
+      assign(a);
+    }
+  }
+
+  // To the cell from which it is not far to any other of its region.
+  void recentre(Answer& a, int region) {
+    double least = a.candidates[region].radius - reach_;
+    for (int i = 0; i < cells_; ++i) {
+      if (cell_[i].region != region) continue;
+      double far = 0.0;
+      for (int j = 0; j < cells_ && far < least; ++j) {
+        if (cell_[j].region == region) far = std::max(far, norm(cell_[j].point - cell_[i].point));
+      }
+      if (!(far < least)) continue;
+      least = far;
+      a.candidates[region].point = cell_[i].point;
     }
   }
 
