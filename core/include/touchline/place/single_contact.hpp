@@ -66,7 +66,7 @@ class SingleContact {
   static constexpr double kNegligible = 10.0;  // of the log posterior, below the best
   // A steady twist and force are assumed. A past that is remembered is exact up to the first order:
   // the rest (`Mean::moment`) is that of the body's origin (measured: 0.08 to 0.1 m in the plane).
-  static constexpr Doubt kDoubt{0.1, 0.0}, kRemembered{0.0, 0.05};
+  static constexpr Doubt kDoubt{0.1, 0.0}, kRemembered{0.0, 0.1};
 
   template <class MeanOf>
   const Answer& locate(int g, MeanOf&& mean, const Doubt& doubt, Measurement& measurement, bool again) {
