@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "touchline/localizer/pair_view.hpp"
@@ -32,6 +33,7 @@ class BodyStarts {
         own_.push_back(p);
       }
     }
+    reach_ = kNear * std::sqrt(0.5 * total / std::max(1.0, 1.0 * own_.size()));
     for (auto* posed : {&points_, &normals_, &earlier_}) posed->resize(own_.size());
   }
 
@@ -45,6 +47,8 @@ class BodyStarts {
   }
 
   int count() const { return static_cast<int>(own_.size()); }
+  // How far it is from anywhere on the body to one of them, or little farther [m].
+  double reach() const { return reach_; }
   int surface(int i) const { return surface_[i]; }
   const Vec3* points() const { return points_.data(); }
   const Vec3* normals() const { return normals_.data(); }
@@ -52,6 +56,9 @@ class BodyStarts {
   const Vec3* earlier() const { return earlier_.data(); }
 
  private:
+  static constexpr double kNear = 0.75;  // times the root of the area that one stands for
+
+  double reach_ = 0.0;
   std::vector<int> surface_;
   std::vector<SurfaceSample> own_;  // in the frame of the node
   std::vector<Vec3> points_, normals_, earlier_;  // in world

@@ -54,26 +54,27 @@ class PairAnswer {
 
   // All that may be touched, where the contacts cannot be told apart: as a first look has it.
   void name_all(const PairSearch& pairs, Answer& a) {
-    begin(pairs.count() > 0 ? pairs[0].rank : 0, 2, PairStarts::kReach, a);
-    pairs.starts().regions([&](int surface, const Vec3& point, double cost) {
-      add(surface, point, cost);
+    begin(pairs.count() > 0 ? pairs[0].rank : 0, 2, a);
+    pairs.starts().regions([&](int surface, const Vec3& point, double cost, double reach) {
+      add(surface, point, cost, reach);
     });
     gather(a);
   }
 
   // The same, as a walk over all that explains has it.
   void name_all(const PairParts& parts, const LinkSurfaces& surfaces, Answer& a) {
-    begin(parts.rank(), 2, parts.reach(), a);
+    begin(parts.rank(), 2, a);
     for (int i = 0; i < parts.count(); ++i) {
       const PairParts::Part& part = parts[i];
-      if (parts.explains(part))
-        add(part.surface, surfaces.to_world(part.point, surfaces[part.surface].node), part.cost);
+      if (!parts.explains(part)) continue;
+      const Vec3 point = surfaces.to_world(part.point, surfaces[part.surface].node);
+      add(part.surface, point, part.cost, parts.reach());
     }
     gather(a);
   }
 
   // No two contacts explain: three at least. Nothing is known of their places.
-  void name_none(const PairSearch& pairs, Answer& a) { begin(pairs.view().most_rank(), 3, 0.0, a); }
+  void name_none(const PairSearch& pairs, Answer& a) { begin(pairs.view().most_rank(), 3, a); }
 
  private:
   static constexpr double kSeparable = 0.9;  // probability of pairs that are told apart
@@ -86,22 +87,21 @@ class PairAnswer {
   struct Cell {
     int surface;
     Vec3 point;
-    double cost;
+    double cost, reach;  // how far around it [m]
     int region;
   };
 
-  void begin(int rank, int contacts, double reach, Answer& a) {
+  void begin(int rank, int contacts, Answer& a) {
     a.status = Status::not_separable;
     a.count = cells_ = 0;
     a.rank = rank;
     a.unknowns = kEach * contacts;
-    reach_ = reach;
     least_ = std::numeric_limits<double>::infinity();
   }
 
-  void add(int surface, const Vec3& point, double cost) {
+  void add(int surface, const Vec3& point, double cost, double reach) {
     if (cells_ == kCells) return;
-    cell_[cells_++] = {surface, point, cost, -1};
+    cell_[cells_++] = {surface, point, cost, reach, -1};
     least_ = std::min(least_, cost);
   }
 
@@ -127,7 +127,7 @@ class PairAnswer {
 
   // To the cell from which it is not far to any other of its region.
   void recentre(Answer& a, int region) {
-    double least = a.candidates[region].radius - reach_;
+    double least = std::numeric_limits<double>::infinity();
     for (int i = 0; i < cells_; ++i) {
       if (cell_[i].region != region) continue;
       double far = 0.0;
@@ -177,7 +177,7 @@ class PairAnswer {
       }
       if (cell_[i].region < 0) continue;
       Candidate& k = a.candidates[cell_[i].region];
-      k.radius = std::max(k.radius, least + reach_);
+      k.radius = std::max(k.radius, least + cell_[i].reach);
       const double weight = std::exp(0.5 * (least_ - cell_[i].cost));
       k.weight += weight;
       sum += weight;
@@ -206,7 +206,7 @@ class PairAnswer {
   const LocalizerSettings& settings_;
   Cell cell_[kCells];
   int cells_ = 0;
-  double reach_ = 0.0, least_ = 0.0;
+  double least_ = 0.0;
 };
 
 }  // namespace touchline

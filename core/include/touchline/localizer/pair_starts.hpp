@@ -18,8 +18,6 @@ namespace touchline {
 
 class PairStarts {
  public:
-  static constexpr double kReach = 0.025;  // of what a point of a region stands for [m]
-
   PairStarts(const LinkSurfaces& surfaces, const LocalizerSettings& settings, std::size_t rows,
              int segments)
       : settings_(settings),
@@ -61,8 +59,8 @@ class PairStarts {
   int count() const { return count_; }
   const Pair& operator[](int i) const { return found_[i]; }
 
-  // Calls `visit(surface, point, cost)` for each point of the segment that may be touched: the cost
-  // is that of the best pair with one contact in its neighbourhood.
+  // Calls `visit(surface, point, cost, reach)` for each point of the segment that may be touched: the
+  // cost is that of the best pair with one contact in its neighbourhood, within `reach` [m].
   template <class Visit>
   void regions(Visit&& visit) const {
     for (int b = 0; view_ != nullptr && b < view_->bodies(); ++b) {
@@ -71,7 +69,7 @@ class PairStarts {
         double cost = kInfinity;
         for (int other = 0; other < view_->bodies(); ++other)
           cost = std::min(cost, lane(costs_[at(b, other, i)], i % kLanes));
-        if (cost < kPlausible) visit(starts.surface(i), starts.points()[i], cost);
+        if (cost < kPlausible) visit(starts.surface(i), starts.points()[i], cost, starts.reach());
       }
     }
   }
