@@ -10,7 +10,9 @@
 #include <vector>
 
 #include "touchline/place/hypothesis.hpp"
+#include "touchline/place/few_candidates.hpp"
 #include "touchline/place/measurement.hpp"
+#include "touchline/place/place_metric.hpp"
 #include "touchline/place/refinement.hpp"
 #include "touchline/place/view.hpp"
 
@@ -232,24 +234,6 @@ class Explanations {
     return false;
   }
 
-  // One sigma of a place across a direction, where it is least known [m].
-  static double widest(const double* G, const Vec3& direction) {
-    Vec3 s, t;
-    tangents(direction, s, t);
-    const double a = squared(G, s), c = squared(G, t);
-    const double b = 0.5 * (squared(G, s + t) - a - c);
-    const double least = 0.5 * (a + c - std::sqrt((a - c) * (a - c) + 4.0 * b * b));
-    return 1.0 / std::sqrt(std::max(least, 1e-12));
-  }
-
-  static double squared(const double* G, const Vec3& d) {
-    const double v[3] = {d.x, d.y, d.z};
-    double sum = 0.0;
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) sum += v[i] * G[3 * i + j] * v[j];
-    return std::max(0.0, sum);
-  }
-
   int index(const View& view) const { return static_cast<int>(&view - views_.data()); }
 
   // Is the candidate at hand one of those from `first` on?
@@ -316,29 +300,6 @@ class Explanations {
         if (!known(0, kSame)) keep();
       }
     }
-  }
-
-  // Keeps the best few, apart from each other.
-  static int insert(Candidate* starts, int most, int found, const Candidate& k, double apart) {
-    for (int i = 0; i < found; ++i) {
-      if (norm(starts[i].point - k.point) < apart) {
-        if (k.fit.cost() < starts[i].fit.cost()) starts[i] = k;
-        return found;
-      }
-    }
-    if (found < most) {
-      starts[found] = k;
-      return found + 1;
-    }
-    Candidate* last = worst(starts, found);
-    if (k.fit.cost() < last->fit.cost()) *last = k;
-    return found;
-  }
-
-  static Candidate* worst(Candidate* starts, int count) {
-    return std::max_element(starts, starts + count, [](const Candidate& a, const Candidate& b) {
-      return a.fit.cost() < b.fit.cost();
-    });
   }
 
   const Posture& posture_;
