@@ -72,8 +72,6 @@ class Arrivals {
   }
 
  private:
-  static constexpr int kPasses = 3;
-
   // Has it been placed for a while, and has it lasted?
   bool is_found(SegmentContacts& s, const Answer& a) const {
     const bool found = placed(a);
@@ -189,22 +187,18 @@ class Arrivals {
   template <class Read>
   void admit(SegmentContacts& s, const Answer& a, Read&& read) {
     if (s.newcomer < 0) s.newcomer = reports_.next();
-    const JointEstimate& before = s.before.contacts;
-    const int old = before.count;
-    for (int c = 0; c < old; ++c) reports_.add(before.known[c]);
+    s.contacts = s.before.contacts;
+    const int old = s.contacts.count;
+    for (int c = 0; c < old; ++c) reports_.add(s.contacts.known[c]);
     reports_.add(s.newcomer, a);
     read();
     Change change;
     if (freed_) change = Change::of_forces(old, settings_.force_scale);
-    KnownContact found = found_contact(s.newcomer, a, single_.surfaces(), s.new_age, now_.brief());
-    for (int pass = 0; pass < kPasses; ++pass) {  // surfaces are no planes
-      s.contacts = before;
-      s.contacts.add(found, settings_.force_scale);
-      if (pass == 0) fit_.weigh(s.contacts, measurement_);
-      fit_.begin(measurement_, s.contacts);
-      fit_.accept(s.contacts, change, 1.0);
-      found = s.contacts.known[old];
-    }
+    s.contacts.add(found_contact(s.newcomer, a, single_.surfaces(), s.new_age, now_.brief()),
+                   settings_.force_scale);
+    fit_.weigh(s.contacts, measurement_);
+    fit_.begin(measurement_, s.contacts);
+    fit_.accept(s.contacts, change, 1.0);
     s.arriving = false;
     s.know(now_);
   }
