@@ -236,11 +236,14 @@ class Explanations {
 
   int index(const View& view) const { return static_cast<int>(&view - views_.data()); }
 
-  // Is the candidate at hand one of those from `first` on?
+  // Is the candidate at hand one of those from `first` on? Not one that is much worse: at a rim the
+  // line may graze the face beside the one that is pushed.
   bool known(int first, double distance) const {
     const Candidate& k = candidates_[count_];
     for (int i = first; i < count_; ++i) {
-      if (candidates_[i].surface == k.surface && norm(candidates_[i].point - k.point) < distance)
+      const Candidate& other = candidates_[i];
+      if (other.surface == k.surface && norm(other.point - k.point) < distance &&
+          other.fit.cost() < k.fit.cost() + kGrazing)
         return true;
     }
     return false;
