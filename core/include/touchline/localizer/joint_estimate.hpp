@@ -68,14 +68,22 @@ struct JointEstimate {
   }
 
   // What forces that are held and places that are kept do in a time [s]. A force of which the filter
-  // does not show all yet will go on to change: it is younger than 1 / K.
+  // does not show all yet will go on to change: along its own direction, and about as foreseen.
   void creep(double passed, double bandwidth) {
     const int n = size();
     for (int c = 0; c < count; ++c) {
-      const double coming = known[c].coming(bandwidth);
-      const double unrest = kTremor + 2.0 * bandwidth * coming * coming;
+      KnownContact& k = known[c];
+      const double coming = k.coming(bandwidth), unrest = 2.0 * bandwidth * coming * coming;
+      const Vec3 u = (1.0 / std::max(norm(k.force), 1e-9)) * k.force;
+      const double way = bandwidth * k.lag < 1.0 ? 1.0 : -1.0;  // what has grown is young
+      k.force = k.force + way * coming * (1.0 - std::exp(-bandwidth * passed)) * u;
       double* P = covariance + kEach * c * (n + 1);
-      for (int i = 0; i < kEach; ++i) P[i * (n + 1)] += passed * (i < 3 ? unrest : kCreep);
+      for (int i = 0; i < kEach; ++i)
+        P[i * (n + 1)] += passed * (i < 3 ? kTremor + kAcross * unrest : kCreep);
+      for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j)
+          P[i * n + j] += passed * (kDoubt - kAcross) * unrest * component(u, i) * component(u, j);
+      }
     }
   }
 
@@ -122,7 +130,9 @@ struct JointEstimate {
 
  private:
   static constexpr double kAnywhere = 1e-2;  // variance of a place before it is known [m2]
-  static constexpr double kTremor = 1e-3;    // of forces that are held [N2/s]
+  static constexpr double kTremor = 3e-4;    // of forces that are held [N2/s]
+  // Doubt of how much a force changes, and of its direction, in parts of the variance foreseen.
+  static constexpr double kDoubt = 0.05, kAcross = 0.005;
   static constexpr double kSharpest = 4e-10;  // variance of a place [m2]
   static constexpr double kCreep = 2e-9;     // and of their places [m2/s]
 
