@@ -28,6 +28,11 @@ def test_what_cannot_be_is_refused_with_one_line(arguments, named, capsys):
     assert named in capsys.readouterr().err
 
 
+def _may_be_interrupted():
+    # Whoever runs the tests in the background has the signal ignored, and so have their children.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="no signals")
 def test_the_page_is_served_until_it_is_interrupted():
     with socket.socket() as free:
@@ -35,7 +40,12 @@ def test_the_page_is_served_until_it_is_interrupted():
         port = free.getsockname()[1]
     command = [sys.executable, "-u", "-m", "touchline", "demo", "--no-browser", "--port", str(port)]
     with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=os.environ
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env=os.environ,
+        preexec_fn=_may_be_interrupted,  # noqa: PLW1509
     ) as demo:
         try:
             lines = []
@@ -48,7 +58,7 @@ def test_the_page_is_served_until_it_is_interrupted():
                 assert answer.status == 200 and b"<html" in answer.read()
             time.sleep(0.2)
             demo.send_signal(signal.SIGINT)
-            rest, _ = demo.communicate(timeout=60)
+            rest, _ = demo.communicate(timeout=30)
             assert demo.returncode == 0 and "Traceback" not in rest
         finally:
             demo.kill()
