@@ -82,7 +82,7 @@ class TouchSampler:
 
     def pose(self) -> Array:
         """Random joint positions (n,) [rad or m] within their limits."""
-        return self._rng.uniform(*_limits(self.robot))
+        return self._rng.uniform(*self.robot.ranges)
 
     def attempt(self, force: float, q: Array, taken: tuple[str, ...] = ()) -> Touch | None:
         """A random touch, as of `sample`; None if that place is taken or cannot be reached."""
@@ -148,12 +148,6 @@ def sample_on_each(
             touches += islice((touch for touch in tries if touch is not None), 1)
         if len(touches) == len(samplers):
             return touches
-
-
-def _limits(robot: Robot) -> tuple[Array, Array]:
-    joints = [robot.mechanism.joints[name] for name in robot.joint_names]
-    lower = np.array([max(joint.lower, -np.pi) for joint in joints])
-    return lower, np.array([min(joint.upper, np.pi) for joint in joints])
 
 
 def _in_cone(axis: Array, friction: float, rng: np.random.Generator) -> Array:

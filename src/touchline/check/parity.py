@@ -95,11 +95,7 @@ def _signal_names(robot: Robot) -> list[str]:
 
 
 def _configurations(robot: Robot, rng: np.random.Generator) -> Array:
-    joints = [robot.mechanism.joints[name] for name in robot.joint_names]
-    lower = np.array([max(joint.lower, -np.pi) for joint in joints])
-    upper = np.array([min(joint.upper, np.pi) for joint in joints])
-    low, high = np.minimum(lower, upper), np.maximum(lower, upper)
-    return rng.uniform(low, high, (CONFIGURATIONS, len(joints)))
+    return rng.uniform(*robot.ranges, (CONFIGURATIONS, len(robot.joint_names)))
 
 
 def _left_null(matrix: Array) -> tuple[Array, int]:

@@ -52,10 +52,7 @@ def guess_drift(robot: Robot, error: float) -> tuple[Array, Array]:
 
 def _states(robot: Robot, rng: np.random.Generator) -> tuple[Array, Array, Array]:
     """Poses, some way on, with unit speed, with unit acceleration (4 POSES, n)."""
-    joints = [robot.mechanism.joints[name] for name in robot.joint_names]
-    lower = np.array([max(joint.lower, -np.pi) for joint in joints])
-    upper = np.array([min(joint.upper, np.pi) for joint in joints])
-    q = rng.uniform(lower, np.maximum(lower, upper), (POSES, len(joints)))
+    q = rng.uniform(*robot.ranges, (POSES, len(robot.joint_names)))
     way = rng.normal(size=(3, *q.shape))
     way, v, a = way / np.linalg.norm(way, axis=-1, keepdims=True)
     still = np.zeros_like(q)

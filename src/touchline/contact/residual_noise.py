@@ -45,7 +45,7 @@ def residual_noise(robot: Robot, period: float) -> tuple[Array, dict[str, Array]
     )
     noise, kernel = native_noise(robot, period), robot.kernel()
     worst = np.zeros(len(rows))
-    for q in _configurations(robot):
+    for q in np.random.default_rng(0).uniform(*robot.ranges, (CONFIGURATIONS, n)):
         reading, momentum = core.row_variances(kernel, rows, noise, q)
         worst = np.maximum(worst, reading * np.minimum(1.0, K * period / 2) + K**2 * momentum)
     sigma = np.sqrt(worst)
@@ -56,13 +56,3 @@ def _row(segment: int, component: int, joint: int) -> core.DetectionRow:
     """Neither thresholds nor the segment of a joint's row matter here."""
     none = [0.0] * 3
     return core.DetectionRow(segment, component, joint, 1.0, 1.0, 1.0, none, none, none)
-
-
-def _configurations(robot: Robot) -> Array:
-    rng = np.random.default_rng(0)
-    joints = [robot.mechanism.joints[name] for name in robot.joint_names]
-    lower = np.array([max(joint.lower, -np.pi) for joint in joints])
-    upper = np.array([min(joint.upper, np.pi) for joint in joints])
-    return rng.uniform(
-        np.minimum(lower, upper), np.maximum(lower, upper), (CONFIGURATIONS, len(joints))
-    )

@@ -101,6 +101,14 @@ class Robot:
             if name != segment and self._segment_of(self.nodes[i].parent) == segment
         )
 
+    @cached_property
+    def ranges(self) -> tuple[Array, Array]:
+        """Least and largest joint positions (n,) within the limits and half a turn [rad or m]."""
+        joints = [self.mechanism.joints[name] for name in self.joint_names]
+        limits = np.array([(max(j.lower, -np.pi), min(j.upper, np.pi)) for j in joints])
+        low, high = np.sort(limits.reshape(-1, 2), axis=1).T
+        return low, high
+
     def sensor_poses(self, q: Sequence[float] | Array) -> Array:
         """Poses (k, 4, 4) of the sensor frames in world, for joint positions `q` (n,) [rad]."""
         index = {node.sensor: i for i, node in enumerate(self.nodes)}

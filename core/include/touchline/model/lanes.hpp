@@ -44,12 +44,6 @@ inline Lanes root(Lanes x) {
 inline Lanes larger(const Lanes& a, const Lanes& b) { return a > b ? a : b; }
 inline Lanes smaller(const Lanes& a, const Lanes& b) { return a < b ? a : b; }
 
-inline double smallest(const Lanes& a) {
-  double least = lane(a, 0);
-  for (int k = 1; k < kLanes; ++k) least = std::min(least, lane(a, k));
-  return least;
-}
-
 inline bool any_below(const Lanes& a, const Lanes& b) {
   bool any = false;
   for (int k = 0; k < kLanes; ++k) any |= lane(a, k) < lane(b, k);

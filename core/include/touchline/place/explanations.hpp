@@ -87,7 +87,6 @@ class Explanations {
   const Candidate* end() const { return candidates_.data() + count_; }
   Candidate* begin() { return candidates_.data(); }
   Candidate* end() { return candidates_.data() + count_; }
-  void shrink(int count) { count_ = count; }
   double best() const { return best_; }
   // The bodies that were looked at.
   int views() const { return used_; }

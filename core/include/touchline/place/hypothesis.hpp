@@ -86,13 +86,6 @@ class ForceFitter {
     reduce(q, point, A, g);
   }
 
-  // Logarithm of the volume of forces at `point` that explain as well as the best.
-  double log_volume(const Quadratic& q, const Vec3& point) const {
-    double A[9], g[3];
-    reduce(q, point, A, g);
-    return cholesky(A, 3) ? -0.5 * log_determinant(A, 3) : -std::numeric_limits<double>::infinity();
-  }
-
   // Fills chi2, cone and cosine of a force that is given.
   void judge(const Quadratic& q, const Vec3& point, const Vec3& normal, bool grasped,
              Fit& fit) const {

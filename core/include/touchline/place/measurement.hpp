@@ -141,10 +141,9 @@ class Measurement {
     return count;
   }
 
-  // The lower triangle of the covariance of all rows; and of the part of it that no mean over time
-  // takes away, valid where `lasts()`.
+  // The lower triangle of the covariance of all rows.
   void covariance(double* out) const { std::copy_n(covariance_.data(), size_ * size_, out); }
-  const double* lasting_covariance() const { return lasting_covariance_.data(); }
+  // Is there a part of it that no mean over time takes away?
   bool lasts() const { return lasts_; }
 
   // To the scale of the noise: independent rows of variance one.

@@ -64,9 +64,7 @@ class Trajectory:
 def random_trajectory(robot: Robot, rng: np.random.Generator) -> Trajectory:
     """A motion within the joints' limits whose fastest joint reaches 0.5 to 3 rad/s."""
     n = len(robot.joint_names)
-    joints = [robot.mechanism.joints[name] for name in robot.joint_names]
-    lower = np.array([max(joint.lower, -np.pi) for joint in joints])
-    upper = np.array([min(joint.upper, np.pi) for joint in joints])
+    lower, upper = robot.ranges
     frequency = 2 * np.pi * rng.uniform(*FREQUENCIES, (WAVES, n))
     amplitude = rng.uniform(0.2, 1.0, (WAVES, n)) / frequency
     speed = (amplitude * frequency).sum(axis=0)
