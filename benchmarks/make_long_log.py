@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 import touchline as tl
-from touchline.estimation.samples import Samples
 from touchline.logs import TableWriter
 from touchline.logs.tables import table_columns
+from touchline.observer.samples import Samples
 
 RATE = 1000
 PERIOD = 60  # s; the motion repeats

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <vector>
 
-#include "touchline/classifier/classifier.hpp"
-#include "touchline/localizer/localizer.hpp"
+#include "touchline/detail/classifier/classifier.hpp"
+#include "touchline/detail/localizer/localizer.hpp"
 
 namespace answer_rows {
 

@@ -15,7 +15,7 @@
 #include "localizer_bindings.hpp"
 #include "mesh_bindings.hpp"
 #include "samples.hpp"
-#include "touchline/observer/observer.hpp"
+#include "touchline/detail/observer/observer.hpp"
 
 // Types for the stub; what is not an array of float64 of the right shape is a TypeError.
 #define TOUCHLINE_ARRAY "numpy.typing.NDArray[numpy.float64]"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "arrays.hpp"
-#include "touchline/classifier/classifier.hpp"
+#include "touchline/detail/classifier/classifier.hpp"
 
 namespace classification {
 

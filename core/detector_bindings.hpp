@@ -12,7 +12,7 @@
 
 #include "arrays.hpp"
 #include "samples.hpp"
-#include "touchline/detector/detector.hpp"
+#include "touchline/detail/detector/detector.hpp"
 
 namespace detection {
 

@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "touchline/model/mesh.hpp"
+#include "touchline/detail/model/mesh.hpp"
 
 namespace meshes {
 

@@ -5,7 +5,7 @@
 #include <nanobind/nanobind.h>
 
 #include "arrays.hpp"
-#include "touchline/observer/observer.hpp"
+#include "touchline/detail/observer/observer.hpp"
 
 namespace samples {
 

@@ -4,10 +4,10 @@
 import numpy as np
 
 import touchline as tl
-from touchline.contact.reaction import stop
-from touchline.contact.reactor import Reactor
-from touchline.contact.state import State
 from touchline.model.description import PolicyDescription, PolicyRule
+from touchline.reaction.reaction import stop
+from touchline.reaction.reactor import Reactor
+from touchline.reaction.state import State
 from touchline.simulation.encounter import EncounterScene
 
 

@@ -4,7 +4,7 @@
 import numpy as np
 
 import touchline as tl
-from touchline.estimation.samples import Samples
+from touchline.observer.samples import Samples
 
 
 def smooth_motion(robot, seconds, rate, seed=0, amplitude=0.5):

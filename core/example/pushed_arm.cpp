@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <vector>
 
-#include "touchline/observer/observer.hpp"
+#include "touchline/detail/observer/observer.hpp"
 
 using touchline::Vec3;
 

@@ -8,14 +8,14 @@ pipeline = tl.Pipeline(robot)
 result = pipeline.update(time, q, qd, tau, wrench)
 """
 
-from touchline.contact.contact import Candidate, Contact
-from touchline.contact.detector import Level
-from touchline.contact.event import Event
-from touchline.contact.pipeline import Pipeline, Result
+from touchline.detector.detector import Level
 from touchline.errors import InputError
-from touchline.estimation.observer import Estimate, Observer
 from touchline.health import Health
 from touchline.model.robot import Robot, load_robot
+from touchline.observer.observer import Estimate, Observer
+from touchline.pipeline.pipeline import Pipeline, Result
+from touchline.result.contact import Candidate, Contact
+from touchline.result.event import Event
 
 __version__ = "0.1.0"
 

@@ -21,12 +21,12 @@ from touchline.bench.detection.outcome import Outcome
 from touchline.bench.detection.pushes import AFTER, BEFORE, PushMaker, random_pushes
 from touchline.bench.detection.tables import alarm_table, delay_table
 from touchline.bench.detection.work import Setting, maker
-from touchline.contact.calibration import Statistics, watching, with_methods
-from touchline.contact.detector import Detector
-from touchline.contact.tail import Tail
-from touchline.estimation.classical import ClassicalObserver
-from touchline.estimation.dynamics import from_world, inverse_dynamics
-from touchline.estimation.observer import Observer
+from touchline.detector.calibration import Statistics, watching, with_methods
+from touchline.detector.detector import Detector
+from touchline.detector.tail import Tail
+from touchline.observer.classical import ClassicalObserver
+from touchline.observer.dynamics import from_world, inverse_dynamics
+from touchline.observer.observer import Observer
 
 
 @pytest.fixture(scope="module")

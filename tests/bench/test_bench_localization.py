@@ -20,8 +20,8 @@ from touchline.bench.localization.surface_map import SurfaceMap
 from touchline.bench.localization.trial import pair_rank, run_trial
 from touchline.bench.localization.trials_file import write_trials
 from touchline.bench.touches import TouchSampler, sample_on_each, touch_loads
-from touchline.contact.skin import Skin
 from touchline.errors import InputError
+from touchline.localizer.skin import Skin
 
 
 def panda(tier=0):

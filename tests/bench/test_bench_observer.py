@@ -17,10 +17,10 @@ from touchline.bench.observer.timing import Candidate, measure
 from touchline.bench.pinocchio_peer import PinocchioObserver
 from touchline.bench.urdf import robot_urdf, sensor_link
 from touchline.errors import InputError
-from touchline.estimation.dynamics import gravity_loads
-from touchline.estimation.observer import Observer
 from touchline.model.description import JointDescription, SensorDescription
 from touchline.model.robot import Robot
+from touchline.observer.dynamics import gravity_loads
+from touchline.observer.observer import Observer
 
 
 @pytest.fixture(scope="module")

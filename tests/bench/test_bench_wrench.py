@@ -24,13 +24,13 @@ from touchline.bench.wrench.scores import (
 from touchline.bench.wrench.stage import BIAS, IMPACT, QUIET, START, Stage
 from touchline.bench.wrench.tables import row_keys, scenario_table, tally, verdict, write_tables
 from touchline.cli import main
-from touchline.contact.skin import Skin
 from touchline.errors import InputError
-from touchline.estimation.dynamics import contact_loads
-from touchline.estimation.joint_momentum import tool_wrench
-from touchline.estimation.observer import Observer
-from touchline.estimation.samples import Samples
+from touchline.localizer.skin import Skin
 from touchline.model.robot import load_robot
+from touchline.observer.dynamics import contact_loads
+from touchline.observer.joint_momentum import tool_wrench
+from touchline.observer.observer import Observer
+from touchline.observer.samples import Samples
 
 RESTING = np.array([0.4, 0.9, -0.5, -1.2, 0.6, 0.8, 0.3])
 PEERS = [pytest.param(m, id=m.name) for m in METHODS]

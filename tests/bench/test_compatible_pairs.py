@@ -16,7 +16,7 @@ from touchline.bench.localization.scene import FRICTION, arm_and_skin, make_scen
 from touchline.bench.localization.touched import last_answers
 from touchline.bench.localization.trial import make_pipeline, pair_rank
 from touchline.errors import InputError
-from touchline.estimation.dynamics import contact_loads
+from touchline.observer.dynamics import contact_loads
 
 PAIRS = {7: (4, 14, 20), 8: (0, 3, 17), 9: (2, 16, 31)}  # rank, and runs of the benchmark
 CELL = Cell("panda", 2, 0, "together")

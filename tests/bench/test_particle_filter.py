@@ -15,7 +15,7 @@ from touchline.bench.localization.particle_filter import (
 )
 from touchline.bench.localization.scene import arm_and_skin, make_scene
 from touchline.bench.localization.trial import run_trial
-from touchline.contact.skin import Skin
+from touchline.localizer.skin import Skin
 
 
 @pytest.mark.parametrize("columns", [4, 8, 12])

@@ -18,10 +18,10 @@ from touchline.calibrate.noise import NoiseMeter
 from touchline.calibrate.robot_file import write_description
 from touchline.calibrate.run import _check_tails, calibrate
 from touchline.cli.main import main
-from touchline.contact.calibration import fit_growth
-from touchline.contact.detector import Detector
-from touchline.contact.tail import Tail
-from touchline.contact.thresholds import make_thresholds, row_name
+from touchline.detector.calibration import fit_growth
+from touchline.detector.detector import Detector
+from touchline.detector.tail import Tail
+from touchline.detector.thresholds import make_thresholds, row_name
 from touchline.errors import InputError
 from touchline.logs import write_table
 from touchline.model.values import METHODS

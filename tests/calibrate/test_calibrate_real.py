@@ -10,7 +10,7 @@ import pytest
 import touchline as tl
 from touchline.calibrate.run import calibrate
 from touchline.calibrate.summary import summary_text
-from touchline.contact.thresholds import make_thresholds
+from touchline.detector.thresholds import make_thresholds
 from touchline.errors import InputError
 
 REPOSITORY = Path(__file__).resolve().parents[2]

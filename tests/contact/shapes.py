@@ -4,8 +4,7 @@
 import numpy as np
 
 from touchline.bench.touches import Touch, resting_signals
-from touchline.contact.skin import Skin
-from touchline.estimation.observer import Observer
+from touchline.localizer.skin import Skin
 from touchline.model.description import (
     JointDescription,
     Noise,
@@ -15,6 +14,7 @@ from touchline.model.description import (
 from touchline.model.mechanism import Geometry, Inertia, Joint, Link, Mechanism
 from touchline.model.robot import Robot
 from touchline.model.transforms import pose, rotation_rpy
+from touchline.observer.observer import Observer
 
 BODY = Inertia(1.0, np.zeros(3), np.eye(3) * 0.01)
 

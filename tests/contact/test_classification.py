@@ -7,7 +7,7 @@ import pytest
 import touchline as tl
 from touchline.bench.classification.interactions import BEGIN, InteractionSampler
 from touchline.bench.touches import TouchSampler
-from touchline.contact.skin import Skin
+from touchline.localizer.skin import Skin
 
 
 @pytest.fixture(scope="module")

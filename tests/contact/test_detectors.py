@@ -8,10 +8,10 @@ import pytest
 
 import touchline as tl
 from touchline.bench.touches import TouchSampler, resting_signals
-from touchline.contact.detector import Detector
-from touchline.contact.limits import siegmund
-from touchline.contact.skin import Skin
-from touchline.contact.thresholds import make_thresholds, without_limits
+from touchline.detector.detector import Detector
+from touchline.detector.limits import siegmund
+from touchline.detector.thresholds import make_thresholds, without_limits
+from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
 
 METHODS = ("rows", "scaled", "chi2", "glrt", "cusum")

@@ -6,10 +6,10 @@ import pytest
 from shapes import box, chain, measured, still
 
 from touchline.bench.touches import Touch, resting_signals
-from touchline.contact.contact import Contact
-from touchline.contact.localizer import Localizer
-from touchline.contact.pipeline import Pipeline
-from touchline.contact.skin import Skin
+from touchline.localizer.localizer import Localizer
+from touchline.localizer.skin import Skin
+from touchline.pipeline.pipeline import Pipeline
+from touchline.result.contact import Contact
 
 CUBE = box(0.2, 0.2, 0.2)
 PLACE, PULL = np.array([0.03, -0.05, 0.1]), np.array([4.0, 3.0, 20.0])

@@ -6,8 +6,8 @@ import pytest
 from shapes import chain
 
 from touchline.bench.touches import Touch, resting_signals
-from touchline.contact.pipeline import Pipeline
-from touchline.contact.skin import Skin
+from touchline.localizer.skin import Skin
+from touchline.pipeline.pipeline import Pipeline
 
 Q = np.array([0.3, -0.5, 0.8, 0.4, -0.6, 0.5, 0.7])
 # In the frame of the link: place and force of pushes on boxes 8 cm thick.

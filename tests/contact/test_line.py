@@ -9,10 +9,10 @@ from hypothesis.extra.numpy import arrays
 from shapes import chain, measured, sphere, still
 
 from touchline.bench.touches import Touch, resting_signals
-from touchline.contact.line import line_at, line_point, pitch, pitch_score
-from touchline.contact.localizer import Localizer
-from touchline.estimation.observer import Observer
+from touchline.localizer.localizer import Localizer
 from touchline.model.transforms import move_wrench, pose, rotation_rpy
+from touchline.observer.observer import Observer
+from touchline.result.line import line_at, line_point, pitch, pitch_score
 
 vectors = arrays(float, 3, elements=st.floats(-5, 5, width=32))
 

@@ -7,10 +7,10 @@ from shapes import BODY, box, chain, describe, measured, still, turned
 
 import touchline as tl
 from touchline.bench.touches import TouchSampler, resting_signals
-from touchline.contact.localizer import Localizer
-from touchline.contact.skin import Skin
-from touchline.estimation.observer import Observer
+from touchline.localizer.localizer import Localizer
+from touchline.localizer.skin import Skin
 from touchline.model.mechanism import Link, Mechanism
+from touchline.observer.observer import Observer
 
 
 def locate(robot, q, loads, segment="base", rng=None, **options):

@@ -6,7 +6,7 @@ import pytest
 import trimesh
 
 import touchline as tl
-from touchline.contact.skin import Skin
+from touchline.localizer.skin import Skin
 from touchline.native import core
 
 

@@ -12,16 +12,16 @@ from touchline.bench.localization.course import follow_course
 from touchline.bench.localization.scene import make_scene, told_and_real, true_places
 from touchline.bench.localization.trial import make_pipeline, run_trial
 from touchline.bench.touches import TouchSampler, resting_signals
-from touchline.contact.detector import Detection, Detector
-from touchline.contact.localizer import Localizer
-from touchline.contact.model_drift import WAY, guess_drift
-from touchline.contact.pipeline import Pipeline
-from touchline.contact.skin import Skin
-from touchline.contact.thresholds import expect_drift, make_thresholds
-from touchline.estimation.dynamics import gravity_loads
+from touchline.detector.detector import Detection, Detector
+from touchline.detector.model_drift import WAY, guess_drift
+from touchline.detector.thresholds import expect_drift, make_thresholds
+from touchline.localizer.localizer import Localizer
+from touchline.localizer.skin import Skin
 from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot
 from touchline.model.transforms import move_wrench
+from touchline.observer.dynamics import gravity_loads
+from touchline.pipeline.pipeline import Pipeline
 
 OFF = Cell("sara", tier=1, speed=1.0, model_error=0.02)
 CONSTANT, SPEED, ACCELERATION = 0.3, 0.05, 0.02

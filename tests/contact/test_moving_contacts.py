@@ -7,9 +7,9 @@ import pytest
 from touchline.bench.localization.arm import load_arm
 from touchline.bench.localization.moving import carried, moving_signals
 from touchline.bench.touches import TouchSampler
-from touchline.contact.pipeline import Pipeline
-from touchline.contact.skin import Skin
 from touchline.errors import InputError
+from touchline.localizer.skin import Skin
+from touchline.pipeline.pipeline import Pipeline
 
 ONSET, END = 0.52, 0.62  # s: after settling and a quiet time
 

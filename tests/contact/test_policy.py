@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import touchline as tl
-from touchline.contact.contact import Contact
-from touchline.contact.policy import Policy
-from touchline.contact.reactor import Reactor
-from touchline.contact.state import State
 from touchline.model.description import ForceLimit, PolicyDescription, PolicyRule
+from touchline.reaction.policy import Policy
+from touchline.reaction.reactor import Reactor
+from touchline.reaction.state import State
+from touchline.result.contact import Contact
 
 RULES = [
     PolicyRule("ignore", zone="handle"),

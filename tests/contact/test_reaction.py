@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import touchline as tl
-from touchline.contact.contact import Contact
-from touchline.contact.reaction import (
+from touchline.model.description import PolicyDescription, PolicyRule
+from touchline.observer.dynamics import inverse_dynamics, mass_matrix, point_jacobian
+from touchline.reaction.reaction import (
     REACTIONS,
     STRAIGHT,
     Retract,
@@ -18,10 +19,9 @@ from touchline.contact.reaction import (
     stop,
     yielding,
 )
-from touchline.contact.reactor import Reactor, limited
-from touchline.contact.state import Since, State
-from touchline.estimation.dynamics import inverse_dynamics, mass_matrix, point_jacobian
-from touchline.model.description import PolicyDescription, PolicyRule
+from touchline.reaction.reactor import Reactor, limited
+from touchline.reaction.state import Since, State
+from touchline.result.contact import Contact
 
 LINKS = ("link0", "link1", "link3", "link5", "link7", "tool", "handle")
 

@@ -9,7 +9,7 @@ import pytest
 import touchline as tl
 from touchline.bench.localization.arm import load_arm
 from touchline.bench.touches import resting_signals
-from touchline.contact.residual_noise import residual_noise
+from touchline.detector.residual_noise import residual_noise
 from touchline.model.robot import Robot
 
 

@@ -7,7 +7,7 @@ import pytest
 from touchline.bench.localization.cell import Cell
 from touchline.bench.localization.scene import make_scene, told_and_real, true_places
 from touchline.bench.localization.trial import make_pipeline
-from touchline.contact.answer import STATUS
+from touchline.localizer.answer import STATUS
 
 
 @pytest.mark.parametrize(("arm", "tier", "run"), [("sara", 1, 59), ("sara", 2, 59)])

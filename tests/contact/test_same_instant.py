@@ -6,9 +6,9 @@ import pytest
 from shapes import chain
 
 from touchline.bench.touches import Touch, resting_signals
-from touchline.contact.contact import Contact, least_contacts
-from touchline.contact.pipeline import Pipeline
-from touchline.contact.skin import Skin
+from touchline.localizer.skin import Skin
+from touchline.pipeline.pipeline import Pipeline
+from touchline.result.contact import Contact, least_contacts
 
 Q = np.array([0.3, -0.5, 0.8, 0.4, -0.6, 0.5])
 ONSET = 0.06

@@ -7,8 +7,8 @@ from shapes import chain
 
 from touchline.bench.localization.moving import moving_signals
 from touchline.bench.touches import Touch, resting_signals, touch_loads
-from touchline.contact.pipeline import Pipeline
-from touchline.contact.skin import Skin
+from touchline.localizer.skin import Skin
+from touchline.pipeline.pipeline import Pipeline
 
 Q = np.array([0.3, -0.5, 0.8, 0.4, -0.6, 0.5])
 # In the frame of the link: place and force of pushes on boxes 8 cm thick.

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.stats import genpareto
 
-from touchline.contact.tail import (
+from touchline.detector.tail import (
     Tail,
     alarm_levels,
     cluster_peaks,

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.bench.touches import Signals, add_noise, resting_signals, touch_loads
-from touchline.contact.pipeline import Pipeline
-from touchline.contact.skin import Skin
+from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
+from touchline.pipeline.pipeline import Pipeline
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@
 #include <new>
 #include <vector>
 
-#include "touchline/observer/observer.hpp"
+#include "touchline/detail/observer/observer.hpp"
 
 static long allocations = 0;
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pairs of points and the forces at both that explain best, side by side in lanes: prints what goes
 // in and what comes out, for an independent solution to be compared with.
-#include "touchline/localizer/start_beside.hpp"
+#include "touchline/detail/localizer/start_beside.hpp"
 
 #include <cstdio>
 #include <random>

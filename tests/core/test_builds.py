@@ -16,7 +16,7 @@ if {plain}:
     sys.modules["touchline._core_avx2"] = None  # importing it fails, as where there is no AVX2
 import numpy as np
 from robots import random_robot
-from touchline.estimation.observer import Observer
+from touchline.observer.observer import Observer
 from touchline.native import core
 rng = np.random.default_rng(0)
 time = np.cumsum(rng.uniform(0.5e-3, 1.5e-3, 203))

@@ -3,13 +3,13 @@ from pathlib import Path
 
 import numpy as np
 
-from touchline.estimation.samples import Samples
 from touchline.model.description import (
     JointDescription,
     Noise,
     RobotDescription,
     SensorDescription,
 )
+from touchline.observer.samples import Samples
 
 
 def describe(joints=2, sensors=("base",), log=None, **changes) -> RobotDescription:

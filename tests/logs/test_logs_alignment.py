@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from logs_support import assert_same, describe, make_samples
 
-from touchline.estimation.samples import Samples
 from touchline.logs import open_log, read_log, write_table
 from touchline.logs.align import _walk, find_bracket, typical_period
 from touchline.logs.blocks import windows
@@ -20,6 +19,7 @@ from touchline.logs.velocity import (
     position_noise,
 )
 from touchline.model.description import JointDescription, SensorDescription
+from touchline.observer.samples import Samples
 
 STEPS = st.lists(st.floats(0.0, 0.01), min_size=2, max_size=40)
 

@@ -9,10 +9,10 @@ from bag_support import JOINTS, WRENCH, joint_state, raw, storage_file, wrench, 
 from logs_support import assert_same, describe
 
 from touchline.errors import InputError
-from touchline.estimation.samples import Samples
 from touchline.logs import open_log, read_log
 from touchline.logs.cdr import JOINT_STATE, WRENCH_STAMPED, Decoder
 from touchline.model.description import JointDescription, SensorDescription
+from touchline.observer.samples import Samples
 
 NAMES = ("j1", "j2")
 KINDS = ("db3", "mcap")

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from touchline.contact.event import Event
 from touchline.report import event_windows
 from touchline.report.event_windows import AFTER, BEFORE, EventWindows
 from touchline.report.plots import STEPS, curve_path
+from touchline.result.event import Event
 
 PERIOD = 0.01
 

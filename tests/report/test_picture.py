@@ -11,14 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import touchline as tl
-from touchline.contact.contact import Candidate
-from touchline.contact.event import Event
 from touchline.report.event_pictures import EventPoses, event_pictures, event_scene
 from touchline.report.facts import event_doubt, event_where
 from touchline.report.figure import labels, svg_picture
 from touchline.report.picture import Camera, Scene, png_bytes
 from touchline.report.render.raster import rasterize
 from touchline.report.views import sees, views_of_contact
+from touchline.result.contact import Candidate
+from touchline.result.event import Event
 
 SIZE = (360, 300)
 Q = np.array([0.4, 0.7, 0.3, -1.3, 0.3, 0.9, 0.2])

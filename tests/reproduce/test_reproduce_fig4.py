@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from touchline.cli import main
-from touchline.estimation.classical import classical_error
 from touchline.model.robot import load_robot
+from touchline.observer.classical import classical_error
 from touchline.reproduce import fig4
 from touchline.reproduce.conditioning import EndEffector, best_conditioned, nearby_singularity
 from touchline.reproduce.passage import passage

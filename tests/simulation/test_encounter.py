@@ -6,9 +6,9 @@ import pytest
 
 from touchline.bench.reaction.guiding import guide, handle_point
 from touchline.bench.reaction.trial import Case, measure, pressing, reactor
-from touchline.contact.pipeline import Pipeline
-from touchline.contact.reactor import Reactor
 from touchline.model.description import PolicyDescription, PolicyRule
+from touchline.pipeline.pipeline import Pipeline
+from touchline.reaction.reactor import Reactor
 from touchline.simulation.closed_loop import LiveSensors, ReactingController
 from touchline.simulation.contacts import Profile, ScriptedContact, ScriptedForces
 from touchline.simulation.encounter import EncounterScene

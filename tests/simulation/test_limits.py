@@ -4,10 +4,10 @@
 import numpy as np
 import pytest
 
-from touchline.contact.contact import Contact
-from touchline.contact.reactor import Reactor
-from touchline.contact.state import State
 from touchline.model.description import PolicyDescription, PolicyRule
+from touchline.reaction.reactor import Reactor
+from touchline.reaction.state import State
+from touchline.result.contact import Contact
 from touchline.simulation.plant import Plant
 
 CONTROL = 2  # physics steps of 0.5 ms

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import touchline as tl
-from touchline.contact.skin import Skin
 from touchline.health import Health
+from touchline.localizer.skin import Skin
 from touchline.simulation.control import Setpoint, sinusoids
 from touchline.simulation.hands import Hand
 from touchline.view.arm import Conditions, LiveArm

@@ -5,7 +5,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from touchline.contact.event import Event
+from touchline.result.event import Event
 from touchline.view.player import Player
 
 

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from touchline.contact.skin import Crossing
+from touchline.localizer.skin import Crossing
 from touchline.view.reach import pressed
 
 NOWHERE = np.zeros(3)

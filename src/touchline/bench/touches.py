@@ -7,10 +7,10 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.skin import Patch, Skin
-from touchline.estimation.dynamics import gravity_loads
+from touchline.localizer.skin import Patch, Skin
 from touchline.model.robot import Robot
 from touchline.model.transforms import rotation_to_axis
+from touchline.observer.dynamics import gravity_loads
 
 Array = NDArray[np.float64]
 

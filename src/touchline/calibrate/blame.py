@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.calibrate.quiet import Suspicion
-from touchline.contact.calibration import Residuals, watching, with_methods
-from touchline.contact.detector import Detector
-from touchline.contact.thresholds import make_thresholds, row_name
-from touchline.estimation.observer import Observer
-from touchline.estimation.samples import Samples
+from touchline.detector.calibration import Residuals, watching, with_methods
+from touchline.detector.detector import Detector
+from touchline.detector.thresholds import make_thresholds, row_name
 from touchline.model.description import RowCalibration
 from touchline.model.robot import Robot
+from touchline.observer.observer import Observer
+from touchline.observer.samples import Samples
 
 Array = NDArray[np.float64]
 

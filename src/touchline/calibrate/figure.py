@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.calibrate.run import Calibration
-from touchline.contact.calibration import Statistics
-from touchline.contact.tail import Tail, alarm_levels
+from touchline.detector.calibration import Statistics
+from touchline.detector.tail import Tail, alarm_levels
 from touchline.errors import InputError
 from touchline.model.values import METHODS
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from touchline.contact.calibration import Statistics, count_alarms, fit_tails
-from touchline.contact.tail import poisson_interval
+from touchline.detector.calibration import Statistics, count_alarms, fit_tails
+from touchline.detector.tail import poisson_interval
 from touchline.model.robot import Robot
 from touchline.model.values import METHODS
 

@@ -7,9 +7,9 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.estimation.samples import Samples
 from touchline.model.description import AXES, Noise
 from touchline.model.robot import Robot
+from touchline.observer.samples import Samples
 
 Array = NDArray[np.float64]
 

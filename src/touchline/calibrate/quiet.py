@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from touchline.contact.calibration import Statistics
-from touchline.contact.tail import cluster_peaks
+from touchline.detector.calibration import Statistics
+from touchline.detector.tail import cluster_peaks
 
 SUSPICIOUS = 3.0, 5.0  # excesses beyond 3 (ln n + 5) scales of a tail belong to no such tail
 FEW = 8  # peaks that a judgement needs

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from touchline.contact.thresholds import PERIOD_RATIO
+from touchline.detector.thresholds import PERIOD_RATIO
 from touchline.errors import InputError
-from touchline.estimation.samples import Samples
 from touchline.logs import open_log
 from touchline.model.robot import Robot
+from touchline.observer.samples import Samples
 from touchline.report.analysis import typical_period
 
 CHUNK = 1 << 15  # samples

@@ -14,7 +14,7 @@ from touchline.calibrate.noise import measure_noise, noise_keys
 from touchline.calibrate.quiet import LISTED, Suspicion, find_contacts
 from touchline.calibrate.recordings import Recordings
 from touchline.calibrate.robot_file import write_description
-from touchline.contact.calibration import (
+from touchline.detector.calibration import (
     Statistics,
     collect_residuals,
     collect_statistics,
@@ -23,7 +23,7 @@ from touchline.contact.calibration import (
     fit_tails,
     with_methods,
 )
-from touchline.contact.tail import Tail
+from touchline.detector.tail import Tail
 from touchline.errors import InputError
 from touchline.model.description import CalibrationDescription, Noise, RowCalibration
 from touchline.model.robot import Robot, load_robot

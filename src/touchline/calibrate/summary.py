@@ -4,9 +4,9 @@
 from dataclasses import replace
 
 from touchline.calibrate.run import Calibration
-from touchline.contact.limits import threshold
-from touchline.contact.residual_noise import residual_noise
-from touchline.contact.thresholds import make_thresholds, row_name
+from touchline.detector.limits import threshold
+from touchline.detector.residual_noise import residual_noise
+from touchline.detector.thresholds import make_thresholds, row_name
 from touchline.model.robot import Robot
 from touchline.model.values import METHODS
 

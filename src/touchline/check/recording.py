@@ -11,7 +11,7 @@ from touchline.check.signals import SignalTable
 from touchline.check.stamps import Stamps
 from touchline.check.windows import WindowMaker
 from touchline.check.wrenches import check_wrenches
-from touchline.contact.thresholds import make_thresholds
+from touchline.detector.thresholds import make_thresholds
 from touchline.errors import InputError
 from touchline.logs import open_log
 from touchline.model.robot import Robot

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.check.findings import Findings
-from touchline.estimation.samples import Samples
 from touchline.model.description import AXES
 from touchline.model.robot import Robot
+from touchline.observer.samples import Samples
 
 Array = NDArray[np.float64]
 

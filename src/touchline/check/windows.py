@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.estimation.observer import Observer
-from touchline.estimation.samples import Samples
 from touchline.model.description import Friction
 from touchline.model.robot import Robot
+from touchline.observer.observer import Observer
+from touchline.observer.samples import Samples
 
 Array = NDArray[np.float64]
 

@@ -8,13 +8,13 @@ from typing import Any, Self
 import numpy as np
 
 from touchline.errors import InputError
-from touchline.estimation.samples import Samples
 from touchline.logs.blocks import windows
 from touchline.logs.columns import signal_shapes
 from touchline.logs.naming import parse_naming
 from touchline.logs.prepare import Preparation
 from touchline.logs.source import Source
 from touchline.model.description import RobotDescription
+from touchline.observer.samples import Samples
 
 TABLES = (".parquet", ".csv", ".csv.gz")
 BAGS = (".db3", ".mcap")

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 
-from touchline.estimation.samples import Samples
 from touchline.logs.align import delay_halo, shift, typical_period
 from touchline.logs.blocks import Window
 from touchline.logs.source import Source
@@ -16,6 +15,7 @@ from touchline.logs.velocity import (
     position_noise,
 )
 from touchline.model.description import RobotDescription
+from touchline.observer.samples import Samples
 
 
 class Preparation:

@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from touchline.contact.event import Event
-from touchline.contact.pipeline import Pipeline
-from touchline.contact.thresholds import Thresholds
+from touchline.detector.thresholds import Thresholds
 from touchline.errors import InputError
-from touchline.estimation.observer import METHODS
-from touchline.estimation.samples import Samples
 from touchline.logs import Log, open_log
 from touchline.model.robot import Robot, load_robot
+from touchline.observer.observer import METHODS
+from touchline.observer.samples import Samples
+from touchline.pipeline.pipeline import Pipeline
 from touchline.report.comparison import Comparison, compare_log
 from touchline.report.curves import Curves
 from touchline.report.event_pictures import EventPoses
@@ -31,6 +30,7 @@ from touchline.report.outputs import (
     write_text,
 )
 from touchline.report.statistics import Statistics
+from touchline.result.event import Event
 
 CHUNK = 1 << 15  # samples; bounds the memory
 EPOCH = 1e6  # s; stamps beyond it are dates

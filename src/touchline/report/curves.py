@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.detector import Detection
-from touchline.contact.pipeline import Pipeline
-from touchline.estimation.observer import Estimate
+from touchline.detector.detector import Detection
+from touchline.observer.observer import Estimate
+from touchline.pipeline.pipeline import Pipeline
 from touchline.report.traces import Traces
 
 Array = NDArray[np.float64]

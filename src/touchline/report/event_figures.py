@@ -7,7 +7,6 @@ from html import escape
 
 import numpy as np
 
-from touchline.contact.event import Event
 from touchline.report.analysis import Analysis
 from touchline.report.event_pictures import caption, event_pictures, event_scene, truth_of
 from touchline.report.event_windows import Window
@@ -16,6 +15,7 @@ from touchline.report.html import note, section
 from touchline.report.picture import SIGMAS
 from touchline.report.plots import joined, plot
 from touchline.report.render.skin import robot_skin
+from touchline.result.event import Event
 
 MOST_PICTURED = 400  # events; two pictures take a quarter of a second
 # Up to so many events, the pictures are so wide [pixels].

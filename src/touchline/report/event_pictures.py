@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.event import Event
 from touchline.model.robot import Robot
 from touchline.report.comparison import Comparison
 from touchline.report.figure import svg_picture
 from touchline.report.picture import Scene
 from touchline.report.render.camera import Size
 from touchline.report.views import views_of_contact
+from touchline.result.event import Event
 
 Array = NDArray[np.floating[Any]]
 

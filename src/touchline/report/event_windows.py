@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.event import Event
 from touchline.report.traces import Traces
+from touchline.result.event import Event
 
 Array = NDArray[np.float64]
 Array32 = NDArray[np.float32]

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from touchline.contact.event import Event
-from touchline.contact.thresholds import Thresholds
+from touchline.detector.thresholds import Thresholds
 from touchline.health import Health
 from touchline.model.robot import Robot
 from touchline.report.statistics import Statistics
+from touchline.result.event import Event
 
 TUSTIN_LIMIT, RINGING = 0.5, 1.0  # of bandwidth times period
 SUGGESTED = 1 / 3

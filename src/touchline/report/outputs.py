@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from touchline import __version__
-from touchline.contact.event import Event
-from touchline.contact.table import ContactTable
 from touchline.errors import InputError
-from touchline.estimation.observer import Estimate
 from touchline.logs import EstimateWriter, TableWriter
 from touchline.model.description import AXES
 from touchline.model.robot import Robot
+from touchline.observer.observer import Estimate
+from touchline.pipeline.table import ContactTable
 from touchline.report.postures import PostureWriter
+from touchline.result.event import Event
 
 ESTIMATES, CONTACTS, POSTURES = "estimates.parquet", "contacts.parquet", "postures.parquet"
 EVENTS, ANALYSIS, REPORT = "events.json", "analysis.json", "report.html"

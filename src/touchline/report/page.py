@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from touchline import __version__
-from touchline.contact.event import Event
 from touchline.report.analysis import Analysis
 from touchline.report.comparison import HEAD, cells, verdict
 from touchline.report.curves import Panel
@@ -21,6 +20,7 @@ from touchline.report.lanes import lanes
 from touchline.report.outputs import strict
 from touchline.report.plots import joined, plot
 from touchline.report.robot_section import robot_section
+from touchline.result.event import Event
 
 MOST_EVENTS, MOST_SHADED = 1000, 5000
 MOST_BYTES = 4_850_000  # of the page

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.detector import Detection
-from touchline.estimation.observer import Estimate
+from touchline.detector.detector import Detection
 from touchline.health import Health
+from touchline.observer.observer import Estimate
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.estimation.joint_momentum import JointMomentumObserver, tool_wrench
 from touchline.figure import thin
 from touchline.model.robot import Robot, load_robot
+from touchline.observer.joint_momentum import JointMomentumObserver, tool_wrench
 from touchline.reproduce.aim import place_along
 from touchline.reproduce.experiment import Check, Experiment, Row, Table, Tick
 from touchline.reproduce.replay import FORCE, Replay

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.estimation.dynamics import point_jacobian
 from touchline.model.robot import Robot
+from touchline.observer.dynamics import point_jacobian
 
 Array = NDArray[np.float64]
 

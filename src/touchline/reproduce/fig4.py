@@ -12,9 +12,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.estimation.classical import ClassicalObserver
-from touchline.estimation.observer import Observer
 from touchline.figure import thin
+from touchline.observer.classical import ClassicalObserver
+from touchline.observer.observer import Observer
 from touchline.reproduce.conditioning import EndEffector
 from touchline.reproduce.experiment import Check, Experiment, Row, Table, Tick
 from touchline.reproduce.passage import BEST, SINGULAR, Passage, passage

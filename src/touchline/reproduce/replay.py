@@ -7,10 +7,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.event import Event
-from touchline.contact.pipeline import Pipeline
-from touchline.estimation.observer import Estimate, Observer
 from touchline.model.robot import Robot
+from touchline.observer.observer import Estimate, Observer
+from touchline.pipeline.pipeline import Pipeline
+from touchline.result.event import Event
 from touchline.simulation.truth import Simulated, filter_truth
 
 Array = NDArray[np.float64]

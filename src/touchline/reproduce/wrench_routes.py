@@ -7,9 +7,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.skin import Skin
-from touchline.estimation.classical import ClassicalObserver
-from touchline.estimation.joint_momentum import tool_wrench
+from touchline.localizer.skin import Skin
+from touchline.observer.classical import ClassicalObserver
+from touchline.observer.joint_momentum import tool_wrench
 from touchline.reproduce.replay import FORCE, Replay
 from touchline.simulation.truth import filter_truth
 

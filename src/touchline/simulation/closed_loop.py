@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.pipeline import Pipeline, Result
-from touchline.contact.reactor import Command, Reactor
-from touchline.contact.state import State
 from touchline.model.robot import Robot
+from touchline.pipeline.pipeline import Pipeline, Result
+from touchline.reaction.reactor import Command, Reactor
+from touchline.reaction.state import State
 from touchline.simulation.control import Controller
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.plant import Plant

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.pipeline import Pipeline
-from touchline.contact.reactor import Reactor
-from touchline.contact.skin import Skin
-from touchline.contact.state import State
 from touchline.errors import InputError
+from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
+from touchline.pipeline.pipeline import Pipeline
+from touchline.reaction.reactor import Reactor
+from touchline.reaction.state import State
 from touchline.simulation.closed_loop import LiveSensors, ReactingController, Step
 from touchline.simulation.control import Controller, Setpoint, Trajectory
 from touchline.simulation.guiding import GuidingHand, HandMotion, led

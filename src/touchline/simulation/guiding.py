@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.estimation.samples import Samples
 from touchline.model.robot import Robot
+from touchline.observer.samples import Samples
 from touchline.simulation.contacts import Touch, cross, no_touch
 from touchline.simulation.control import JointImpedance, hold
 from touchline.simulation.noise import SensorNoise

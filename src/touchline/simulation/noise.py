@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.estimation.samples import Samples
 from touchline.model.robot import Robot
+from touchline.observer.samples import Samples
 from touchline.simulation.readings import Readings
 
 Array = NDArray[np.float64]

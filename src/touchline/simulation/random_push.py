@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.errors import InputError
-from touchline.estimation.samples import Samples
 from touchline.model.robot import Robot
+from touchline.observer.samples import Samples
 from touchline.simulation.contacts import Profile, ScriptedContact, ScriptedForces
 from touchline.simulation.control import JointSprings
 from touchline.simulation.held_push import can_hold, held_push

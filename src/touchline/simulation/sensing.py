@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.estimation.samples import Samples
 from touchline.model.description import AXES, JointDescription, SensorDescription
 from touchline.model.robot import Robot
+from touchline.observer.samples import Samples
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.readings import Readings
 

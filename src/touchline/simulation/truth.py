@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.estimation.samples import Samples
+from touchline.observer.samples import Samples
 from touchline.simulation.contacts import Touch
 
 Array = NDArray[np.float64]

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.contact import Contact
-from touchline.contact.skin import Skin
-from touchline.estimation.samples import Samples
+from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
+from touchline.observer.samples import Samples
+from touchline.result.contact import Contact
 from touchline.simulation.control import JointImpedance
 from touchline.simulation.hands import Hand, Hands, place
 from touchline.simulation.noise import SensorNoise

@@ -7,9 +7,9 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from touchline.contact.contact import Candidate, Contact
-from touchline.contact.line import line_point
 from touchline.model.robot import Robot
+from touchline.result.contact import Candidate, Contact
+from touchline.result.line import line_point
 from touchline.view.markers import ContactMarker
 from touchline.view.scene import RobotScene
 

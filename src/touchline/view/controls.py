@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import viser
 
-from touchline.contact.reaction import REACTIONS
+from touchline.reaction.reaction import REACTIONS
 from touchline.view.arm import Conditions
 from touchline.view.faults import FAULTS
 from touchline.view.methods import METHODS

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.estimation.samples import Samples
 from touchline.model.robot import Robot
+from touchline.observer.samples import Samples
 
 Array = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.contact import Contact
 from touchline.model.robot import Robot
+from touchline.result.contact import Contact
 from touchline.simulation.hands import Hand
 from touchline.simulation.truth import Truth
 from touchline.view.methods import Felt

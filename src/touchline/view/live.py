@@ -10,7 +10,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.skin import Skin
+from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot, load_robot
 from touchline.simulation.hands import Hand
 from touchline.view.arm import RATE, LiveArm

@@ -9,17 +9,17 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.contact import Contact
-from touchline.contact.detector import Detector
-from touchline.contact.localizer import Localizer
-from touchline.contact.pipeline import Pipeline
-from touchline.contact.skin import Skin
-from touchline.contact.thresholds import make_thresholds
+from touchline.detector.detector import Detector
+from touchline.detector.thresholds import make_thresholds
 from touchline.errors import InputError
-from touchline.estimation.classical import ClassicalObserver
-from touchline.estimation.observer import Observer
-from touchline.estimation.samples import Samples
+from touchline.localizer.localizer import Localizer
+from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
+from touchline.observer.classical import ClassicalObserver
+from touchline.observer.observer import Observer
+from touchline.observer.samples import Samples
+from touchline.pipeline.pipeline import Pipeline
+from touchline.result.contact import Contact
 from touchline.simulation.truth import filter_truth
 
 Array = NDArray[np.float64]

@@ -3,7 +3,7 @@
 
 from collections.abc import Sequence
 
-from touchline.contact.event import Event
+from touchline.result.event import Event
 
 
 class Player:

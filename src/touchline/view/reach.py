@@ -3,7 +3,7 @@
 
 from collections.abc import Sequence
 
-from touchline.contact.skin import Crossing
+from touchline.localizer.skin import Crossing
 
 FINGER = 0.008  # m; between two links that are closer no finger fits
 EDGE = 0.03  # m; a link of which a line cuts off less does not bar its way

@@ -4,11 +4,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.contact import Contact
-from touchline.contact.reactor import Reactor
-from touchline.contact.state import State
 from touchline.model.description import PolicyDescription, PolicyRule
 from touchline.model.robot import Robot
+from touchline.reaction.reactor import Reactor
+from touchline.reaction.state import State
+from touchline.result.contact import Contact
 from touchline.simulation.control import JointImpedance
 from touchline.simulation.plant import Plant
 from touchline.view.motion import Switched

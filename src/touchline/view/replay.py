@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.contact import Candidate, Contact
-from touchline.contact.event import Event
 from touchline.errors import InputError
 from touchline.logs.truth import TrueContact, read_truth
 from touchline.model.description import AXES
 from touchline.model.robot import load_robot
+from touchline.result.contact import Candidate, Contact
+from touchline.result.event import Event
 from touchline.view.tables import TimedTable
 
 Array = NDArray[np.float64]

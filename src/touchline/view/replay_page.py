@@ -8,8 +8,8 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from touchline.contact.contact import Contact
-from touchline.contact.event import Event
+from touchline.result.contact import Contact
+from touchline.result.event import Event
 from touchline.view.contacts import ContactScene, candidates
 from touchline.view.player import Player
 from touchline.view.readout import STATUS_WORDS

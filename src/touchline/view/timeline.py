@@ -6,7 +6,7 @@ import viser
 from numpy.typing import NDArray
 from viser import uplot
 
-from touchline.contact.event import Event
+from touchline.result.event import Event
 from touchline.view.replay import Replay
 from touchline.view.signals import Box, now_series, with_now
 

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.bench.touches import Signals, Touch, TouchSampler, add_noise
-from touchline.contact.zones import Zones
-from touchline.estimation.dynamics import contact_loads, inverse_dynamics
+from touchline.classifier.zones import Zones
 from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot
+from touchline.observer.dynamics import contact_loads, inverse_dynamics
 
 Array = NDArray[np.float64]
 

@@ -20,12 +20,12 @@ from touchline.bench.classification.interactions import BEGIN, Interaction, Inte
 from touchline.bench.request import prepare_results
 from touchline.bench.tables import Row, aligned
 from touchline.bench.touches import TouchSampler
-from touchline.contact.event import Event
-from touchline.contact.pipeline import Pipeline
-from touchline.contact.skin import Skin
+from touchline.localizer.skin import Skin
 from touchline.model.description import ZONES
 from touchline.model.robot import Robot, load_robot
 from touchline.numbers import check_least
+from touchline.pipeline.pipeline import Pipeline
+from touchline.result.event import Event
 
 KINDS = ("contact", "collision")
 CHUNK = 20

@@ -30,13 +30,13 @@ from touchline.bench.detection.work import (
     description,
     maker,
 )
-from touchline.contact.calibration import BLOCK, Statistics
-from touchline.contact.thresholds import make_thresholds
-from touchline.estimation.classical import moved_mass
-from touchline.estimation.dynamics import inverse_dynamics, mass_matrix, posture
-from touchline.estimation.observer import Observer
-from touchline.estimation.samples import Samples
+from touchline.detector.calibration import BLOCK, Statistics
+from touchline.detector.thresholds import make_thresholds
 from touchline.model.robot import Robot
+from touchline.observer.classical import moved_mass
+from touchline.observer.dynamics import inverse_dynamics, mass_matrix, posture
+from touchline.observer.observer import Observer
+from touchline.observer.samples import Samples
 
 Array = NDArray[np.float64]
 _Recording = tuple[Trajectory, Samples]

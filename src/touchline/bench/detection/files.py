@@ -9,7 +9,7 @@ import numpy as np
 
 from touchline.bench.detection.outcome import Outcome, percentile
 from touchline.bench.detection.work import LAYOUTS, description
-from touchline.contact.tail import poisson_interval
+from touchline.detector.tail import poisson_interval
 
 RATES = np.geomspace(0.1, 100.0, 31)  # per hour, of the curves; 1 and 10 are among them
 SETTING = ("observer", "rate_hz", "velocity_noise")

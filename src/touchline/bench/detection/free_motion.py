@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.estimation.dynamics import inverse_dynamics
-from touchline.estimation.samples import Samples
 from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot
+from touchline.observer.dynamics import inverse_dynamics
+from touchline.observer.samples import Samples
 
 Array = NDArray[np.float64]
 

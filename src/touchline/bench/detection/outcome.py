@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.bench.detection.work import Setting, description
-from touchline.contact.calibration import Statistics, count_alarms
-from touchline.contact.tail import Tail
+from touchline.detector.calibration import Statistics, count_alarms
+from touchline.detector.tail import Tail
 
 Array = NDArray[np.float64]
 

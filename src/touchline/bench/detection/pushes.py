@@ -14,10 +14,10 @@ from touchline.bench.detection.free_motion import (
     random_trajectory,
 )
 from touchline.bench.touches import Touch, TouchSampler
-from touchline.contact.skin import Skin
-from touchline.estimation.dynamics import contact_loads
-from touchline.estimation.samples import Samples
+from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
+from touchline.observer.dynamics import contact_loads
+from touchline.observer.samples import Samples
 
 Array = NDArray[np.float64]
 

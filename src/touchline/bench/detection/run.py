@@ -28,7 +28,7 @@ from touchline.bench.detection.work import (
     pieces,
 )
 from touchline.bench.request import prepare_results
-from touchline.contact.calibration import fit_tails
+from touchline.detector.calibration import fit_tails
 from touchline.errors import InputError
 from touchline.numbers import check_least
 

@@ -6,7 +6,7 @@ import numpy as np
 from touchline.bench.detection.outcome import Outcome, percentile
 from touchline.bench.detection.work import LAYOUTS
 from touchline.bench.tables import Row, aligned
-from touchline.contact.tail import poisson_interval
+from touchline.detector.tail import poisson_interval
 
 ALARMS = (100.0, 10.0, 1.0)  # per hour
 

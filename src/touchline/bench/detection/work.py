@@ -17,13 +17,13 @@ from touchline.bench.detection.free_motion import (
     with_noise,
 )
 from touchline.bench.detection.pushes import AFTER, BEFORE, PushMaker, random_pushes
-from touchline.contact import calibration as cal
-from touchline.contact.detector import Detector
-from touchline.contact.tail import Tail
-from touchline.estimation.observer import Observer
-from touchline.estimation.samples import Samples
+from touchline.detector import calibration as cal
+from touchline.detector.detector import Detector
+from touchline.detector.tail import Tail
 from touchline.model.description import RowCalibration
 from touchline.model.robot import Robot, load_robot
+from touchline.observer.observer import Observer
+from touchline.observer.samples import Samples
 
 Array = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 from touchline.bench.localization.line_rules import first_entry, nearest_to_line
 from touchline.bench.localization.particle_filter import ParticleFilter
 from touchline.bench.touches import Signals
-from touchline.contact.detector import Detection
-from touchline.contact.skin import Skin
-from touchline.estimation.observer import Estimate
+from touchline.detector.detector import Detection
+from touchline.localizer.skin import Skin
+from touchline.observer.observer import Estimate
 
 Array = NDArray[np.float64]
 

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from touchline.bench.localization.touched import NEAR
 from touchline.bench.touches import Touch
-from touchline.contact.answer import Answer
-from touchline.contact.skin import Patch, Skin
-from touchline.estimation.dynamics import contact_loads
+from touchline.localizer.answer import Answer
+from touchline.localizer.skin import Patch, Skin
 from touchline.model.robot import Robot
+from touchline.observer.dynamics import contact_loads
 
 Array = NDArray[np.float64]
 

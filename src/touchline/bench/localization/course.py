@@ -12,8 +12,8 @@ from touchline.bench.localization.moving import carried
 from touchline.bench.localization.scene import Scene
 from touchline.bench.localization.touched import NEAR
 from touchline.bench.tables import Row, aligned
-from touchline.contact.answer import POSITION, STATUS
-from touchline.contact.pipeline import Pipeline
+from touchline.localizer.answer import POSITION, STATUS
+from touchline.pipeline.pipeline import Pipeline
 
 SHOWN = 0.02  # s after an onset: the filter shows most of the force
 HEAD: Row = (

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.answer import Answer
+from touchline.localizer.answer import Answer
 
 Array = NDArray[np.float64]
 

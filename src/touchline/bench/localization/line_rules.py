@@ -4,8 +4,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.line import line_point
-from touchline.contact.skin import Skin
+from touchline.localizer.skin import Skin
+from touchline.result.line import line_point
 
 Array = NDArray[np.float64]
 

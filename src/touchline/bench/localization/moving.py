@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the sensors of an arm report that moves and is touched: exact inverse dynamics, no engine.
 
-The dynamics are those of the classical methods (`touchline.estimation.dynamics`), which share no
+The dynamics are those of the classical methods (`touchline.observer.dynamics`), which share no
 code with the observer.
 """
 
@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.bench.touches import Signals, Touch, add_noise
-from touchline.estimation.dynamics import contact_loads, inverse_dynamics
 from touchline.model.robot import Robot
+from touchline.observer.dynamics import contact_loads, inverse_dynamics
 
 Array = NDArray[np.float64]
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.skin import Skin
-from touchline.estimation.dynamics import contact_loads
+from touchline.localizer.skin import Skin
 from touchline.model.transforms import rotation_to_axis
+from touchline.observer.dynamics import contact_loads
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from touchline.bench.touches import (
     resting_signals,
     sample_on_each,
 )
-from touchline.contact.skin import Skin
+from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
 
 Array = NDArray[np.float64]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.contact.skin import Skin
+from touchline.localizer.skin import Skin
 from touchline.report.render.camera import Camera, Size
 from touchline.report.render.canvas import Canvas
 from touchline.report.render.light import Lights, ShadowMap, shaded

@@ -13,10 +13,10 @@ from touchline.bench.localization.matching import distances, match
 from touchline.bench.localization.moving import carried
 from touchline.bench.localization.scene import Scene, true_places
 from touchline.bench.touches import Touch
-from touchline.contact.answer import Answer
-from touchline.contact.event import Event
-from touchline.contact.pipeline import Pipeline
+from touchline.localizer.answer import Answer
 from touchline.model.robot import Robot
+from touchline.pipeline.pipeline import Pipeline
+from touchline.result.event import Event
 
 Array = NDArray[np.float64]
 

@@ -18,11 +18,11 @@ from touchline.bench.localization.scene import (
     true_places,
 )
 from touchline.bench.localization.touched import NEAR, Touched, judge, last_answers
-from touchline.contact.detector import Detection
-from touchline.contact.pipeline import Pipeline
-from touchline.contact.skin import Skin
-from touchline.estimation.observer import Estimate
+from touchline.detector.detector import Detection
+from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
+from touchline.observer.observer import Estimate
+from touchline.pipeline.pipeline import Pipeline
 
 UNKNOWNS = 10  # of two contacts
 

@@ -14,7 +14,7 @@ from touchline.bench.detection.free_motion import (
     random_trajectory,
 )
 from touchline.bench.localization.arm import load_arm
-from touchline.contact import calibration as cal
+from touchline.detector import calibration as cal
 from touchline.model.robot import Robot
 
 RUNS = 25  # that share an arm

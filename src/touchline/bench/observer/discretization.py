@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.bench.observer.motion import Motion, fast_motion
-from touchline.estimation.observer import Observer
 from touchline.model.robot import Robot
+from touchline.observer.observer import Observer
 
 Array = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.estimation.dynamics import contact_loads, inverse_dynamics
 from touchline.model.robot import Robot
+from touchline.observer.dynamics import contact_loads, inverse_dynamics
 
 Array = NDArray[np.float64]
 

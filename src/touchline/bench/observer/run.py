@@ -19,10 +19,10 @@ from touchline.bench.observer.motion import Motion, fast_motion, pushed_link
 from touchline.bench.observer.tables import error_table, timing_table
 from touchline.bench.observer.timing import Candidate, Timing, measure
 from touchline.errors import InputError
-from touchline.estimation.observer import Observer
 from touchline.model.description import JointDescription, SensorDescription
 from touchline.model.robot import Robot, load_robot
 from touchline.numbers import check_least
+from touchline.observer.observer import Observer
 
 BANDWIDTH = 100.0  # [rad/s]
 RUN_SAMPLES, SAMPLES = 8000, 250  # per round: of `run`, and of what takes one at a time

@@ -16,7 +16,6 @@ from touchline.bench.reaction.trial import (
     outcome_of,
     pressing,
 )
-from touchline.contact.reaction import REACTIONS
 from touchline.figure import (
     FAINT,
     PAGE,
@@ -27,6 +26,7 @@ from touchline.figure import (
     save,
     styled,
 )
+from touchline.reaction.reaction import REACTIONS
 
 LOOKS = dict(zip(REACTIONS, (FAINT, *SHADES), strict=False))
 MARKERS = dict(zip(REACTIONS, "os^v", strict=True))

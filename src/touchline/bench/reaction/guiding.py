@@ -10,12 +10,12 @@ from functools import cache
 
 import numpy as np
 
-from touchline.contact.classification import Classifier, Kind
-from touchline.contact.detector import Detector
-from touchline.contact.zones import Zones
-from touchline.estimation.observer import Observer
+from touchline.classifier.classifier import Classifier, Kind
+from touchline.classifier.zones import Zones
+from touchline.detector.detector import Detector
 from touchline.model.robot import load_robot
 from touchline.model.surface import link_surface
+from touchline.observer.observer import Observer
 from touchline.simulation.guiding import guided_samples
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.plant import Plant

@@ -22,8 +22,8 @@ from touchline.bench.reaction.guiding import PART, Guided, guide, told
 from touchline.bench.reaction.trial import MASSES, QUIET, SCENES, SPRINGS, Case, Trial, cases, play
 from touchline.bench.request import prepare_results
 from touchline.bench.tables import Row, aligned
-from touchline.contact.reaction import REACTIONS
 from touchline.numbers import check_least
+from touchline.reaction.reaction import REACTIONS
 
 IN_TIME = 0.3  # s within which a clamping force is to be gone
 SAME = 1.005  # peaks that differ by less are the same

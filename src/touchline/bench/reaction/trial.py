@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.bench.reaction.guiding import HANDLE, handle_point
-from touchline.contact.reaction import REACTIONS
-from touchline.contact.reactor import Reactor
 from touchline.model.description import PolicyDescription, PolicyRule
 from touchline.model.robot import Robot, load_robot
+from touchline.reaction.reaction import REACTIONS
+from touchline.reaction.reactor import Reactor
 from touchline.simulation.encounter import HIT_TIME, Encounter, EncounterScene, Outcome
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scene import Run

@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.estimation.dynamics import posture
-from touchline.estimation.samples import Samples
 from touchline.model.mechanism import Mechanism
 from touchline.model.robot import Robot
+from touchline.observer.dynamics import posture
+from touchline.observer.samples import Samples
 from touchline.simulation.contacts import ScriptedContact, ScriptedForces
 from touchline.simulation.control import Trajectory
 from touchline.simulation.noise import SensorNoise

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.bench.wrench.log import Log
-from touchline.estimation.classical import ClassicalObserver
-from touchline.estimation.dynamics import point_jacobian, posture, to_world
-from touchline.estimation.observer import Observer
+from touchline.observer.classical import ClassicalObserver
+from touchline.observer.dynamics import point_jacobian, posture, to_world
+from touchline.observer.observer import Observer
 from touchline.simulation.truth import filter_truth
 
 Array = NDArray[np.float64]

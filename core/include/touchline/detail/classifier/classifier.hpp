@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+// Contact or collision, and clamped or free: what kind of touch each segment feels. A collision
+// begins fast: the force grows by more than `onset` to more than `collision`. What has not begun so
+// within kPatience is a contact; a later blow makes it a collision. Forces have passed the
+// observer's low-pass, which shows a step of F as a rate of at most 0.63 F / kWindow (K = 100).
+// No allocation per sample.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "touchline/detail/classifier/clamping.hpp"
+#include "touchline/detail/classifier/force_history.hpp"
+#include "touchline/detail/observer/observer.hpp"
+
+namespace touchline {
+
+enum class Kind { none = 0, undecided = 1, contact = 2, collision = 3 };
+
+// From when on a touch of a segment is a blow.
+struct BlowLimits {
+  double onset;             // growth of its force [N/s]
+  double collision;         // size of its force [N]
+  std::vector<int> joints;  // whose torques stand for its force; none: its wrench is known
+};
+
+class Classifier {
+ public:
+  static constexpr double kPatience = 0.05;  // after detection, for a collision to show [s]
+  static constexpr double kLever = 0.5;      // joint torques count as forces at this distance [m]
+  static constexpr double kLeading = 0.5;    // of a segment's load: a blow is this contact's
+
+  Classifier(const Observer& observer, std::vector<BlowLimits> limits)
+      : row_(observer.row_layout()),
+        limits_(std::move(limits)),
+        bandwidths_(limits_.size()),
+        sizes_(limits_.size()),
+        touches_(limits_.size()),
+        history_(limits_.size()),
+        clamping_(limits_.size()) {
+    bool good = limits_.size() == static_cast<std::size_t>(row_.segments);
+    for (const BlowLimits& of_segment : limits_) {
+      for (const int joint : of_segment.joints) good = good && joint >= 0 && joint < row_.joints;
+    }
+    if (!good) throw std::invalid_argument("the limits do not fit the observer");
+    for (std::size_t g = 0; g < limits_.size(); ++g) {
+      const int sensor = observer.layout().segments[g].sensor;
+      if (sensor >= 0) bandwidths_[g] = observer.sensors()[sensor].bandwidth;
+      for (const JointRow& joint : observer.joints()) {
+        if (sensor < 0) bandwidths_[g] = std::max(bandwidths_[g], joint.bandwidth);
+      }
+    }
+  }
+
+  std::size_t width() const { return static_cast<std::size_t>(row_.width()); }
+  std::size_t segments() const { return limits_.size(); }
+
+  // Takes a sample: the observer's row and the detector's level of each segment.
+  void step(double time, const double* row, const double* levels) {
+    time_ = std::fmax(time_, time);
+    for (std::size_t g = 0; g < limits_.size(); ++g) sizes_[g] = size(static_cast<int>(g), row);
+    history_.add(time_, sizes_.data());
+    clamping_.step(time_, row + row_.segment_wrench(), levels);
+    for (std::size_t g = 0; g < limits_.size(); ++g) decide(static_cast<int>(g), levels[g] > 0.0);
+  }
+
+  // What is said of the contacts on segment g in that sample.
+  void consider(int g, const Reports& reports) { clamping_.consider(g, reports); }
+
+  Kind kind(int g) const { return touches_[g].kind; }
+  // Of a contact that carries this share of the load on segment g.
+  Kind kind(int g, double share) const {
+    return share >= kLeading ? kind(g) : std::min(kind(g), Kind::contact);
+  }
+  // Contact k on segment g.
+  bool clamped(int g, int k) const { return clamping_(g, k); }
+  // Of the segment's force [N/s]; NaN where it is not touched.
+  double rate(int g) const { return touches_[g].rate; }
+
+ private:
+  static constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+  struct Touch {
+    Kind kind = Kind::none;
+    double begin = 0.0, rate = kNaN;
+  };
+
+  // Of the force on segment g [N].
+  double size(int g, const double* row) const {
+    const double* w = row + row_.segment_wrench() + 6 * g;
+    if (limits_[g].joints.empty()) return norm(Vec3{w[0], w[1], w[2]});
+    double most = 0.0;
+    for (const int joint : limits_[g].joints)
+      most = std::fmax(most, std::fabs(row[row_.segment_torque() + joint]));
+    return most / kLever;
+  }
+
+  void decide(int g, bool touched) {
+    Touch& touch = touches_[g];
+    if (!touched) {
+      touch = Touch{};
+      return;
+    }
+    if (touch.kind == Kind::none) touch = {Kind::undecided, time_, kNaN};
+    const BlowLimits& limits = limits_[g];
+    touch.rate = history_.rate(g);
+    const bool strong = sizes_[g] + touch.rate / bandwidths_[g] > limits.collision;
+    if (touch.rate > limits.onset && strong) {
+      touch.kind = Kind::collision;
+    } else if (touch.kind == Kind::undecided && time_ >= touch.begin + kPatience) {
+      touch.kind = Kind::contact;
+    }
+  }
+
+  RowLayout row_;
+  std::vector<BlowLimits> limits_;
+  std::vector<double> bandwidths_, sizes_;  // of the segments' wrenches [rad/s], forces [N]
+  std::vector<Touch> touches_;
+  ForceHistory history_;
+  Clamping clamping_;
+  double time_ = -std::numeric_limits<double>::infinity();
+};
+
+}  // namespace touchline

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// How far the arm has come from where the baseline of a segment was averaged: an error of the model
+// that the baseline has taken out comes back as the arm moves on. No allocation per sample.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include "touchline/detail/detector/detection_row.hpp"
+
+namespace touchline {
+
+class BaselinePosture {
+ public:
+  BaselinePosture(std::size_t segments, std::size_t joints)
+      : joints_(joints), mean_(segments * joints, 0.0) {}
+
+  // The baseline takes a sample with the weight `gain`.
+  void average(std::size_t segment, const double* q, double gain) {
+    double* mean = mean_.data() + segment * joints_;
+    for (std::size_t j = 0; j < joints_; ++j) mean[j] += gain * (q[j] - mean[j]);
+  }
+
+  // Sum of squares of the joints' ways since [rad2].
+  double distance2(std::size_t segment, const double* q) const {
+    const double* mean = mean_.data() + segment * joints_;
+    double sum = 0.0;
+    for (std::size_t j = 0; j < joints_; ++j) sum += (q[j] - mean[j]) * (q[j] - mean[j]);
+    return sum;
+  }
+
+ private:
+  std::size_t joints_;
+  std::vector<double> mean_;  // per segment: joint positions
+};
+
+// Variance of what the model's errors have added to a row since its baseline, `way2` [rad2] away.
+// The constant part is what an arm leaves on its way through ordinary motion: weight, which changes
+// with the pose, about in proportion to the way as far as `kFarthest`; and in a joint's own torque
+// friction, all of which comes with motion.
+inline double drifted(const DetectionRow& row, const Activity& activity, double way2) {
+  constexpr double kFar = 0.75, kFarthest = 2.0, kMoving = 0.1;  // [rad], [rad], [rad/s]
+  double share = std::min(way2, kFarthest * kFarthest) / (kFar * kFar);
+  if (row.component < 0)
+    share = std::max(share, std::min(1.0, activity.speed2 / (kMoving * kMoving)));
+  const double constant = row.drift.constant;
+  return row.drift.variance(activity) + (share - 1.0) * constant * constant;
+}
+
+}  // namespace touchline

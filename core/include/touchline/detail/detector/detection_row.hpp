@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a detector tests, and what it is told of each row.
+#pragma once
+
+#include <vector>
+
+#include "touchline/detail/detector/noise_figures.hpp"
+
+namespace touchline {
+
+enum class Level { none = 0, contact = 1, collision = 2 };
+
+// How fast the robot moves: what errors of the model grow with.
+struct Activity {
+  double speed2 = 0.0;        // sum of squared joint speeds [rad2/s2]
+  double acceleration = 0.0;  // norm of the joint accelerations [rad/s2]
+};
+
+// One sigma of what the model's errors leave in a row [N or Nm].
+struct ModelError {
+  double constant = 0.0;
+  double speed = 0.0;         // per rad2/s2 of squared speed
+  double acceleration = 0.0;  // per rad/s2
+
+  double variance(const Activity& a) const {
+    const double v = speed * a.speed2, b = acceleration * a.acceleration;
+    return constant * constant + v * v + b * b;
+  }
+};
+
+// One residual of a segment: a component of its wrench in the frame of its own sensor, or the
+// torque that contacts on the segment put on one of its joints.
+struct DetectionRow {
+  int segment;
+  int component;  // 0 to 5 of the segment wrench; -1: a joint
+  int joint;
+  double contact, collision;  // thresholds [N or Nm]
+  double baseline_limit;      // the largest residual that is taken for an offset [N or Nm]
+  ModelError slow, quick;     // against the baseline and against the reference of `kReference`
+  ModelError drift;           // against the baseline, while a contact lasts
+};
+
+struct DetectionTimes {
+  double min_duration;  // a test must hold this long to fire [s]
+  double hold;          // and be quiet this long to clear [s]
+  double baseline;      // time constant of the baseline [s]
+  double release;       // cleared below this fraction of the thresholds
+};
+
+// Rows: each by itself, and where `sum_limit` is finite the sum of their squares. Scaled: each
+// against what noise and the model's errors let expect at this speed and acceleration. Chi2: all
+// together, against their covariance. GLRT: the unfiltered loads of several windows, likewise.
+// CUSUM: the innovations of a Kalman filter.
+enum class Test { rows, scaled, chi2, glrt, cusum };
+
+// A test in use, with its threshold for each segment.
+struct TestSetting {
+  Test test;
+  std::vector<double> limits;
+};
+
+struct DetectionSettings {
+  std::vector<TestSetting> tests;
+  std::vector<double> sum_limits;  // per segment: of the sum of squares of all normalized rows
+  DetectionTimes times;
+  NoiseFigures noise;
+  std::vector<double> windows;  // of the GLRT [s]
+};
+
+constexpr double kReference = 0.2;  // time constant of what GLRT takes for offset [s]
+constexpr double kShift = 1.0;      // of the mean, that CUSUM is made for [sigma per sample]
+constexpr double kRefresh = 0.01;   // covariances follow the posture this often [s]
+
+}  // namespace touchline

@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tells contact from noise, per segment: one or several tests at a time, each with a threshold,
+// with hysteresis, a minimum duration, and a slow baseline that follows constant offsets while
+// nothing touches. No allocation, lock, exception or output in `step`.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "touchline/detail/detector/activity.hpp"
+#include "touchline/detail/detector/baseline_posture.hpp"
+#include "touchline/detail/detector/detection_row.hpp"
+#include "touchline/detail/detector/segment_tests.hpp"
+#include "touchline/detail/model/posture.hpp"
+#include "touchline/detail/observer/observer.hpp"
+
+namespace touchline {
+
+class Detector {
+ public:
+  Detector(const Observer& observer, std::vector<DetectionRow> rows, DetectionSettings settings)
+      : observer_(observer),
+        posture_(observer.tree(), observer.row_layout().joints),
+        rows_(std::move(rows)),
+        settings_(std::move(settings)),
+        activity_(observer.row_layout().joints),
+        baseline_posture_(settings_.sum_limits.size(), observer.row_layout().joints),
+        states_(rows_.size()),
+        samples_(rows_.size()),
+        segments_(settings_.sum_limits.size()),
+        first_(segments_.size() + 1, 0),
+        normalized_(rows_.size(), 0.0),
+        drift_(rows_.size(), 0.0),
+        levels_(segments_.size(), 0),
+        quiet_(segments_.size(), 0.0),
+        statistics_(segments_.size() * settings_.tests.size(), 0.0) {
+    for (std::size_t g = 0; g < segments_.size(); ++g) {
+      std::vector<DetectionRow> own;
+      for (const DetectionRow& row : rows_) {
+        if (row.segment == static_cast<int>(g)) own.push_back(row);
+      }
+      first_[g + 1] = first_[g] + own.size();
+      tests_.emplace_back(observer, own, settings_);
+      joint_tests_ = joint_tests_ || tests_.back().used();
+    }
+  }
+
+  // To be called after each step of the observer, with the row it wrote and the sample it took.
+  void step(const double* output, const double* q, const double* qd) {
+    row_ = output;
+    const double now = observer_.time();
+    const double dt = timed_ ? std::max(0.0, now - time_) : 0.0;
+    timed_ = true;
+    time_ = now;
+    if (dt > 0.0) follow_motion(q, qd, dt);
+    for (std::size_t g = 0; g < segments_.size(); ++g) {
+      Segment& s = segments_[g];
+      s.peak = s.sum = s.collision = 0.0;
+      read_segment(g);
+      for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) test_row(i);
+      judge(g, dt);
+      decide(g, dt);
+    }
+    for (std::size_t i = 0; i < rows_.size(); ++i) follow_offset(i, dt);
+    if (dt > 0.0 && sound_) follow_drift(q, dt);
+  }
+
+  const std::vector<DetectionRow>& rows() const { return rows_; }
+  // Per row: (residual - baseline) / contact threshold; 0 where there is no settled residual.
+  const std::vector<double>& normalized() const { return normalized_; }
+  // Per row: one sigma of what the model's errors may have added since the baseline [N or Nm].
+  const std::vector<double>& drift() const { return drift_; }
+  const std::vector<int>& levels() const { return levels_; }  // per segment
+  // Per segment: over how long its baseline has been averaged [s].
+  const std::vector<double>& quiet() const { return quiet_; }
+  // Per segment, for each test: what is compared with its limit.
+  const std::vector<double>& statistics() const { return statistics_; }
+  const RowSample& sample(std::size_t row) const { return samples_[row]; }
+  // The tests of a segment, and the number of its first row.
+  const SegmentTests& tests(int segment) const { return tests_[segment]; }
+  std::size_t first_row(int segment) const { return first_[segment]; }
+  const Activity& activity() const { return activity_.activity(); }
+  double baseline(int row) const { return states_[row].baseline; }
+  double reference(int row) const { return states_[row].reference; }
+  const Observer& observer() const { return observer_; }
+
+ private:
+  struct RowState {
+    double baseline = 0.0, reference = 0.0;
+    double age = 0.0, referred = 0.0;  // over how long they have been averaged [s]
+    bool started = false;
+  };
+  struct Segment {
+    double peak = 0.0, sum = 0.0, collision = 0.0;  // of the normalized rows
+    double above = 0.0, above_collision = 0.0, below = 0.0;  // for how long [s]
+    double score = 0.0;  // of all tests, in thresholds
+    bool pending = false, pending_collision = false;
+  };
+  static constexpr double kMost = 1.5;  // thresholds that a sum can grow to while all is felt
+
+  void follow_motion(const double* q, const double* qd, double dt) {
+    double sum = 0.0;
+    for (int j = 0; j < observer_.row_layout().joints; ++j) sum += std::fabs(q[j]) + std::fabs(qd[j]);
+    sound_ = sum < kAbsurd;
+    if (!sound_) return;
+    activity_.add(qd, dt);
+    if (!joint_tests_) return;
+    since_ += dt;
+    if (placed_ && since_ < kRefresh) return;
+    posture_.set(q, nullptr);
+    for (SegmentTests& tests : tests_) tests.weigh(posture_, activity_.activity());
+    since_ = 0.0;
+    placed_ = true;
+  }
+
+  // The residuals and innovations of a segment's rows.
+  void read_segment(std::size_t g) {
+    const RowLayout& layout = observer_.row_layout();
+    double wrench[6], load[6];
+    bool known = false;
+    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+      const DetectionRow& row = rows_[i];
+      RowSample& s = samples_[i];
+      if (row.component < 0) {
+        s.known = row_[layout.joint_settled() + row.joint] > 0.0;
+        s.residual = row_[layout.segment_torque() + row.joint];
+        s.innovation = observer_.own_innovation(row.joint);
+      } else {
+        if (i == first_[g]) known = read_wrench(g, wrench, load);
+        s.known = known;
+        s.residual = wrench[row.component];
+        s.innovation = load[row.component];
+      }
+      s.known = s.known && std::isfinite(s.residual);
+      if (!std::isfinite(s.innovation)) s.innovation = s.residual;  // samples were lost
+    }
+  }
+
+  bool read_wrench(std::size_t g, double* wrench, double* innovation) const {
+    const RowLayout& layout = observer_.row_layout();
+    const int sensor = observer_.layout().segments[g].sensor;
+    if (sensor < 0 || !(row_[layout.segment_settled() + g] > 0.0)) {
+      std::fill_n(wrench, 6, std::nan(""));
+      std::fill_n(innovation, 6, std::nan(""));
+      return false;
+    }
+    const Pose X = observer_.sensor_pose(sensor);
+    store(wrench_to_child(X, load(row_ + layout.segment_wrench() + 6 * g)), wrench);
+    if (joint_tests_)
+      store(wrench_to_child(X, load(row_ + layout.segment_innovation() + 6 * g)), innovation);
+    return true;
+  }
+
+  void test_row(std::size_t i) {
+    const DetectionRow& row = rows_[i];
+    RowState& s = states_[i];
+    RowSample& sample = samples_[i];
+    normalized_[i] = 0.0;
+    if (!sample.known) return;
+    if (!s.started) {  // the first settled residual is taken for an offset, up to the limit
+      s.baseline = std::clamp(sample.residual, -row.baseline_limit, row.baseline_limit);
+      s.reference = sample.residual;
+      s.started = true;
+    }
+    sample.offset = s.baseline;
+    sample.reference = s.reference;
+    sample.referred = s.referred;
+    const double x = (sample.residual - s.baseline) / row.contact;
+    normalized_[i] = x;
+    Segment& segment = segments_[row.segment];
+    segment.peak = std::max(segment.peak, std::fabs(x));
+    segment.sum += x * x;
+    segment.collision = std::max(segment.collision, std::fabs(x) * row.contact / row.collision);
+  }
+
+  // May offsets be followed: is nothing felt, or only by what has been an offset since?
+  bool adapts(std::size_t g) const {
+    return levels_[g] == 0 ? !segments_[g].pending : segments_[g].peak < settings_.times.release;
+  }
+
+  // The statistics of all tests, and the largest in thresholds.
+  void judge(std::size_t g, double dt) {
+    Segment& s = segments_[g];
+    if (joint_tests_ && placed_) {
+      double most = std::numeric_limits<double>::infinity();
+      for (const TestSetting& setting : settings_.tests) {
+        if (setting.test == Test::cusum) most = kMost * setting.limits[g];
+      }
+      tests_[g].step(samples_.data() + first_[g], dt, adapts(g), activity_.activity(), most);
+    }
+    s.score = 0.0;
+    for (std::size_t t = 0; t < settings_.tests.size(); ++t) {
+      const TestSetting& setting = settings_.tests[t];
+      double& statistic = statistics_[g * settings_.tests.size() + t];
+      statistic = setting.test == Test::rows ? std::max(s.peak, std::sqrt(s.sum / settings_.sum_limits[g]))
+                  : placed_                  ? tests_[g].statistic(setting.test)
+                                             : 0.0;
+      s.score = std::max(s.score, statistic / setting.limits[g]);
+    }
+  }
+
+  void decide(std::size_t g, double dt) {
+    Segment& s = segments_[g];
+    advance(s.score > 1.0, dt, s.pending, s.above);
+    advance(s.collision > 1.0, dt, s.pending_collision, s.above_collision);
+    s.below = s.score < settings_.times.release ? s.below + dt : 0.0;
+    if (s.pending && s.above >= settings_.times.min_duration) levels_[g] = std::max(levels_[g], 1);
+    if (s.pending_collision && s.above_collision >= settings_.times.min_duration) levels_[g] = 2;
+    if (levels_[g] > 0 && s.below >= settings_.times.hold) levels_[g] = 0;
+  }
+
+  // For how long a test has held without a break.
+  static void advance(bool holds, double dt, bool& pending, double& duration) {
+    duration = holds && pending ? duration + dt : 0.0;
+    pending = holds;
+  }
+
+  void follow_offset(std::size_t i, double dt) {
+    RowState& s = states_[i];
+    const DetectionRow& row = rows_[i];
+    const double value = samples_[i].residual;
+    if (!samples_[i].known) return;
+    // Running means first, low-passes once they have seen enough.
+    if (adapts(row.segment)) {
+      s.referred = std::min(s.referred + dt, kReference);
+      if (s.referred > 0.0) s.reference += (value - s.reference) * std::min(1.0, dt / s.referred);
+    }
+    if (levels_[row.segment] > 0 || segments_[row.segment].pending) return;
+    quiet_[row.segment] = s.age += dt;
+    const double tau = std::min(s.age, settings_.times.baseline);
+    if (tau <= 0.0) return;
+    const double next = s.baseline + (value - s.baseline) * std::min(1.0, dt / tau);
+    s.baseline = std::clamp(next, -row.baseline_limit, row.baseline_limit);
+  }
+
+  // Drifts of the rows, from where the arm was while the baselines were averaged.
+  void follow_drift(const double* q, double dt) {
+    for (std::size_t g = 0; g < segments_.size(); ++g) {
+      if (levels_[g] == 0 && !segments_[g].pending && quiet_[g] > 0.0) {
+        const double tau = std::min(quiet_[g], settings_.times.baseline);
+        baseline_posture_.average(g, q, std::min(1.0, dt / tau));
+      }
+      const double way2 = baseline_posture_.distance2(g, q);
+      for (std::size_t i = first_[g]; i < first_[g + 1]; ++i)
+        drift_[i] = std::sqrt(drifted(rows_[i], activity(), way2));
+    }
+  }
+
+  const Observer& observer_;
+  Posture posture_;
+  const double* row_ = nullptr;
+  std::vector<DetectionRow> rows_;
+  DetectionSettings settings_;
+  ActivityMeter activity_;
+  BaselinePosture baseline_posture_;
+  std::vector<RowState> states_;
+  std::vector<RowSample> samples_;
+  std::vector<Segment> segments_;
+  std::vector<std::size_t> first_;  // per segment: its first row; they stand together
+  std::vector<SegmentTests> tests_;
+  std::vector<double> normalized_, drift_;
+  std::vector<int> levels_;
+  std::vector<double> quiet_, statistics_;
+  double time_ = 0.0, since_ = 0.0;
+  bool timed_ = false, placed_ = false, joint_tests_ = false, sound_ = false;
+};
+
+}  // namespace touchline

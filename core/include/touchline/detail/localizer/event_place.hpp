@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where an event is, from all its strong samples: explanations that agree are one place, fixed on
+// its link, and the evidence for each place adds up. Bounded memory, no allocation per sample.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "touchline/detail/place/hypothesis.hpp"
+
+namespace touchline {
+
+struct Place {
+  int surface = -1;
+  Vec3 point;             // in the frame of the node, weighted mean
+  double weight = 0.0;    // of the mean: sum of 1 / variance
+  double evidence = 0.0;  // log of the odds, before normalization
+  double last = 0.0;      // probability in the sample at hand
+  double share = 0.0;     // probability of the place
+};
+
+class EventPlace {
+ public:
+  static constexpr int kPlaces = 12;
+
+  void restart() { *this = EventPlace{}; }
+
+  // `independence`: how much of an independent sample each one is (K dt / 2 behind a filter).
+  // Returns whether the sample is strong; if it is, its explanations are to be added.
+  bool begin_sample(double strength, double time, double independence) {
+    if (kStrong * strength > peak_) {  // all that came before was weak
+      const double peak = strength;
+      restart();
+      peak_ = peak;
+    }
+    peak_ = std::max(peak_, strength);
+    if (strength < kStrong * peak_) return false;
+    time_ = time;
+    independence_ = std::min(1.0, independence);
+    ++samples_;
+    return true;
+  }
+
+  // Explanations of a sample that no single force explains count only as long as there is no other.
+  bool open(int status, bool explained) {
+    ++statuses_[status];
+    if (!explained) ++unexplained_;
+    if (!explained && explained_ > 0) return false;
+    if (explained && explained_ == 0) {
+      count_ = 0;
+      missed_ = 0.0;
+    }
+    for (int i = 0; i < count_; ++i) places_[i].last = 0.0;
+    return true;
+  }
+
+  void add(int surface, const Vec3& point, double probability, double variance, double radius) {
+    if (!(variance > 0.0) || probability < kFloor) return;
+    const double near = std::max(radius, 3.0 * std::sqrt(variance));
+    Place* place = nullptr;
+    double least = near;
+    for (int i = 0; i < count_; ++i) {
+      const double distance = norm(places_[i].point - point);
+      if (places_[i].surface == surface && distance < least) {
+        least = distance;
+        place = &places_[i];
+      }
+    }
+    if (place == nullptr) place = fresh(surface);
+    const double weight = probability / (variance + kSmoothness);
+    place->weight += weight;
+    place->point = place->point + (weight / place->weight) * (point - place->point);
+    place->last += probability;
+  }
+
+  // `variance` of the sample's best place, of which the part `lasting` is that of the next as well.
+  void close(double variance, double lasting) {
+    for (int i = 0; i < count_; ++i)
+      places_[i].evidence += independence_ * std::log(std::clamp(places_[i].last, kFloor, 1.0));
+    missed_ += independence_ * std::log(kFloor);
+    if (std::isfinite(variance)) {
+      variance_ += (1.0 - lasting) * variance;
+      lasting_ += lasting * variance;
+      ++explained_;
+    }
+  }
+
+  // Gives each place its probability and sorts them: the most probable body's best comes first,
+  // the others by probability. `body(surface)` tells what is one body.
+  template <class Body>
+  void conclude(Body&& body) {
+    // What errs in one sample, the model, errs in the next: they are not that many looks.
+    const double looks = missed_ < 0.0 ? std::min(1.0, kLooks * std::log(kFloor) / missed_) : 1.0;
+    double sum = 0.0, most = -1e300;
+    for (int i = 0; i < count_; ++i) most = std::max(most, places_[i].evidence);
+    for (int i = 0; i < count_; ++i) sum += std::exp(looks * (places_[i].evidence - most));
+    for (int i = 0; i < count_; ++i)
+      places_[i].share = std::exp(looks * (places_[i].evidence - most)) / sum;
+    std::sort(places_, places_ + count_,
+              [](const Place& a, const Place& b) { return a.share > b.share; });
+    int first = 0;
+    double largest = 0.0;
+    for (int i = 0; i < count_; ++i) {
+      double of_body = 0.0;
+      for (int k = 0; k < count_; ++k)
+        of_body += body(places_[i].surface) == body(places_[k].surface) ? places_[k].share : 0.0;
+      if (of_body > largest + 1e-12) {
+        largest = of_body;
+        first = i;
+      }
+    }
+    std::rotate(places_, places_ + first, places_ + std::min(first + 1, count_));
+  }
+
+  int count() const { return count_; }
+  const Place& place(int i) const { return places_[i]; }
+  double time() const { return time_; }
+  bool mostly_unexplained() const { return 2 * unexplained_ > samples_; }
+  int frequent(int a, int b) const { return statuses_[a] >= statuses_[b] ? a : b; }
+
+  // Of the mean over the event, which takes away only what differs from sample to sample.
+  double variance() const {
+    if (explained_ == 0) return std::nan("");
+    const double looks = 1.0 + (explained_ - 1) * independence_;
+    return (variance_ / looks + lasting_) / explained_;
+  }
+
+ private:
+  static constexpr double kStrong = 0.5;      // of the peak
+  static constexpr double kFloor = 1e-3;      // no sample rules a place out
+  static constexpr double kLooks = 3.0;       // that an event is worth at most
+  static constexpr double kSmoothness = 1e-8;  // m2; no mesh is smoother
+
+  Place* fresh(int surface) {
+    Place* place = places_;
+    if (count_ < kPlaces) {
+      place = &places_[count_++];
+    } else {
+      place = std::min_element(places_, places_ + kPlaces, [](const Place& a, const Place& b) {
+        return a.evidence < b.evidence;
+      });
+    }
+    *place = Place{};
+    place->surface = surface;
+    place->evidence = missed_;
+    return place;
+  }
+
+  Place places_[kPlaces];
+  int count_ = 0, samples_ = 0, explained_ = 0, unexplained_ = 0;
+  int statuses_[5] = {};
+  double peak_ = 0.0, time_ = 0.0, independence_ = 1.0, missed_ = 0.0;
+  double variance_ = 0.0, lasting_ = 0.0;  // sums over the explained samples
+};
+
+}  // namespace touchline

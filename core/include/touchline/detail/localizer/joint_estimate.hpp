@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+// The contacts on one segment whose places are known, and the joint covariance of all their forces
+// and places: where the wrench alone tells two contacts, what one gains the other loses.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "touchline/detail/localizer/known_contact.hpp"
+#include "touchline/detail/model/dense.hpp"
+#include "touchline/detail/place/hypothesis.hpp"
+
+namespace touchline {
+
+struct JointEstimate {
+  static constexpr int kMost = 4, kEach = 5;  // contacts; unknowns of each: force, place
+  static constexpr int kSize = kEach * kMost;
+  int count = 0;
+  KnownContact known[kMost];
+  double covariance[kSize * kSize] = {};  // (size, size), row by row
+
+  int size() const { return kEach * count; }
+
+  // A contact of which nothing is known but roughly its place and force.
+  void add(const KnownContact& contact, double force_sigma) {
+    const int old = size(), n = old + kEach;
+    for (int i = old - 1; i >= 0; --i) {
+      for (int j = old - 1; j >= 0; --j) covariance[i * n + j] = covariance[i * old + j];
+    }
+    known[count++] = contact;
+    forget(count - 1, force_sigma);
+  }
+
+  void remove(int c) {
+    const int n = size(), first = kEach * c, after = first + kEach;
+    int to = 0;
+    for (int i = 0; i < n; ++i) {
+      for (int j = 0; j < n; ++j) {
+        if ((i < first || i >= after) && (j < first || j >= after))
+          covariance[to++] = covariance[i * n + j];
+      }
+    }
+    std::copy(known + c + 1, known + count, known + c);
+    --count;
+  }
+
+  // Of a contact nothing is known any more.
+  void forget(int c, double force_sigma) {
+    const int n = size(), first = kEach * c;
+    for (int i = first; i < first + kEach; ++i) {
+      for (int j = 0; j < n; ++j) covariance[i * n + j] = covariance[j * n + i] = 0.0;
+      covariance[i * (n + 1)] = i < first + 3 ? force_sigma * force_sigma : kAnywhere;
+    }
+  }
+
+  // Those of all contacts but one.
+  void copy_without(int c, JointEstimate& out) const {
+    out = *this;
+    out.remove(c);
+  }
+
+  // How old that is which each force speaks of, at a time [s].
+  void age(double bandwidth, double time) {
+    for (int c = 0; c < count; ++c) {
+      KnownContact& k = known[c];
+      k.lag = k.age.follow(k.force, bandwidth, time) / bandwidth;
+    }
+  }
+
+  // What forces that are held and places that are kept do in a time [s]. A force of which the filter
+  // does not show all yet will go on to change: along its own direction, and about as foreseen.
+  void creep(double passed, double bandwidth) {
+    const int n = size();
+    for (int c = 0; c < count; ++c) {
+      KnownContact& k = known[c];
+      const double coming = k.coming(bandwidth), unrest = 2.0 * bandwidth * coming * coming;
+      const Vec3 u = (1.0 / std::max(norm(k.force), 1e-9)) * k.force;
+      const double way = bandwidth * k.lag < 1.0 ? 1.0 : -1.0;  // what has grown is young
+      k.force = k.force + way * coming * (1.0 - std::exp(-bandwidth * passed)) * u;
+      double* P = covariance + kEach * c * (n + 1);
+      for (int i = 0; i < kEach; ++i)
+        P[i * (n + 1)] += passed * (i < 3 ? kTremor + kAcross * unrest : kCreep);
+      for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j)
+          P[i * n + j] += passed * (kDoubt - kAcross) * unrest * component(u, i) * component(u, j);
+      }
+    }
+  }
+
+  // The places' own covariances, from the joint one; none is sharper than surfaces are, or than the
+  // errors allow that the samples have in common.
+  void spread() {
+    const int n = size();
+    for (int c = 0; c < count; ++c) {
+      double* P = covariance + (kEach * c + 3) * (n + 1);
+      P[0] = std::max(P[0], kSharpest);
+      P[n + 1] = std::max(P[n + 1], kSharpest);
+      const Spread seen{P[0], P[1], P[n + 1]}, lasting = known[c].lasting;
+      const double rest = std::max(0.0, lasting.trace() - seen.trace());
+      known[c].place = rest > 0.0 ? seen + (rest / lasting.trace()) * lasting : seen;
+    }
+  }
+
+  // Standard deviation of a force in its worst direction at most [N].
+  double force_sigma(int c) const {
+    const int n = size();
+    double sum = 0.0;
+    for (int i = kEach * c; i < kEach * c + 3; ++i) sum += covariance[i * (n + 1)];
+    return std::sqrt(sum);
+  }
+
+  // Moves the place of a contact to `p`, whose tangents are turned with the normal, the shortest
+  // way: its coordinates along the surface turn with them.
+  void move(int c, const SurfacePoint& p) {
+    KnownContact& k = known[c];
+    Vec3 from[2], to[2];
+    tangents(k.normal, from[0], from[1]);
+    tangents(p.normal, to[0], to[1]);
+    double turn[2][2];
+    for (int j = 0; j < 2; ++j) {
+      const Vec3 carried = turned(from[j], k.normal, p.normal);
+      for (int i = 0; i < 2; ++i) turn[i][j] = dot(to[i], carried);
+    }
+    k.point = p.point;
+    k.normal = p.normal;
+    const int n = size(), at = kEach * c + 3;
+    for (int i = 0; i < n; ++i) turn_pair(turn, covariance + i * n + at, 1);
+    for (int i = 0; i < n; ++i) turn_pair(turn, covariance + at * n + i, n);
+  }
+
+ private:
+  static constexpr double kAnywhere = 1e-2;  // variance of a place before it is known [m2]
+  static constexpr double kTremor = 3e-4;    // of forces that are held [N2/s]
+  // Doubt of how much a force changes, and of its direction, in parts of the variance foreseen.
+  static constexpr double kDoubt = 0.05, kAcross = 0.005;
+  static constexpr double kSharpest = 4e-10;  // variance of a place [m2]
+  static constexpr double kCreep = 2e-9;     // and of their places [m2/s]
+
+  // `v` by the shortest turn that takes one unit vector to another (Rodrigues).
+  static Vec3 turned(const Vec3& v, const Vec3& from, const Vec3& to) {
+    const Vec3 w = cross(from, to);
+    const double cosine = dot(from, to);
+    if (cosine < -0.999) return v;
+    return v + cross(w, v) + (1.0 / (1.0 + cosine)) * cross(w, cross(w, v));
+  }
+
+  static void turn_pair(const double turn[2][2], double* x, int stride) {
+    const double a = x[0], b = x[stride];
+    x[0] = turn[0][0] * a + turn[0][1] * b;
+    x[stride] = turn[1][0] * a + turn[1][1] * b;
+  }
+};
+
+}  // namespace touchline

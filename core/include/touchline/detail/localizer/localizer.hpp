@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where each segment is touched, and where each event is, from all its samples. No allocation per
+// sample.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+#include "touchline/detail/localizer/event_place.hpp"
+#include "touchline/detail/localizer/tracks.hpp"
+
+namespace touchline {
+
+class Localizer {
+ public:
+  Localizer(const Observer& observer, std::vector<DetectionRow> tests, NoiseFigures noise,
+            std::vector<LinkSurface> surfaces, LocalizerSettings settings)
+      : observer_(observer),
+        settings_(settings),
+        period_(noise.period),
+        measurement_(observer, std::move(tests), std::move(noise)),
+        single_(observer, measurement_.posture(), settings_, std::move(surfaces)),
+        tracks_(single_, measurement_, settings_, measurement_.most_rows(),
+                observer.row_layout().segments, period_),
+        states_(observer.row_layout().segments),
+        memories_(observer.row_layout().segments, std::vector<Memory>(Reports::kMost + 1)) {
+    for (std::vector<Memory>& of_segment : memories_) {
+      for (Memory& m : of_segment) m.q.resize(observer.row_layout().joints, kNaN);
+    }
+    ended_.reserve(Reports::kMost + 1);
+  }
+
+  Localizer(const Localizer&) = delete;
+  Localizer& operator=(const Localizer&) = delete;
+
+  const std::vector<LinkSurface>& surfaces() const { return single_.surfaces().all(); }
+  // The posterior of the place of the only contact of the last sample, cell by cell; throws where
+  // there are several or none, or where that one's place is not this sample's.
+  std::vector<SurfaceCell> region() const {
+    const Answer& own = single_.answer();
+    if (said_ != 1 || !placed(*last_) || !placed(own) ||
+        norm(last_->candidates[0].point - own.candidates[0].point) > 0.0)
+      throw std::invalid_argument("the last sample does not speak of the place of a single contact");
+    return single_.region();
+  }
+  const Measurement& measurement() const { return measurement_; }
+
+  // Sizes of what the methods below take.
+  std::size_t joints() const { return observer_.row_layout().joints; }
+  std::size_t segments() const { return observer_.row_layout().segments; }
+  std::size_t tests() const { return measurement_.tests(); }
+  std::size_t width() const { return observer_.row_layout().width(); }
+
+  // Throws unless arrays of these sizes belong to this robot.
+  void expect(int segment, std::size_t row, std::size_t normalized, std::size_t q,
+              std::size_t qd) const {
+    if (segment < 0 || static_cast<std::size_t>(segment) >= segments())
+      throw std::invalid_argument("there is no such segment");
+    if (row != width() || normalized != tests() || q != joints() || qd != joints())
+      throw std::invalid_argument("an array has a size that does not belong to this robot");
+  }
+
+  // The configuration of the sample; what the model's errors may have added to each row of the
+  // detector since its baseline; for how long the baseline of each segment has been averaged. All
+  // but `q` may be null.
+  void set_state(const double* q, const double* qd, const double* drift, const double* quiet) {
+    measurement_.set_state(q, qd, drift, quiet);
+    said_ = 0;
+  }
+
+  // Covariance (6, 6) of a segment's wrench; false where it has none.
+  bool wrench_covariance(int g, const double* row, double* out) {
+    if (!measurement_.read(g, row, nullptr) || !measurement_.has_wrench()) return false;
+    measurement_.wrench_covariance(out);
+    return true;
+  }
+
+  // The contact on segment g, from the observer's row and the detector's normalized rows (or null).
+  // A wrench that has been steady for a while is as old as its filter, 1 / K.
+  const Answer& locate(int g, const double* row, const double* normalized) {
+    return locate(g, row, normalized, steady_lag(g));
+  }
+
+  const Answer& locate(int g, const double* row, const double* normalized, double lag) {
+    said_ = 1;
+    last_ = &single_.answer();
+    if (!measurement_.read(g, row, normalized)) return single_.clear();
+    return single_.locate(g, lag, measurement_);
+  }
+
+  // Takes a sample of segment g at `time` [s]: what is said of each contact on it is in `reports()`,
+  // and the events that have ended in `ended()`.
+  void follow(int g, bool touched, const double* row, const double* normalized, double time,
+              const double* q) {
+    SegmentContacts& s = states_[g];
+    ended_.clear();
+    if (touched && !s.touched) {
+      const int first = tracks_.begin(g);
+      s = SegmentContacts{};
+      s.first = first;
+      s.age.restart(time);
+    }
+    if (s.touched && !touched) end_all(g);
+    s.touched = touched;
+    if (!touched) return;
+    tracks_.follow(s, g, bandwidth(g), time,
+                   [&] { return measurement_.read(g, row, normalized); });
+    const Reports& reports = tracks_.reports();
+    for (int i = 0; i < reports.ended(); ++i) end(g, reports.ended(i));
+    said_ += reports.count();
+    if (reports.count() > 0) last_ = &reports[0].answer;
+    const double strength = measurement_.strength(g, normalized);
+    for (int i = 0; i < reports.count(); ++i)
+      remember(g, reports[i], reports.share(i) * strength, time, q);
+  }
+
+  const Reports& reports() const { return tracks_.reports(); }
+
+  // An event: its number, its places, and the joint positions at the time of its position.
+  struct Memory {
+    int serial = -1;
+    EventPlace event;
+    std::vector<double> q;
+    bool undetermined = false;  // were there fewer equations than unknowns?
+  };
+
+  // Those that ended with the last sample; those that last or were the last on segment g.
+  const std::vector<Memory*>& ended() const { return ended_; }
+  std::vector<Memory>& memories(int g) { return memories_[g]; }
+
+  // Weighs the places of an event, those of the most probable body first.
+  void conclude(Memory& m) {
+    m.event.conclude([this](int surface) { return surfaces()[surface].node; });
+  }
+
+  Status status(const Memory& m) const {
+    const EventPlace& event = m.event;
+    if (event.count() == 0 || event.mostly_unexplained())
+      return static_cast<Status>(event.frequent(3, 4));
+    double here = 0.0;
+    for (int i = 0; i < event.count(); ++i) {
+      const Place &a = event.place(0), &b = event.place(i);
+      if (a.surface == b.surface && norm(a.point - b.point) < settings_.place_radius)
+        here += b.share;
+    }
+    const bool sharp = event.variance() < settings_.spread_limit() * settings_.spread_limit();
+    return here >= settings_.certain && sharp && !m.undetermined ? Status::located : Status::ambiguous;
+  }
+
+ private:
+  static constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+  // Finds the memory of an event, or makes room for it in place of one that has ended.
+  Memory& memory(int g, int serial) {
+    Memory* room = nullptr;
+    for (Memory& m : memories_[g]) {
+      if (m.serial == serial) return m;
+      if (m.serial < 0 && room == nullptr) room = &m;
+    }
+    if (room == nullptr) room = &memories_[g].back();
+    room->serial = serial;
+    room->event.restart();
+    return *room;
+  }
+
+  void end(int g, int serial) {
+    for (Memory& m : memories_[g]) {
+      if (m.serial == serial) ended_.push_back(&m);
+    }
+  }
+  void end_all(int g) {
+    for (Memory& m : memories_[g]) {
+      if (m.serial >= 0) ended_.push_back(&m);
+    }
+  }
+
+  // Adds what is said of a contact to its event.
+  void remember(int g, const Report& report, double strength, double time, const double* q) {
+    Memory& m = memory(g, report.serial);
+    const Answer& answer = report.answer;
+    if (!m.event.begin_sample(strength, time, 0.5 * period_ * bandwidth(g))) return;
+    std::copy(q, q + m.q.size(), m.q.begin());
+    const bool explained =
+        answer.status == Status::located || answer.status == Status::ambiguous;
+    if (!m.event.open(static_cast<int>(answer.status), explained)) return;
+    m.undetermined = answer.rank < answer.unknowns;
+    for (int i = 0; i < answer.count; ++i) {
+      const Candidate& k = answer.candidates[i];
+      m.event.add(k.surface, single_.surfaces().to_node(k.point, surfaces()[k.surface].node),
+                  k.weight, k.along[0] + k.along[2], settings_.place_radius);
+    }
+    m.event.close(explained ? answer.spread * answer.spread : kNaN, answer.lasting);
+  }
+
+  double steady_lag(int g) const {
+    return observer_.layout().segments[g].sensor >= 0 ? 1.0 / bandwidth(g) : 0.0;
+  }
+
+  double bandwidth(int g) const {
+    const int sensor = observer_.layout().segments[g].sensor;
+    if (sensor >= 0) return observer_.sensors()[sensor].bandwidth;
+    double least = std::numeric_limits<double>::infinity();
+    for (const JointRow& joint : observer_.joints()) least = std::min(least, joint.bandwidth);
+    return least;
+  }
+
+  const Observer& observer_;
+  LocalizerSettings settings_;
+  double period_;
+  Measurement measurement_;
+  SingleContact single_;
+  Tracks tracks_;
+  std::vector<SegmentContacts> states_;              // per segment
+  std::vector<std::vector<Memory>> memories_;  // per segment: of events
+  std::vector<Memory*> ended_;
+  int said_ = 0;  // contacts of which something was said in the last sample, and of one of them what
+  const Answer* last_ = nullptr;
+};
+
+}  // namespace touchline

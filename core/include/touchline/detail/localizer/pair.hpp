@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Two contacts that explain one measurement.
+#pragma once
+
+#include <limits>
+
+#include "touchline/detail/model/spatial.hpp"
+
+namespace touchline {
+
+// One point of a pair, with its force.
+struct PairEnd {
+  int surface = -1, body = -1, node = -1;  // `body`: of the segment's
+  Vec3 point, normal, force;
+  double along[3] = {};  // covariance of the two tangent coordinates
+};
+
+struct Pair {
+  PairEnd ends[2];  // the more inboard one first
+  double chi2 = 0.0, cost = std::numeric_limits<double>::infinity();
+  double weight = 0.0;  // log of the evidence, then the probability
+  int rank = 0;         // of the equations
+};
+
+// Are both points of two pairs nearer to each other than `distance`?
+inline bool near(const Pair& a, const Pair& b, double distance) {
+  const auto close = [&](int k) {
+    const Vec3 d = a.ends[k].point - b.ends[k].point;
+    return dot(d, d) < distance * distance;
+  };
+  return close(0) && close(1);
+}
+
+}  // namespace touchline

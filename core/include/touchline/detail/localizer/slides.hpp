@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+// One of the contacts on a segment slides while the others are held: it is located anew in every
+// sample, with what is known of the others taken out, from where all of them were known before it
+// began to. No allocation per sample.
+#pragma once
+
+#include <algorithm>
+
+#include "touchline/detail/localizer/known_fit.hpp"
+#include "touchline/detail/localizer/reports.hpp"
+#include "touchline/detail/localizer/segment_contacts.hpp"
+#include "touchline/detail/place/single_contact.hpp"
+
+namespace touchline {
+
+class Slides {
+ public:
+  enum class Outcome { none, slides, rests };
+
+  Slides(SingleContact& single, Measurement& measurement, const LocalizerSettings& settings,
+         JointFit& fit, KnownFit& known, Reports& reports)
+      : single_(single),
+        measurement_(measurement),
+        settings_(settings),
+        fit_(fit),
+        known_(known),
+        reports_(reports) {}
+
+  // Has one contact moved along its body, no faster than contacts slide? Of several the one that
+  // explains best. Then all are reported, also where a sample says otherwise in between; once it
+  // rests they are known from where it does.
+  template <class Read>
+  Outcome follow(SegmentContacts& s, const SegmentSample& now, Read&& read) {
+    const JointEstimate& before = s.before.contacts;
+    const double time = now.time, brief = now.brief(), way = kFastest * (time - s.since + brief);
+    const double passed = 0.5 * now.bandwidth * std::max(0.0, time - s.weighed);
+    s.weighed = time;
+    int slider = -1;
+    for (int c = 0; c < before.count; ++c) {
+      read();
+      if (before.count > 1) {
+        before.copy_without(c, others_);
+        fit_.take_out(others_, Change::none(), measurement_);
+      }
+      const double lag = before.count > 1 ? before.known[c].lag : now.lag;
+      const Answer& a = single_.locate(now.segment, lag, measurement_);
+      const bool can = within_reach(before.known[c], a, single_.surfaces(), way);
+      s.against[c] += passed * (can ? a.chi2 : chi2_limit(measurement_.size(), kNever));
+      if (!can || (slider >= 0 && s.against[c] > s.against[slider])) continue;
+      slider = c;
+      answer_ = a;
+    }
+    if (slider < 0 && !(time - s.slid < brief)) return Outcome::none;
+    const bool found = slider >= 0;
+    if (found) {
+      if (!decided(s, slider) && moved(before.known[slider]) > settings_.place_radius)
+        answer_.status = Status::ambiguous;
+      s.slid = time;
+      s.slide = answer_;
+    } else {
+      slider = s.slider;
+    }
+    for (int i = 0; i < before.count; ++i) {
+      if (i != slider) reports_.add(before.known[i]);
+    }
+    reports_.add(before.known[slider].serial, s.slide);
+    const bool anew = s.slider != slider || s.rests < 0.0;
+    s.slider = slider;
+    if (!found) return Outcome::slides;
+    read();
+    if (before.count == 1) {  // nothing is held: any sample tells where it is
+      if (time - s.since < SegmentContacts::kYoung * brief) return Outcome::slides;
+      rest(s.rested = before, slider);
+      s.contacts = s.rested;
+      return Outcome::rests;
+    }
+    if (anew || !stays(s)) {
+      s.rests = time;
+      rest(s.rested = before, slider);
+    } else if (time - s.rests >= (decided(s, slider) ? SegmentContacts::kYoung : kLong) * brief) {
+      s.contacts = s.rested;
+      return Outcome::rests;
+    }
+    return Outcome::slides;
+  }
+
+ private:
+  static constexpr double kFastest = 0.5;  // contacts slide no faster [m/s]
+  // Of chi2: a difference that tells which one slides; and in sigmas, that of what cannot slide.
+  static constexpr double kMargin = 9.0, kNever = 5.0;
+  static constexpr double kLong = 10.0;  // times 1 / K, where it cannot be told
+
+  // Can no other one as well have slid?
+  static bool decided(const SegmentContacts& s, int slider) {
+    for (int c = 0; c < s.before.contacts.count; ++c) {
+      if (c != slider && s.against[c] < s.against[slider] + kMargin) return false;
+    }
+    return true;
+  }
+
+  // From where a contact was known to where it is found [m].
+  double moved(const KnownContact& k) const {
+    return norm(answer_.candidates[0].point - single_.surfaces().to_world(k.point, k.node));
+  }
+
+  bool stays(const SegmentContacts& s) {
+    fit_.weigh(s.rested, measurement_);
+    return known_.explain(s.rested);
+  }
+
+  // Contact c is where it was found now.
+  void rest(JointEstimate& contacts, int c) {
+    KnownContact& k = contacts.known[c];
+    k = found_contact(k.serial, answer_, single_.surfaces(), k.age, k.lag);
+    contacts.forget(c, settings_.force_scale);
+    fit_.weigh(contacts, measurement_);
+    fit_.begin(measurement_, contacts);
+    fit_.judge(contacts);
+  }
+
+  SingleContact& single_;
+  Measurement& measurement_;
+  const LocalizerSettings& settings_;
+  JointFit& fit_;
+  KnownFit& known_;
+  Reports& reports_;
+  Answer answer_;
+  JointEstimate others_;
+};
+
+}  // namespace touchline

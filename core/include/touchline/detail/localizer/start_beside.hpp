@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+// Many pairs of points at once: the forces at both that explain best, in closed form, for one start
+// of a body beside all those of another.
+#pragma once
+
+#include <limits>
+
+#include "touchline/detail/localizer/start_lanes.hpp"
+
+namespace touchline {
+
+// One start of a body beside blocks of those of another.
+class StartBeside {
+ public:
+  // Start i; `square`: of what is measured.
+  StartBeside(const StartLanes& own, int i, double square) : rows_(own.rows()) {
+    const int block = i / kLanes, k = i % kLanes;
+    for (int r = 0; r < 3 * rows_; ++r) load_[r] = lane(own.load(block)[r], k);
+    for (int c = 0; c < 6; ++c) turn_[c] = lane(own.turn(block)[c], k);
+    rest_ = square + lane(own.beyond(block), k);
+    for (int c = 0; c < 3; ++c) {
+      target_[c] = lane(own.target(block)[c], k);
+      normal_[c] = lane(own.normal(block)[c], k);
+      rest_ -= target_[c] * target_[c];
+    }
+  }
+
+  // The misfit with each of a block of others, with the best forces in any direction.
+  Lanes misfit(const StartLanes& others, int block) {
+    const Lanes *v = others.load(block), *g = others.target(block);
+    for (Lanes& c : coupling_) c = all_lanes(0.0);
+    for (int r = 0; r < rows_; ++r) {
+      for (int p = 0; p < 3; ++p) {
+        for (int q = 0; q < 3; ++q) coupling_[3 * p + q] += v[3 * r + p] * load_[3 * r + q];
+      }
+    }
+    // What the other's force explains of what is left beside this one.
+    Lanes y[3], S[6];
+    for (int p = 0, k = 0; p < 3; ++p) {
+      const Lanes* c = coupling_ + 3 * p;
+      y[p] = g[p] - (c[0] * target_[0] + c[1] * target_[1] + c[2] * target_[2]);
+      for (int q = 0; q <= p; ++q, ++k) {
+        const Lanes* d = coupling_ + 3 * q;
+        S[k] = all_lanes(p == q ? 1.0 : 0.0) - (c[0] * d[0] + c[1] * d[1] + c[2] * d[2]);
+      }
+    }
+    const Lanes l10 = S[1] / S[0], l20 = S[3] / S[0];
+    const Lanes d1 = S[2] - l10 * S[1], t = S[4] - l20 * S[1], l21 = t / d1;
+    const Lanes d2 = S[5] - l20 * S[3] - l21 * t;
+    y[1] -= l10 * y[0];
+    y[2] -= l20 * y[0] + l21 * y[1];
+    const Lanes x0 = y[0] / S[0], x1 = y[1] / d1, x2 = y[2] / d2;
+    const Lanes cost = all_lanes(rest_) - (y[0] * x0 + y[1] * x1 + y[2] * x2) + others.beyond(block);
+    other_[2] = x2;
+    other_[1] = x1 - l21 * x2;
+    other_[0] = x0 - l10 * other_[1] - l20 * x2;
+    const Lanes least = smaller(smaller(S[0], d1), d2);
+    return least > all_lanes(kSingular) ? cost : all_lanes(std::numeric_limits<double>::infinity());
+  }
+
+  // The forces that do: this one's, then the other's (3 each).
+  void forces(const StartLanes& others, int block, Lanes* out) const {
+    Lanes own[3];
+    for (int q = 0; q < 3; ++q) {
+      own[q] = all_lanes(target_[q]);
+      for (int p = 0; p < 3; ++p) own[q] -= coupling_[3 * p + q] * other_[p];
+    }
+    turned(turn_, own, out);
+    turned(others.turn(block), other_, out + 3);
+  }
+
+  const double* normal() const { return normal_; }
+
+ private:
+  static constexpr double kSingular = 1e-13;
+
+  template <class T>
+  static void turned(const T* lower, const Lanes* x, Lanes* out) {
+    out[0] = lower[0] * x[0] + lower[1] * x[1] + lower[3] * x[2];
+    out[1] = lower[2] * x[1] + lower[4] * x[2];
+    out[2] = lower[5] * x[2];
+  }
+
+  int rows_;
+  double load_[3 * PairView::kRows], target_[3], turn_[6], normal_[3], rest_;
+  Lanes coupling_[9], other_[3];
+};
+
+}  // namespace touchline

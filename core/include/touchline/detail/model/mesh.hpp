@@ -1,0 +1,317 @@
+// SPDX-License-Identifier: Apache-2.0
+// The triangles of one link with a bounding volume hierarchy: every crossing of a line, the point
+// nearest to a line, the point nearest to a point. No allocation after construction.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <vector>
+
+#include "touchline/detail/model/spatial.hpp"
+
+namespace touchline {
+
+// A line in space; `direction` is a unit vector.
+struct ForceLine {
+  Vec3 origin, direction;
+  Vec3 at(double t) const { return origin + t * direction; }
+};
+
+// A crossing at `line.at(t)`: an entry where the outward normal stands against the direction.
+struct Crossing {
+  double t = 0.0;
+  int face = -1;
+  Vec3 normal;
+};
+
+struct SurfacePoint {
+  double distance = std::numeric_limits<double>::infinity();
+  int face = -1;
+  Vec3 point, normal;
+};
+
+struct Triangle {
+  Vec3 a, ab, ac, normal;
+  int face;  // index in the order given
+};
+
+class Mesh {
+ public:
+  Mesh(const std::vector<Vec3>& vertices, const std::vector<std::array<int, 3>>& faces) {
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+      const Vec3 a = vertices[faces[i][0]];
+      const Vec3 ab = vertices[faces[i][1]] - a, ac = vertices[faces[i][2]] - a;
+      const Vec3 n = cross(ab, ac);
+      const double length = norm(n);
+      if (length > 0.0) triangles_.push_back({a, ab, ac, (1.0 / length) * n, static_cast<int>(i)});
+    }
+    boxes_.reserve(triangles_.size() + 1);
+    if (!triangles_.empty()) build(0, static_cast<int>(triangles_.size()));
+  }
+
+  const std::vector<Triangle>& triangles() const { return triangles_; }
+  bool empty() const { return triangles_.empty(); }
+
+  // Calls `visit(Crossing)` for each crossing of the whole line, in no order. A line through an
+  // edge is reported by both triangles and never by none.
+  template <class Visit>
+  void crossings(const ForceLine& line, Visit&& visit) const {
+    const Vec3 inverse = invert(line.direction);
+    visit_triangles([&](const Box& box) { return crosses(box, line.origin, inverse); },
+                    [&](const Triangle& tri) {
+                      double t;
+                      if (crosses(tri, line, t)) visit(Crossing{t, tri.face, tri.normal});
+                    });
+  }
+
+  // The point of the surface nearest to the line, if nearer than `limit`.
+  SurfacePoint nearest_to_line(const ForceLine& line,
+                               double limit = std::numeric_limits<double>::infinity()) const {
+    return nearest(
+        limit,
+        [&](const Box& b) {
+          const Vec3 low = exact(b.low), high = exact(b.high);
+          const Vec3 centre = 0.5 * (low + high) - line.origin;
+          const Vec3 beside = centre - dot(centre, line.direction) * line.direction;
+          return norm(beside) - 0.5 * norm(high - low);
+        },
+        [&](const Triangle& tri, SurfacePoint& best) { nearer_to_line(tri, line, best); });
+  }
+
+  // Calls `visit(SurfacePoint)` for the point nearest to the line of each triangle that is nearer
+  // to it than `limit` and whose normal is `wanted(normal)`.
+  template <class Wanted, class Visit>
+  void around(const ForceLine& line, double limit, Wanted&& wanted, Visit&& visit) const {
+    const Vec3 inverse = invert(line.direction);
+    visit_triangles([&](const Box& box) { return crosses(box, line.origin, inverse, limit); },
+                    [&](const Triangle& tri) {
+                      if (!wanted(tri.normal)) return;
+                      SurfacePoint p;
+                      p.distance = limit;
+                      nearer_to_line(tri, line, p);
+                      if (p.face >= 0) visit(p);
+                    });
+  }
+
+  // The point of the surface nearest to `p`, if nearer than `limit`.
+  SurfacePoint nearest_to_point(const Vec3& p,
+                                double limit = std::numeric_limits<double>::infinity()) const {
+    return nearest(
+        limit,
+        [&](const Box& b) {
+          const Vec3 d{outside(p.x, b.low.x, b.high.x), outside(p.y, b.low.y, b.high.y),
+                       outside(p.z, b.low.z, b.high.z)};
+          return norm(d);
+        },
+        [&](const Triangle& tri, SurfacePoint& best) {
+          if (std::fabs(dot(tri.normal, p - tri.a)) < best.distance)
+            offer(tri, nearest_on(tri, p), p, best);
+        });
+  }
+
+ private:
+  static constexpr int kLeaf = 4, kDepth = 64;
+  static constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  static constexpr double kEdge = 1e-9;  // of barycentric coordinates: edges belong to both sides
+
+  struct Bounds {
+    Vec3 low, high;
+  };
+  struct Box {
+    BasicVec3<float> low, high;  // rounded outwards: half of the memory, where time goes
+    int next;   // a leaf's first triangle, or an inner box's second child (the first follows it)
+    int count;  // triangles of a leaf; 0: an inner box
+  };
+
+  int build(int begin, int end) {
+    const int index = static_cast<int>(boxes_.size());
+    boxes_.push_back({});
+    const Bounds exact = bounds(begin, end);
+    Box box{rounded(exact.low, -kInfinity), rounded(exact.high, kInfinity), begin, end - begin};
+    if (box.count > kLeaf) {
+      split(begin, end, exact);
+      boxes_[index] = box;
+      build(begin, (begin + end) / 2);
+      box.next = build((begin + end) / 2, end);
+      box.count = 0;
+    }
+    boxes_[index] = box;
+    return index;
+  }
+
+  // Calls `visit(Triangle)` for all in boxes that are `reached(Box)`, in no order.
+  template <class Reached, class Visit>
+  void visit_triangles(Reached&& reached, Visit&& visit) const {
+    if (empty()) return;
+    int stack[kDepth], size = 0;
+    stack[size++] = 0;
+    while (size > 0) {
+      const int index = stack[--size];
+      const Box& box = boxes_[index];
+      if (!reached(box)) continue;
+      if (box.count == 0) {
+        stack[size++] = index + 1;
+        stack[size++] = box.next;
+        continue;
+      }
+      for (int i = box.next; i < box.next + box.count; ++i) visit(triangles_[i]);
+    }
+  }
+
+  static BasicVec3<float> rounded(const Vec3& v, float towards) {
+    const auto round = [towards](double x) {
+      return std::nextafter(static_cast<float>(x), towards);
+    };
+    return {round(v.x), round(v.y), round(v.z)};
+  }
+  static Vec3 exact(const BasicVec3<float>& v) { return {v.x, v.y, v.z}; }
+
+  void split(int begin, int end, const Bounds& box) {
+    const Vec3 size = box.high - box.low;
+    const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    const auto centre = [axis](const Triangle& t) {
+      const Vec3 c = 3.0 * t.a + t.ab + t.ac;
+      return axis == 0 ? c.x : axis == 1 ? c.y : c.z;
+    };
+    std::nth_element(triangles_.begin() + begin, triangles_.begin() + (begin + end) / 2,
+                     triangles_.begin() + end, [&](const Triangle& s, const Triangle& t) {
+                       return centre(s) < centre(t);
+                     });
+  }
+
+  Bounds bounds(int begin, int end) const {
+    constexpr double inf = std::numeric_limits<double>::infinity();
+    Bounds box{{inf, inf, inf}, {-inf, -inf, -inf}};
+    for (int i = begin; i < end; ++i) {
+      const Triangle& t = triangles_[i];
+      for (const Vec3& p : {t.a, t.a + t.ab, t.a + t.ac}) {
+        box.low = {std::min(box.low.x, p.x), std::min(box.low.y, p.y), std::min(box.low.z, p.z)};
+        box.high = {std::max(box.high.x, p.x), std::max(box.high.y, p.y),
+                    std::max(box.high.z, p.z)};
+      }
+    }
+    const double pad = 1e-9 * (1.0 + norm(box.high - box.low));  // flat boxes, edge tolerance
+    box.low = box.low - Vec3{pad, pad, pad};
+    box.high = box.high + Vec3{pad, pad, pad};
+    return box;
+  }
+
+  static Vec3 invert(const Vec3& d) {
+    const auto inverse = [](double x) { return 1.0 / (std::fabs(x) > 1e-200 ? x : 1e-200); };
+    return {inverse(d.x), inverse(d.y), inverse(d.z)};
+  }
+
+  // Does the line through `o` cross the box, or one that is wider by `pad`?
+  static bool crosses(const Box& box, const Vec3& o, const Vec3& inverse, double pad = 0.0) {
+    const Vec3 wide{pad, pad, pad};
+    const Vec3 low = exact(box.low) - wide - o, high = exact(box.high) + wide - o;
+    const double x0 = low.x * inverse.x, x1 = high.x * inverse.x;
+    const double y0 = low.y * inverse.y, y1 = high.y * inverse.y;
+    const double z0 = low.z * inverse.z, z1 = high.z * inverse.z;
+    const double enter = std::max({std::min(x0, x1), std::min(y0, y1), std::min(z0, z1)});
+    const double leave = std::min({std::max(x0, x1), std::max(y0, y1), std::max(z0, z1)});
+    return enter <= leave;
+  }
+
+  static bool crosses(const Triangle& tri, const ForceLine& line, double& t) {
+    const Vec3 p = cross(line.direction, tri.ac);
+    const double det = dot(tri.ab, p);
+    if (det == 0.0) return false;
+    const Vec3 s = line.origin - tri.a;
+    const double u = dot(s, p) / det;
+    if (!(u >= -kEdge && u <= 1.0 + kEdge)) return false;
+    const Vec3 q = cross(s, tri.ab);
+    const double v = dot(line.direction, q) / det;
+    if (!(v >= -kEdge && u + v <= 1.0 + kEdge)) return false;
+    t = dot(tri.ac, q) / det;
+    return true;
+  }
+
+  template <class Bound, class Offer>
+  SurfacePoint nearest(double limit, Bound&& bound, Offer&& offer_triangle) const {
+    SurfacePoint best;
+    best.distance = limit;
+    if (empty()) return best;
+    struct Entry {
+      double bound;
+      int box;
+    } stack[kDepth];
+    int size = 0;
+    stack[size++] = {bound(boxes_[0]), 0};
+    while (size > 0) {
+      const Entry entry = stack[--size];
+      if (entry.bound >= best.distance) continue;
+      const Box& box = boxes_[entry.box];
+      if (box.count > 0) {
+        for (int i = box.next; i < box.next + box.count; ++i) offer_triangle(triangles_[i], best);
+        continue;
+      }
+      Entry near{bound(boxes_[entry.box + 1]), entry.box + 1}, far{bound(boxes_[box.next]), box.next};
+      if (near.bound > far.bound) std::swap(near, far);
+      stack[size++] = far;
+      stack[size++] = near;
+    }
+    return best;
+  }
+
+  static void offer(const Triangle& tri, const Vec3& point, const Vec3& target,
+                    SurfacePoint& best) {
+    const double distance = norm(point - target);
+    if (distance < best.distance) best = {distance, tri.face, point, tri.normal};
+  }
+
+  static double outside(double v, double low, double high) {
+    return v < low ? low - v : v > high ? v - high : 0.0;
+  }
+
+  // Beside the line, the nearest point of a triangle lies on an edge.
+  static void nearer_to_line(const Triangle& tri, const ForceLine& line, SurfacePoint& best) {
+    double t;
+    if (crosses(tri, line, t)) {
+      if (best.distance > 0.0) best = {0.0, tri.face, line.at(t), tri.normal};
+      return;
+    }
+    const Vec3 corners[3] = {tri.a, tri.a + tri.ab, tri.a + tri.ac};
+    for (int i = 0; i < 3; ++i) {
+      const Vec3 edge = corners[(i + 1) % 3] - corners[i];
+      const Vec3 e = edge - dot(edge, line.direction) * line.direction;
+      const Vec3 from = corners[i] - line.origin;
+      const Vec3 a = from - dot(from, line.direction) * line.direction;
+      const double length = dot(e, e);
+      const double s = length > 0.0 ? std::clamp(-dot(a, e) / length, 0.0, 1.0) : 0.0;
+      const double distance = norm(a + s * e);
+      if (distance < best.distance)
+        best = {distance, tri.face, corners[i] + s * edge, tri.normal};
+    }
+  }
+
+  // By the region of the plane that the point lies in (Ericson, Real-Time Collision Detection).
+  static Vec3 nearest_on(const Triangle& tri, const Vec3& p) {
+    const Vec3 ap = p - tri.a;
+    const double d1 = dot(tri.ab, ap), d2 = dot(tri.ac, ap);
+    if (d1 <= 0.0 && d2 <= 0.0) return tri.a;
+    const Vec3 bp = ap - tri.ab;
+    const double d3 = dot(tri.ab, bp), d4 = dot(tri.ac, bp);
+    if (d3 >= 0.0 && d4 <= d3) return tri.a + tri.ab;
+    const double vc = d1 * d4 - d3 * d2;
+    if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0) return tri.a + (d1 / (d1 - d3)) * tri.ab;
+    const Vec3 cp = ap - tri.ac;
+    const double d5 = dot(tri.ab, cp), d6 = dot(tri.ac, cp);
+    if (d6 >= 0.0 && d5 <= d6) return tri.a + tri.ac;
+    const double vb = d5 * d2 - d1 * d6;
+    if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0) return tri.a + (d2 / (d2 - d6)) * tri.ac;
+    const double va = d3 * d6 - d5 * d4;
+    if (va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0)
+      return tri.a + tri.ab + ((d4 - d3) / ((d4 - d3) + (d5 - d6))) * (tri.ac - tri.ab);
+    const double scale = 1.0 / (va + vb + vc);
+    return tri.a + (vb * scale) * tri.ab + (vc * scale) * tri.ac;
+  }
+
+  std::vector<Triangle> triangles_;
+  std::vector<Box> boxes_;
+};
+
+}  // namespace touchline

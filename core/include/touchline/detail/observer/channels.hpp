@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which balances and filters each joint, segment and sensor of a robot has, and the rules by which
+// a filter goes on, waits or begins anew where values were missing.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "touchline/detail/observer/balance.hpp"
+#include "touchline/detail/observer/filter.hpp"
+#include "touchline/detail/observer/layout.hpp"
+#include "touchline/detail/observer/signals.hpp"
+
+namespace touchline {
+
+// `segment` filters the momentum of each segment in world axes: no ghost contact in motion.
+// `paper` filters each residual in its own sensor frame and subtracts afterwards (18).
+enum class Method { segment, paper };
+
+class Channels {
+ public:
+  // The filter that a sensor's wrench is taken from where the segments do not tell it.
+  enum class SensorFilter { none, world, local };
+
+  Channels(const Layout& layout, const std::vector<JointRow>& joints,
+           const std::vector<SensorRow>& sensors, Method method, Discretization rule)
+      : filters(rule),
+        layout_(layout),
+        joints_(joints),
+        segments_(layout.segments.size()),
+        local_balances_(sensors.size(), 0),
+        sensor_filters_(sensors.size(), 0) {
+    for (const JointRow& joint : joints) balances.add(1, joint.measured());
+    for (const Segment& segment : layout.segments) balances.add(6, segment.sensor >= 0);
+    for (std::size_t s = 0; s < sensors.size(); ++s) balances.add(6, true);
+    for (int part = 0; part < 3; ++part) {
+      for (const JointRow& joint : joints) filters.add(1, joint.bandwidth);
+    }
+    for (const Segment& segment : layout.segments) {
+      const bool root = segment.sensor < 0;  // nothing is known of it: any bandwidth in use does
+      filters.add(6, root ? joints.at(0).bandwidth : sensors[segment.sensor].bandwidth);
+    }
+    for (std::size_t s = 0; s < sensors.size(); ++s) {
+      kinds_.push_back(choose(sensors, s, method));
+      if (kinds_[s] == SensorFilter::local) local_balances_[s] = balances.add(6, true);
+      if (kinds_[s] != SensorFilter::none)
+        sensor_filters_[s] = filters.add(6, sensors[s].bandwidth);
+    }
+  }
+
+  // Numbers of groups of balances.
+  std::size_t joint(std::size_t j) const { return j; }
+  std::size_t segment(std::size_t g) const { return joints_.size() + g; }
+  std::size_t sensor(std::size_t s) const { return joints_.size() + segments_ + s; }
+  std::size_t local(std::size_t s) const { return local_balances_[s]; }
+
+  // Numbers of groups of filters: all of a joint's external torque, without what the next sensors
+  // outboard see, without what the sensor inboard sees; then the wrenches.
+  std::size_t external(std::size_t j) const { return j; }
+  std::size_t own(std::size_t j) const { return joints_.size() + j; }
+  std::size_t parity(std::size_t j) const { return 2 * joints_.size() + j; }
+  std::size_t segment_filter(std::size_t g) const { return 3 * joints_.size() + g; }
+  SensorFilter kind(std::size_t s) const { return kinds_[s]; }
+  std::size_t sensor_filter(std::size_t s) const { return sensor_filters_[s]; }
+
+  // Enters which joints and sensors have values at this instant; returns whether a next sample
+  // with all values needs no books.
+  bool book(const std::vector<char>& joint_present, const std::vector<char>& sensor_present,
+            const Instant& now) {
+    bool regular = true;
+    for (std::size_t j = 0; j < joints_.size(); ++j)
+      regular &= balances.book(joint(j), joint_present[j] != 0, now);
+    for (std::size_t s = 0; s < kinds_.size(); ++s) {
+      const bool present = sensor_present[s] != 0;
+      regular &= balances.book(sensor(s), present, now);
+      if (kinds_[s] == SensorFilter::local) balances.book(local(s), present, now);
+    }
+    for (std::size_t g = 0; g < segments_; ++g) {
+      const Segment& segment = layout_.segments[g];
+      bool present = segment.sensor >= 0 && sensor_present[segment.sensor];
+      for (int t : segment.successors) present = present && sensor_present[t];
+      regular &= balances.book(this->segment(g), present, now);
+    }
+    return regular;
+  }
+
+  // After `book` and the balance: what each filter does with this sample.
+  void decide(const Instant& now) {
+    for (std::size_t j = 0; j < joints_.size(); ++j) decide_joint(j, now);
+    for (std::size_t g = 0; g < segments_; ++g) follow(segment_filter(g), segment(g), now);
+    for (std::size_t s = 0; s < kinds_.size(); ++s) {
+      if (kinds_[s] == SensorFilter::world) follow(sensor_filter(s), sensor(s), now);
+      if (kinds_[s] == SensorFilter::local) follow(sensor_filter(s), local(s), now);
+    }
+  }
+
+  Balances balances;
+  Filters filters;
+
+ private:
+  SensorFilter choose(const std::vector<SensorRow>& sensors, std::size_t s, Method method) const {
+    if (method == Method::paper || !sensors[s].six_axis()) return SensorFilter::local;
+    const Segment& segment = layout_.segments[layout_.segment_of_sensor[s]];
+    return segment.successors.empty() ? SensorFilter::none : SensorFilter::world;
+  }
+
+  void decide_joint(std::size_t j, const Instant& now) {
+    if (joints_[j].torque == Torque::from) {
+      const Action action = compare(external(j), nullptr, layout_.source_sensors[j], now);
+      if (action != Action::filter) *balances.e(joint(j)) = kNaN;
+      filters.act(own(j), Action::absent, now);
+      filters.act(parity(j), Action::absent, now);
+      return;
+    }
+    const Balances::Group& balance = balances.group(joint(j));
+    follow(external(j), joint(j), now);
+    compare(own(j), &balance, layout_.outboard_sensors[j], now);
+    if (layout_.inboard_sensors[j].empty()) {
+      filters.act(parity(j), Action::absent, now);
+    } else {
+      compare(parity(j), &balance, layout_.inboard_sensors[j], now);
+    }
+  }
+
+  // A filter of one balance begins anew where the balance did.
+  void follow(std::size_t filter, std::size_t balance, const Instant& now) {
+    const Balances::Group& group = balances.group(balance);
+    const Action action = !group.present ? Action::absent
+                          : group.fresh  ? Action::filter
+                                         : Action::restart;
+    filters.act(filter, action, now, group.regular ? kNaN : group.dt);
+  }
+
+  // Innovations of several balances are compared only where all of them span the interval from
+  // the sample before; a filter that had to wait for that too long begins anew.
+  Action compare(std::size_t filter, const Balances::Group* joint,
+                 const std::vector<Projection>& pairs, const Instant& now) {
+    bool present = joint == nullptr || joint->present;
+    bool fresh = joint == nullptr || joint->fresh;
+    bool regular = joint == nullptr || joint->regular;
+    for (const Projection& pair : pairs) {
+      const Balances::Group& group = balances.group(sensor(pair.sensor));
+      present = present && group.present;
+      regular = regular && group.regular;
+    }
+    fresh = fresh && now.in_reach(filters.group(filter).time);
+    const Action action = !present  ? Action::absent
+                          : !fresh  ? Action::restart
+                          : regular ? Action::filter
+                                    : Action::hold;
+    filters.act(filter, action, now);
+    return action;
+  }
+
+  const Layout& layout_;
+  const std::vector<JointRow>& joints_;
+  std::size_t segments_;
+  std::vector<std::size_t> local_balances_, sensor_filters_;
+  std::vector<SensorFilter> kinds_;
+};
+
+}  // namespace touchline

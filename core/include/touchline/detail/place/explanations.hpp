@@ -1,0 +1,325 @@
+// SPDX-License-Identifier: Apache-2.0
+// The explanations of one contact on a segment: all entries of the line of force action into all
+// its links, the nearest surface where the line misses, and sampled points, improved on the mesh,
+// where there is no line. No allocation per sample.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "touchline/detail/place/hypothesis.hpp"
+#include "touchline/detail/place/few_candidates.hpp"
+#include "touchline/detail/place/measurement.hpp"
+#include "touchline/detail/place/place_metric.hpp"
+#include "touchline/detail/place/refinement.hpp"
+#include "touchline/detail/place/view.hpp"
+
+namespace touchline {
+
+class Explanations {
+ public:
+  static constexpr double kWindow = 50.0;  // of chi2: beyond it an explanation weighs nothing
+
+  Explanations(const Observer& observer, const Posture& posture,
+               const LocalizerSettings& settings, std::vector<LinkSurface> surfaces)
+      : posture_(posture),
+        fitter_(settings),
+        surfaces_(observer, posture_, std::move(surfaces)),
+        refinement_(surfaces_, fitter_) {
+    std::size_t most = 0;
+    for (int g = 0; g < observer.row_layout().segments; ++g)
+      most = std::max(most, surfaces_.bodies(g).size());
+    views_.resize(most);
+    starts_.resize(observer.row_layout().segments);
+    for (std::vector<Start>& starts : starts_) starts.reserve(kMost);
+    candidates_.resize(kMost);
+  }
+
+  Explanations(const Explanations&) = delete;
+  Explanations& operator=(const Explanations&) = delete;
+
+  // Finds all that may explain segment g; `measurement` has read it. `mean(node)`: where a body was
+  // when it felt what the wrench speaks of, and `doubt`: what is not known of that.
+  // `again`: what was found by a search a moment ago serves once more.
+  template <class MeanOf>
+  void find(int g, MeanOf&& mean, const Doubt& doubt, Measurement& measurement, bool again) {
+    count_ = used_ = 0;
+    found_ = &starts_[g];
+    again_ = again;
+    if (!again) found_->clear();
+    best_ = std::numeric_limits<double>::infinity();
+    for (const Body& body : surfaces_.bodies(g)) {
+      View& view = views_[used_++];
+      view = View{};
+      view.node = body.node;
+      view.surfaces = &body.surfaces;
+      view.q = measurement.quadratic(body.node);
+      if (measurement.has_wrench()) {
+        const double* w = measurement.wrench();
+        view.allow_for_motion(posture_.pose(body.node), mean(body.node),
+                              norm(Vec3{w[0], w[1], w[2]}), doubt);
+      }
+      view.begin();
+    }
+    if (measurement.has_wrench()) {
+      std::sort(views_.begin(), views_.begin() + used_,
+                [](const View& a, const View& b) { return a.least < b.least; });
+    }
+    for (int i = 0; i < used_; ++i) {
+      View& view = views_[i];
+      if (!(view.least < best_ + kWindow)) continue;
+      if (view.line) view.find_line();
+      if (view.line && view.floor < best_ + kWindow) enter(view);
+    }
+    // What must be searched for costs more, so it comes last and only where it may matter.
+    for (int i = 0; i < used_; ++i) {
+      View& view = views_[i];
+      if (!(view.floor < best_ + kRelevant)) continue;
+      if (view.line) beside(view);
+      if (!measurement.has_wrench()) search(view);
+    }
+  }
+
+  int count() const { return count_; }
+  const Candidate* begin() const { return candidates_.data(); }
+  const Candidate* end() const { return candidates_.data() + count_; }
+  Candidate* begin() { return candidates_.data(); }
+  Candidate* end() { return candidates_.data() + count_; }
+  double best() const { return best_; }
+  // The bodies that were looked at.
+  int views() const { return used_; }
+  const View& view(int i) const { return views_[i]; }
+  const View& view(const Candidate& k) const { return views_[k.view]; }
+  const LinkSurfaces& surfaces() const { return surfaces_; }
+  const ForceFitter& fitter() const { return fitter_; }
+
+  // Calls `visit(surface, point, normal, t)` for each entry of a line into the links of segment g.
+  template <class Visit>
+  void entries(int g, const ForceLine& line, Visit&& visit) const {
+    for (const Body& body : surfaces_.bodies(g)) {
+      for (int s : body.surfaces) surfaces_.entries(s, line, visit);
+    }
+  }
+
+ private:
+  static constexpr int kMost = 192, kStarts = 3, kPassed = 4;
+  static constexpr double kRelevant = 25.0;  // of chi2: where a search is worth while
+  static constexpr double kRough = 150.0;    // of chi2: where a start may lead to something
+  static constexpr double kFew = 1e4;        // and as long as there are only few of them
+  static constexpr double kSpread = 0.04;    // of starts on one surface [m]
+  static constexpr double kFar = 0.15;       // from the line: not what it speaks of [m]
+  static constexpr double kGrazing = 4.0;  // cost of the cone beyond which a point is moved
+  static constexpr double kCoarse = 6e-3;  // joint torques alone tell no place better [m]
+  static constexpr double kSame = 5e-3;    // points nearer than this are one [m]
+  static constexpr double kFine = 1e-3;    // what a place is worth knowing to [m]
+  static constexpr double kSigmas = 4.0;   // of a place, within which faces are looked for
+  static constexpr double kApart = 0.015;  // faces farther apart are looked at for themselves [m]
+
+  // All entries of the line into the body.
+  void enter(View& view) {
+    const ForceLine line = view.later_line();
+    const int before = count_;
+    for (int s : *view.surfaces) {
+      surfaces_.entries(s, line, [&](int surface, const Vec3& point, const Vec3& normal, double) {
+        if (count_ == kMost) return;
+        Candidate& k = fresh(view, surface);
+        k.point = point;
+        k.normal = normal;
+        k.fit.force = view.wrench.linear;
+        fitter_.judge(view.q, view.earlier(point), normal, surfaces_[surface].graspable, k.fit);
+        view.steep = view.steep || k.fit.cone < kGrazing;
+        view.met = true;
+        if (!known(before, 1e-7)) keep();  // an edge is met twice
+      });
+    }
+  }
+
+  // What the line misses by no more than the noise may be touched as well as what it enters; and
+  // where it only grazes the body, better points are nearby.
+  void beside(View& view) {
+    const int found = count_, own = index(view);
+    const bool near = view.floor < best_ + kSigmas * kSigmas;
+    const bool passed = near && (again_ ? revisit(view, kFine, kApart) : pass(view));
+    for (int i = 0; near && !again_ && i < found; ++i) {  // what is entered now may be missed next
+      if (candidates_[i].view == own) remember(view, candidates_[i]);
+    }
+    if (!view.met && !passed) miss(view);
+    if (view.steep) return;
+    for (int i = 0; i < found && count_ < kMost; ++i) {
+      if (candidates_[i].view != own) continue;
+      candidates_[count_] = candidates_[i];
+      candidates_[i].fit.cone = std::numeric_limits<double>::infinity();  // replaced
+      refinement_.improve(view, candidates_[count_]);
+      if (!known(found, kSame)) keep();
+    }
+  }
+
+  Candidate& fresh(const View& view, int surface) {
+    Candidate& k = candidates_[count_];
+    k = Candidate{};
+    k.surface = surface;
+    k.view = index(view);
+    return k;
+  }
+
+  // The faces that the line passes within the noise and at no grazing angle, apart from its entries
+  // and from each other: the best point on each. Returns whether there are any.
+  bool pass(View& view) {
+    const ForceLine line = view.later_line();
+    const auto nearest = [&](const Vec3& p) {
+      return line.at(dot(p - line.origin, line.direction));
+    };
+    double G[9];
+    const Vec3 middle = view.earlier(nearest(posture_.pose(view.node).p));
+    if (!fitter_.place_metric(view.q, middle, view.wrench.linear, G)) return false;
+    Candidate starts[kPassed];
+    int found = 0;
+    const double limit = std::min(kFar, kSigmas * widest(G, line.direction));
+    for (int s : *view.surfaces) {
+      surfaces_.around(s, line, limit, fitter_.steepest(), [&](const SurfacePoint& p) {
+        Candidate k;
+        k.surface = s;
+        k.view = index(view);
+        k.point = p.point;
+        k.normal = p.normal;
+        k.fit.cone = fitter_.cone_cost(-dot(p.normal, line.direction));
+        k.fit.chi2 = view.floor + squared(G, p.point - nearest(p.point));
+        if (k.fit.cost() < best_ + kSigmas * kSigmas && !entered(k))
+          found = insert(starts, kPassed, found, k, kApart);
+      });
+    }
+    for (int i = 0; i < found && count_ < kMost; ++i) {
+      place(view, starts[i].surface, starts[i].point, starts[i].normal);
+      refinement_.improve(view, candidates_[count_], kFine, kApart);
+      remember(view, candidates_[count_]);
+      if (!known(0, kSame)) keep();
+    }
+    return found > 0;
+  }
+
+  // Starts from where the last search has ended, within `around` [m]. Returns whether it has found
+  // anything on this body.
+  bool revisit(View& view, double finest, double around) {
+    bool any = false;
+    for (const Start& start : *found_) {
+      if (surfaces_[start.surface].node != view.node || count_ == kMost) continue;
+      any = true;
+      place(view, start.surface, surfaces_.to_world(start.point, view.node),
+            surfaces_.turn_to_world(start.normal, view.node));
+      if (view.line && entered(candidates_[count_])) continue;
+      if (!(candidates_[count_].fit.cost() < best_ + kRough)) continue;
+      refinement_.improve(view, candidates_[count_], finest, around);
+      if (!known(0, kSame)) keep();
+    }
+    return any;
+  }
+
+  void remember(const View& view, const Candidate& k) {
+    if (found_->size() < kMost && k.fit.cost() < best_ + kRelevant)
+      found_->push_back({k.surface, surfaces_.to_node(k.point, view.node),
+                         surfaces_.turn_to_node(k.normal, view.node)});
+  }
+
+  // Is there an entry of the line nearby that explains as well?
+  bool entered(const Candidate& k) const {
+    for (int i = 0; i < count_; ++i) {
+      const Candidate& other = candidates_[i];
+      if (other.view == k.view && norm(other.point - k.point) < kApart &&
+          (other.fit.cone < kGrazing || other.fit.cost() < k.fit.cost()))
+        return true;
+    }
+    return false;
+  }
+
+  int index(const View& view) const { return static_cast<int>(&view - views_.data()); }
+
+  // Is the candidate at hand one of those from `first` on? Not one that is much worse: at a rim the
+  // line may graze the face beside the one that is pushed.
+  bool known(int first, double distance) const {
+    const Candidate& k = candidates_[count_];
+    for (int i = first; i < count_; ++i) {
+      const Candidate& other = candidates_[i];
+      if (other.surface == k.surface && norm(other.point - k.point) < distance &&
+          other.fit.cost() < k.fit.cost() + kGrazing)
+        return true;
+    }
+    return false;
+  }
+
+  void keep() {
+    const double cost = candidates_[count_].fit.cost();
+    if (!(cost < best_ + kWindow)) return;
+    best_ = std::min(best_, cost);
+    if (count_ < kMost) ++count_;
+  }
+
+  // The surface nearest to the line, and from there the best explanation nearby.
+  void miss(View& view) {
+    const ForceLine line = view.later_line();
+    for (int s : *view.surfaces) {
+      const SurfacePoint p = surfaces_.nearest(s, line, kFar);
+      if (p.face < 0 || count_ == kMost) continue;
+      // At an edge the normal is that of either side: what counts is the wrench alone.
+      if (fitter_.free_chi2(view.q, view.earlier(p.point)) > best_ + kRelevant) continue;
+      place(view, s, p.point, p.normal);
+      refinement_.improve(view, candidates_[count_]);
+      keep();
+    }
+  }
+
+  void place(const View& view, int surface, const Vec3& point, const Vec3& normal,
+             double limit = std::numeric_limits<double>::infinity()) {
+    Candidate& k = fresh(view, surface);
+    k.point = point;
+    k.normal = normal;
+    k.fit = fitter_.fit(view.q, view.earlier(k.point), k.normal, surfaces_[surface].graspable, limit);
+  }
+
+  // Without a line: the best of the points spread over each link, each improved.
+  void search(View& view) {
+    if (again_) {
+      revisit(view, kCoarse, 4.0 * kCoarse);
+      return;
+    }
+    for (int s : *view.surfaces) {
+      Candidate starts[kStarts];
+      int found = 0;
+      for (const SurfaceSample& sample : surfaces_.samples(s)) {
+        if (count_ == kMost) return;
+        const double limit =
+            std::max(best_ + kRough, found < kStarts ? kFew : worst(starts, found)->fit.cost());
+        place(view, s, surfaces_.to_world(sample.point, view.node),
+              surfaces_.turn_to_world(sample.normal, view.node), limit);
+        found = insert(starts, kStarts, found, candidates_[count_], kSpread);
+      }
+      for (int i = 0; i < found && count_ < kMost; ++i) {
+        Candidate& k = candidates_[count_] = starts[i];
+        if (!refinement_.descend(view, k) && k.fit.cost() < best_ + kRough)
+          refinement_.settle(view, k, kCoarse, 0.8 * kSpread);
+        remember(view, k);
+        if (!known(0, kSame)) keep();
+      }
+    }
+  }
+
+  const Posture& posture_;
+  ForceFitter fitter_;
+  LinkSurfaces surfaces_;
+  Refinement refinement_;
+  std::vector<View> views_;
+  std::vector<Candidate> candidates_;
+  // Where searches on each segment have ended, in the frames of the nodes.
+  struct Start {
+    int surface;
+    Vec3 point, normal;
+  };
+  std::vector<std::vector<Start>> starts_;
+  std::vector<Start>* found_ = nullptr;  // those of the segment at hand
+  bool again_ = false;
+  int used_ = 0, count_ = 0;
+  double best_ = 0.0;
+};
+
+}  // namespace touchline

@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: Apache-2.0
+// One contact explained: a point of a link's surface and a force in its friction cone, judged by
+// what the measurements say of the wrench that the two make.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "touchline/detail/model/dense.hpp"
+#include "touchline/detail/model/mesh.hpp"
+#include "touchline/detail/place/quadratic.hpp"
+
+namespace touchline {
+
+struct LocalizerSettings {
+  double friction = 0.8;          // coefficient of the friction cone
+  double cone_softness = 0.1;     // one sigma of the angle beyond the cone [rad]
+  double force_scale = 50.0;      // of contact forces, where they cannot be seen [N]
+  double place_scale = 0.1;       // of surfaces, where the place cannot be seen [m]
+  double pitch_limit = 4.0;       // sigmas beyond which one force does not explain a segment
+  double least_force = 0.3;       // below it no place is named [N]
+  double certain = 0.9;           // probability of a place that counts as located
+  double place_radius = 0.0225;   // explanations nearer than this are one place [m]
+  double finger = 0.03;           // free space that a push comes from [m]
+  bool first_entry = false;       // the paper's rule
+
+  // A place that is less sure than this is not located [m].
+  double spread_limit() const { return 4.0 * place_radius; }
+};
+
+struct Fit {
+  Vec3 force;
+  double chi2 = 0.0;    // of the measurements
+  double cone = 0.0;    // cost of a force beyond the friction cone, and of its size
+  double cosine = 0.0;  // between the push and the inward normal
+  double cost() const { return chi2 + cone; }
+};
+
+inline double component(const Vec3& v, int i) { return i == 0 ? v.x : i == 1 ? v.y : v.z; }
+
+inline void wrench_of(const Vec3& point, const Vec3& force, double* w) {
+  store(Spatial{force, cross(point, force)}, w);
+}
+
+// Two directions along a surface.
+inline void tangents(const Vec3& n, Vec3& s, Vec3& t) {
+  const Vec3 helper = std::fabs(n.x) < 0.6 ? Vec3{1.0, 0.0, 0.0} : Vec3{0.0, 1.0, 0.0};
+  s = cross(n, helper);
+  s = (1.0 / norm(s)) * s;
+  t = cross(n, s);
+}
+
+class ForceFitter {
+ public:
+  explicit ForceFitter(const LocalizerSettings& settings)
+      : settings_(settings), cone_(std::atan(settings.friction)) {}
+
+  // The force at `point` that explains best, in the friction cone of the outward `normal`, or, if
+  // it may be `grasped`, in any direction. Beyond a chi2 of `limit` nothing is worked out.
+  Fit fit(const Quadratic& q, const Vec3& point, const Vec3& normal, bool grasped,
+          double limit = std::numeric_limits<double>::infinity()) const {
+    double A[9], g[3];
+    reduce(q, point, A, g);
+    Fit free;
+    free.cone = std::numeric_limits<double>::infinity();
+    if (solve(A, g, free.force)) judge(q, point, normal, grasped, free);
+    if (grasped || free.cone < 1.0 || free.chi2 > limit) return free;
+    const Fit bound = on_cone(q, point, normal, A, g);
+    return bound.cost() < free.cost() ? bound : free;
+  }
+
+  // The misfit of the best force at `point`, in whatever direction.
+  double free_chi2(const Quadratic& q, const Vec3& point) const {
+    double A[9], g[3], w[6];
+    reduce(q, point, A, g);
+    Vec3 force;
+    if (!solve(A, g, force)) return std::numeric_limits<double>::infinity();
+    wrench_of(point, force, w);
+    return q(w);
+  }
+
+  // What is measured of the force at `point`, and assumed of its size:
+  // chi2(f) = constant - 2 g . f + f^T A f.
+  void force_terms(const Quadratic& q, const Vec3& point, double* A, double* g) const {
+    reduce(q, point, A, g);
+  }
+
+  // Fills chi2, cone and cosine of a force that is given.
+  void judge(const Quadratic& q, const Vec3& point, const Vec3& normal, bool grasped,
+             Fit& fit) const {
+    double w[6];
+    wrench_of(point, fit.force, w);
+    fit.chi2 = q(w);
+    const double size = norm(fit.force);
+    fit.cosine = size > 0.0 ? -dot(normal, fit.force) / size : 0.0;
+    fit.cone = grasped ? 0.0 : cone_cost(fit.cosine);
+    fit.cone += size * size / (settings_.force_scale * settings_.force_scale);
+  }
+
+  // Logarithm of how dense forces are, per volume: their directions, in the friction cone or all
+  // of them, and sizes are equally likely, but that people push near the normal.
+  double log_prior(const Fit& fit, bool grasped) const {
+    const double directions = grasped ? 2.0 : 1.0 - std::cos(cone_);
+    const double volume = directions * std::max(dot(fit.force, fit.force), 1.0);
+    if (grasped) return -std::log(volume);
+    const double beyond = std::max(0.0, std::acos(std::clamp(fit.cosine, -1.0, 1.0)) - kSlant);
+    return -std::log(volume) - 0.5 * beyond * beyond / (kSlantSigma * kSlantSigma);
+  }
+
+  // Cosine between push and inward normal, below which a face is not worth looking at.
+  double steepest() const { return std::cos(cone_ + 4.0 * settings_.cone_softness); }
+
+  double cone_cost(double cosine) const {
+    if (cosine <= 0.0) return std::numeric_limits<double>::infinity();
+    const double beyond = std::acos(std::min(1.0, cosine)) - cone_;
+    if (beyond <= 0.0) return 0.0;
+    return beyond * beyond / (settings_.cone_softness * settings_.cone_softness);
+  }
+
+  // What is known of a displacement of the point of a force, the force being free: chi2 grows by
+  // d^T G d. False where forces are not known.
+  bool place_metric(const Quadratic& q, const Vec3& point, const Vec3& force, double* G) const {
+    double D[6][6], H[36];
+    for (int c = 0; c < 3; ++c) {
+      wrench_of(point, unit(c), D[c]);
+      store(Spatial{{}, cross(unit(c), force)}, D[3 + c]);
+    }
+    for (int a = 0; a < 6; ++a) {
+      double L[6];
+      for (int r = 0; r < 6; ++r) {
+        L[r] = 0.0;
+        for (int i = 0; i < 6; ++i) L[r] += q.information[6 * r + i] * D[a][i];
+      }
+      for (int b = 0; b < 6; ++b) {
+        H[6 * a + b] = 0.0;
+        for (int r = 0; r < 6; ++r) H[6 * a + b] += D[b][r] * L[r];
+      }
+      if (a < 3) H[7 * a] += 1.0 / (settings_.force_scale * settings_.force_scale);
+    }
+    double F[9], x[3][3];
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        F[3 * i + j] = H[6 * i + j];
+        x[i][j] = H[6 * i + 3 + j];
+      }
+    }
+    if (!cholesky(F, 3)) return false;
+    for (int j = 0; j < 3; ++j) solve_lower(F, 3, &x[0][j], 3);
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        G[3 * i + j] = H[6 * (3 + i) + 3 + j];
+        for (int r = 0; r < 3; ++r) G[3 * i + j] -= x[r][i] * x[r][j];
+      }
+    }
+    return true;
+  }
+
+  // The information on force and on the two tangent coordinates of the point (5, 5), with what is
+  // assumed where nothing is measured; `gradient` (5): of -chi2 / 2.
+  void information(const Quadratic& q, const Vec3& point, const Vec3& normal, const Vec3& force,
+                   double* H, double* gradient) const {
+    double D[6][5], w[6], rest[6];
+    Vec3 along[2];
+    tangents(normal, along[0], along[1]);
+    for (int c = 0; c < 5; ++c) {
+      double column[6];
+      if (c < 3) {
+        wrench_of(point, unit(c), column);
+      } else {
+        store(Spatial{{}, cross(along[c - 3], force)}, column);
+      }
+      for (int r = 0; r < 6; ++r) D[r][c] = column[r];
+    }
+    wrench_of(point, force, w);
+    double LD[6][5];
+    for (int r = 0; r < 6; ++r) {
+      rest[r] = q.vector[r];
+      for (int k = 0; k < 6; ++k) rest[r] -= q.information[6 * r + k] * w[k];
+      for (int c = 0; c < 5; ++c) {
+        LD[r][c] = 0.0;
+        for (int k = 0; k < 6; ++k) LD[r][c] += q.information[6 * r + k] * D[k][c];
+      }
+    }
+    for (int a = 0; a < 5; ++a) {
+      gradient[a] = 0.0;
+      for (int r = 0; r < 6; ++r) gradient[a] += D[r][a] * rest[r];
+      for (int b = 0; b <= a; ++b) {
+        double sum = 0.0;
+        for (int r = 0; r < 6; ++r) sum += D[r][a] * LD[r][b];
+        H[5 * a + b] = H[5 * b + a] = sum;
+      }
+      const double scale = a < 3 ? settings_.force_scale : settings_.place_scale;
+      H[6 * a] += 1.0 / (scale * scale);
+    }
+  }
+
+  // Variance of the place of a contact, both directions along the surface together, by errors that
+  // have the part `lasting` (6, 6) of the information; `P` (5, 5) is the inverse of `information`.
+  static double place_variance(const double* lasting, const double* P, const Vec3& point,
+                               const Vec3& normal, const Vec3& force) {
+    Vec3 along[2];
+    tangents(normal, along[0], along[1]);
+    double sum = 0.0;
+    for (int c = 3; c < 5; ++c) {
+      const double* x = P + 5 * c;
+      const Vec3 df{x[0], x[1], x[2]}, way = x[3] * along[0] + x[4] * along[1];
+      double w[6];
+      store(Spatial{df, cross(point, df) + cross(way, force)}, w);
+      for (int a = 0; a < 6; ++a) {
+        for (int b = 0; b < 6; ++b) sum += w[a] * lasting[6 * a + b] * w[b];
+      }
+    }
+    return sum;
+  }
+
+ private:
+  static constexpr double kSlant = 0.3, kSlantSigma = 0.2;  // of pushes from the normal [rad]
+
+  static Vec3 unit(int i) { return {i == 0 ? 1.0 : 0.0, i == 1 ? 1.0 : 0.0, i == 2 ? 1.0 : 0.0}; }
+
+  // chi2(f) = constant - 2 g . f + f^T A f for a force at `point`, plus the force's prior.
+  void reduce(const Quadratic& q, const Vec3& point, double* A, double* g) const {
+    double J[3][6], LJ[3][6];
+    for (int c = 0; c < 3; ++c) {
+      wrench_of(point, unit(c), J[c]);
+      g[c] = 0.0;
+      for (int r = 0; r < 6; ++r) {
+        g[c] += J[c][r] * q.vector[r];
+        LJ[c][r] = 0.0;
+        for (int k = 0; k < 6; ++k) LJ[c][r] += q.information[6 * r + k] * J[c][k];
+      }
+    }
+    for (int a = 0; a < 3; ++a) {
+      for (int b = 0; b < 3; ++b) {
+        double sum = 0.0;
+        for (int r = 0; r < 6; ++r) sum += J[a][r] * LJ[b][r];
+        A[3 * a + b] = sum;
+      }
+      A[4 * a] += 1.0 / (settings_.force_scale * settings_.force_scale);
+    }
+  }
+
+  static bool solve(const double* A, const double* g, Vec3& force) {
+    double factor[9], f[3] = {g[0], g[1], g[2]};
+    std::copy(A, A + 9, factor);
+    if (!cholesky(factor, 3)) return false;
+    solve_cholesky(factor, 3, f);
+    force = {f[0], f[1], f[2]};
+    return true;
+  }
+
+  // The best force on the edge of the cone: for each direction the size follows in closed form.
+  Fit on_cone(const Quadratic& q, const Vec3& point, const Vec3& normal, const double* A,
+              const double* g) const {
+    Vec3 s, t;
+    tangents(normal, s, t);
+    double best = 0.0, at = 0.0;
+    Vec3 force;
+    const auto offer = [&](double angle) {
+      const Vec3 u = settings_.friction * (std::cos(angle) * s + std::sin(angle) * t) - normal;
+      const double x[3] = {u.x, u.y, u.z};
+      double along = 0.0, curve = 0.0;
+      for (int i = 0; i < 3; ++i) {
+        along += g[i] * x[i];
+        for (int j = 0; j < 3; ++j) curve += x[i] * A[3 * i + j] * x[j];
+      }
+      if (along <= 0.0 || along * along / curve <= best) return;
+      best = along * along / curve;
+      at = angle;
+      force = (along / curve) * u;
+    };
+    constexpr int kDirections = 8;
+    constexpr double kTurn = 6.283185307179586;
+    for (int i = 0; i < kDirections; ++i) offer(kTurn * i / kDirections);
+    for (double step = 0.5 * kTurn / kDirections; step > 0.05; step *= 0.5) {
+      const double middle = at;
+      offer(middle - step);
+      offer(middle + step);
+    }
+    Fit fit;
+    fit.force = force;
+    fit.cone = std::numeric_limits<double>::infinity();
+    if (best > 0.0) judge(q, point, normal, false, fit);
+    return fit;
+  }
+
+  const LocalizerSettings& settings_;
+  double cone_;
+};
+
+}  // namespace touchline

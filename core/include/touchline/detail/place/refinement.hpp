@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// Moves a candidate over its surface to where it explains best. No allocation.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "touchline/detail/model/dense.hpp"
+#include "touchline/detail/place/hypothesis.hpp"
+#include "touchline/detail/place/link_surfaces.hpp"
+#include "touchline/detail/place/view.hpp"
+
+namespace touchline {
+
+class Refinement {
+ public:
+  Refinement(const LinkSurfaces& surfaces, const ForceFitter& fitter)
+      : surfaces_(surfaces), fitter_(fitter) {}
+
+  // To the best place nearby, as exactly as `finest` [m]; where it does not go straight downhill,
+  // within about `around` [m].
+  void improve(const View& view, Candidate& k, double finest = 1e-3, double around = 0.064) const {
+    if (!descend(view, k)) settle(view, k, finest, around);
+  }
+
+  // Goes downhill by Gauss-Newton steps; returns whether that was all there was to do.
+  bool descend(const View& view, Candidate& k) const {
+    bool arrived = false;
+    for (int i = 0; i < 8 && !arrived; ++i) {
+      double H[25], g[5];
+      fitter_.information(view.q, view.earlier(k.point), k.normal, k.fit.force, H, g);
+      if (!cholesky(H, 5)) break;
+      solve_cholesky(H, 5, g);
+      Vec3 s, t;
+      tangents(k.normal, s, t);
+      Vec3 step = g[3] * s + g[4] * t;
+      const double length = norm(step);
+      if (length > 0.05) step = (0.05 / length) * step;
+      arrived = length < kArrived;
+      if (!arrived && !try_point(view, k, k.point + step)) break;
+    }
+    return arrived && k.fit.cone < 1.0;
+  }
+
+  // Where the friction cone or an edge stands in the way: smaller and smaller trials around, down
+  // to `finest` [m].
+  void settle(const View& view, Candidate& k, double finest, double around = 0.064) const {
+    for (double radius = 0.5 * around; radius > finest; radius *= 0.5) {
+      for (int round = 0; round < 3 && better_around(view, k, radius); ++round) {
+      }
+    }
+  }
+
+ private:
+  static constexpr double kArrived = 2e-4;  // length of a step [m]
+
+  bool better_around(const View& view, Candidate& k, double radius) const {
+    Vec3 s, t;
+    tangents(k.normal, s, t);
+    const Vec3 centre = k.point;
+    bool better = false;
+    constexpr double kHalf = 0.5, kSine = 0.8660254037844386;  // of 60 degrees
+    for (const double side : {1.0, -1.0}) {
+      for (const Vec3& way : {s, kHalf * s + kSine * t, kHalf * s - kSine * t})
+        better |= try_point(view, k, centre + (side * radius) * way);
+    }
+    return better;
+  }
+
+  bool try_point(const View& view, Candidate& k, const Vec3& target) const {
+    // The candidate is on the surface itself: nothing farther away than it is of interest.
+    const double limit = std::min(0.06, 1.000001 * norm(target - k.point));
+    const SurfacePoint p = surfaces_.nearest(k.surface, target, limit);
+    if (p.face < 0) return false;
+    const bool grasped = surfaces_[k.surface].graspable;
+    const Fit fit = fitter_.fit(view.q, view.earlier(p.point), p.normal, grasped);
+    if (!(fit.cost() < k.fit.cost() - 1e-6)) return false;
+    k.point = p.point;
+    k.normal = p.normal;
+    k.fit = fit;
+    return true;
+  }
+
+  const LinkSurfaces& surfaces_;
+  const ForceFitter& fitter_;
+};
+
+}  // namespace touchline

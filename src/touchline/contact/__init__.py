@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: Apache-2.0
-"""From residuals to contacts: detection, localization, reaction."""

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Is the arm touched: tests of residuals, thresholds, calibration."""

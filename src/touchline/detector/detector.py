@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Detection of contacts and collisions on the residuals, one sample or a recording at a time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.detector.residual_noise import native_noise
+from touchline.detector.thresholds import Thresholds, make_thresholds
+from touchline.native import core
+from touchline.observer.observer import Estimate, Observer
+
+Array = NDArray[np.float64]
+
+
+class Level(IntEnum):
+    """What a segment feels."""
+
+    NONE = 0
+    CONTACT = 1
+    COLLISION = 2
+
+
+@dataclass(frozen=True)
+class Detection:
+    """The detector's view of one sample, or of N samples (N in front).
+
+    Attributes:
+        levels: (m,) the `Level` of each segment.
+        normalized: (r,) each test's (residual - baseline) / contact threshold.
+        drift: (r,) one sigma of what the model's errors may have added to each residual since
+            its baseline, as the arm has moved on [N or Nm].
+        quiet: (m,) over how long the baseline of each segment has been averaged [s].
+    """
+
+    levels: Array
+    normalized: Array
+    drift: Array
+    quiet: Array
+
+    @staticmethod
+    def joined(samples: "Sequence[Detection]") -> "Detection":
+        """Single samples as N samples."""
+        return Detection(
+            np.array([sample.levels for sample in samples]),
+            np.array([sample.normalized for sample in samples]),
+            np.array([sample.drift for sample in samples]),
+            np.array([sample.quiet for sample in samples]),
+        )
+
+
+@dataclass(frozen=True)
+class Details:
+    """What the tests see of N samples, for those who set thresholds.
+
+    Attributes:
+        levels: (N, m) the `Level` of each segment.
+        statistics: (N, m, t) each test's statistic, in the order of `Thresholds.limits`.
+        residual: (N / every, r) residuals less their baseline [N or Nm]; NaN where not known.
+        slow: (N / every, r) the same, low-passed once more.
+        quick: (N / every, r) residuals less the mean of the last 0.2 s, low-passed once more.
+        noise: (N / every, r) the variance of these two by the noise of the signals.
+        activity: (N / every, 2) squared speed [rad2/s2], acceleration [rad/s2].
+    """
+
+    levels: Array
+    statistics: Array
+    residual: Array
+    slow: Array
+    quick: Array
+    noise: Array
+    activity: Array
+
+
+class Detector:
+    """Runs an observer and tests its residuals (see the native `detector.hpp`).
+
+    Args:
+        observer: the observer; feed samples to the detector, not to both.
+        thresholds: default: those of the robot's description.
+        period: time between samples [s], for thresholds that follow from the noise.
+    """
+
+    def __init__(
+        self, observer: Observer, thresholds: Thresholds | None = None, period: float = 1e-3
+    ) -> None:
+        self.observer = observer
+        self.thresholds = thresholds or make_thresholds(observer.robot, period)
+        detection = observer.robot.description.detection
+        times = core.DetectionTimes(
+            detection.min_duration, detection.hold, detection.baseline.time, detection.release
+        )
+        self._core = core.Detector(
+            observer.kernel,
+            [core.DetectionRow(**vars(row)) for row in self.thresholds.rows],
+            core.DetectionSettings(
+                [
+                    core.TestSetting(getattr(core.Test, method), limits.tolist())
+                    for method, limits in self.thresholds.limits.items()
+                ],
+                self.thresholds.sum_limit.tolist(),
+                times,
+                native_noise(observer.robot, period),
+                list(detection.windows),
+            ),
+        )
+
+    def update(self, time, q, qd, tau=None, wrench=None) -> tuple[Estimate, Detection]:
+        """One sample, arguments as for `Observer.update`."""
+        signals = self.observer.arrays((), q, qd, tau, wrench)
+        row, *judged = core.detect(self.observer.kernel, self._core, float(time), *signals)
+        return self.observer.estimate(row), Detection(*judged)
+
+    def run(self, time, q, qd, tau=None, wrench=None) -> tuple[Estimate, Detection]:
+        """N samples, arguments as for `Observer.run`."""
+        stamps = np.ascontiguousarray(time, dtype=float)
+        signals = self.observer.arrays(stamps.shape, q, qd, tau, wrench)
+        rows, *judged = core.detect_run(self.observer.kernel, self._core, stamps, *signals)
+        return self.observer.estimate(rows), Detection(*judged)
+
+    def details(self, time, q, qd, tau=None, wrench=None, every: int = 1) -> Details:
+        """N samples, for those who set thresholds: what the tests see."""
+        stamps = np.ascontiguousarray(time, dtype=float)
+        signals = self.observer.arrays(stamps.shape, q, qd, tau, wrench)
+        q, qd, tau, wrench = signals
+        found = core.detect_details(
+            self.observer.kernel, self._core, stamps, q, qd, tau, wrench, every
+        )
+        return Details(*found)

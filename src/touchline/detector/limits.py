@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Limits of a statistic for a false-alarm rate: from theory, and from the tail that was seen."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.model.description import DetectionDescription, TailDescription
+
+Array = NDArray[np.float64]
+
+CUSUM_SHIFT = 1.0  # as `kShift` in core/include/touchline/detail/detector/detection_row.hpp
+
+
+def threshold(tail: TailDescription, rate: float) -> float:
+    """What the tail's statistic exceeds `rate` times an hour; its beginning where that is more."""
+    excess = np.log(max(tail.per_hour / rate, 1.0))
+    if abs(tail.shape) > 1e-9:
+        excess = np.expm1(tail.shape * excess) / tail.shape
+    return float(tail.level + tail.scale * excess)
+
+
+def siegmund(run_length: float, shift: float) -> float:
+    """Threshold of a one-sided CUSUM on standard normal samples.
+
+    Args:
+        run_length: mean number of samples to a false alarm.
+        shift: of the mean that it is made for; half of it is taken off each sample.
+
+    The corrected diffusion approximation (Siegmund 1985): with b = h + 1.166 and k = shift / 2 the
+    run length is (exp(2 k b) - 2 k b - 1) / (2 k^2).
+    """
+    least, most = 0.0, (np.log1p(0.5 * shift**2 * run_length) + 10.0) / shift + 10.0
+    for _ in range(60):  # bisection: the run length grows with b
+        b = 0.5 * (least + most)
+        longer = np.expm1(shift * b) - shift * b > 0.5 * shift**2 * run_length
+        least, most = (least, b) if longer else (b, most)
+    return max(least - 1.166, 0.0)
+
+
+def theoretical(
+    method: str, counts: NDArray[np.int64], rate: float, period: float, d: DetectionDescription
+) -> Array:
+    """Limits (m,) if noise were all: every sample is taken for a test of its own."""
+    from scipy.special import chdtri, ndtri
+
+    if method == "rows":
+        return np.ones(len(counts))
+    alarm = min(rate * period / 3600.0, 0.1)
+    rows = np.maximum(counts, 1)
+    if method == "scaled":
+        return -ndtri(0.5 * alarm / rows)
+    if method == "cusum":
+        return np.array([siegmund(2 * n / alarm, CUSUM_SHIFT) for n in rows])
+    tests = len(d.windows) if method == "glrt" else 1
+    return np.sqrt(chdtri(rows, alarm / tests))
+
+
+def sum_limits(counts: NDArray[np.int64], sigmas: float) -> Array:
+    """Limits (m,) of the sum of squared rows, as rare as one row beyond `sigmas`."""
+    from scipy.special import chdtri, erfc
+
+    alarm = erfc(sigmas / np.sqrt(2))  # of one row: a normal variable beyond +-sigmas
+    return chdtri(np.maximum(counts, 1), alarm) / sigmas**2

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the arm is touched: link surfaces, places, candidates."""

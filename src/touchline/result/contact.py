@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What Touchline says of one contact."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.result.line import line_point
+
+Array = NDArray[np.float64]
+
+STATUSES = ("located", "ambiguous", "not_separable", "wrench_only")
+UNKNOWNS = 5  # of one contact
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One explanation of a contact: `position` (3,) [m] in world on `link`, of rigid `body`.
+
+    Where contacts cannot be told apart, it stands for the part of the link within `radius` [m].
+    """
+
+    link: str
+    body: str
+    probability: float
+    position: Array
+    radius: float = 0.0
+
+
+def least_contacts(status: str, unknowns: int | None) -> int | None:
+    """How many contacts there are at least, where an answer has a status and so many unknowns."""
+    if status in ("located", "ambiguous"):
+        return 1
+    return unknowns // UNKNOWNS if unknowns else None
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A contact on one segment at one instant; what is not known is None.
+
+    Attributes:
+        segment: name of the segment.
+        event: number of the event that it belongs to.
+        level: "contact" or "collision"; "contact" until the contrary is known.
+        status: "located", "ambiguous", "not_separable" or "wrench_only".
+        wrench: (6,) [N, Nm] on the segment, world axes, about the world origin; None on `root`.
+        link: the link that carries the point, and `body` the rigid body it belongs to.
+        body_probability: of that body, 0 to 1.
+        position: (3,) [m] in world.
+        force: (3,) [N] on the robot, world axes.
+        covariance: (3, 3) [m2] of the position.
+        candidates: other explanations, best first.
+        decided: whether the level is more than a default.
+        zone: "structure", "end_effector" or "handle"; None while that is open.
+        clamped: whether forces on two sides oppose each other; None where that is not known.
+        rate: at which the force grows [N/s].
+        rank: where no equation is left over, for one contact (joint torques alone) or for several
+            that begin together: how many independent ones there are, for the `unknowns` (two for
+            each place, three for each force). With fewer than unknowns no place is named.
+    """
+
+    segment: str
+    event: int
+    level: str
+    status: str = "wrench_only"
+    wrench: Array | None = None
+    link: str | None = None
+    body: str | None = None
+    body_probability: float | None = None
+    position: Array | None = None
+    force: Array | None = None
+    covariance: Array | None = None
+    candidates: tuple[Candidate, ...] = field(default=())
+    decided: bool = False
+    zone: str | None = None
+    clamped: bool | None = False
+    rate: float | None = None
+    rank: int | None = None
+    unknowns: int | None = None
+
+    @property
+    def at_least(self) -> int | None:
+        """How many pushes explain what is measured, at least; None where that is not known.
+
+        One where a place is named. Contacts that cannot be told apart are one `Contact`, for two
+        or, where no two explain, three at least.
+        """
+        return least_contacts(self.status, self.unknowns)
+
+    @property
+    def may_be_more(self) -> bool:
+        """Would one contact more explain as well?
+
+        So it is where no equation is left over. Then `candidates` hold all that may be touched if
+        there are just so many contacts as `at_least` says, and not of necessity if there are more.
+        """
+        return self.status == "not_separable" or self.rank is not None
+
+    @property
+    def size(self) -> float:
+        """Of the force, or of the segment's where the contact's own is not known [N]."""
+        force = self.force if self.wrench is None or self.force is not None else self.wrench[:3]
+        return 0.0 if force is None else float(np.linalg.norm(force))
+
+    @property
+    def line(self) -> tuple[Array, Array] | None:
+        """Line of force action in world: its point (3,) [m] nearest to the origin, unit vector.
+
+        None without a wrench or a force.
+        """
+        if self.wrench is None or not np.linalg.norm(self.wrench[:3]) > 0.0:
+            return None
+        return line_point(self.wrench), self.wrench[:3] / np.linalg.norm(self.wrench[:3])
+
+    @property
+    def moment(self) -> float | None:
+        """Of the wrench about its own line [Nm]: zero for one pure force; None without a line."""
+        line = self.line
+        return None if line is None or self.wrench is None else float(line[1] @ self.wrench[3:])
+
+    @property
+    def likely_link(self) -> str | None:
+        """The link, or the best candidate's where the place is not certain."""
+        if self.link is None and self.candidates:
+            return self.candidates[0].link
+        return self.link
+
+    @property
+    def position_std(self) -> float | None:
+        """Square root of the covariance's trace [m]."""
+        return None if self.covariance is None else float(np.sqrt(np.trace(self.covariance)))

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Events: from the sample at which a test fires to the one at which the contact is gone."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.result.contact import Candidate, least_contacts
+
+Array = NDArray[np.float64]
+
+
+FIRST = ("id", "segment", "level", "detected", "cleared")  # in `events.json`, for its readers
+
+
+@dataclass
+class EventAnswer:
+    """Where an event is, from all its strong samples; what is not known is None.
+
+    Attributes:
+        status: as of a `Contact`, over the event.
+        link: the link that carries the point, of the rigid `body`.
+        body_probability: of that body, 0 to 1.
+        position: (3,) [m] in world at `time_of_position`, from all strong samples.
+        position_link: (3,) [m] the same in the frame of `link`.
+        time_of_position: the last strong sample [s].
+        position_std: root of the trace of its covariance [m].
+        candidates: all explanations, best first, at `time_of_position`.
+    """
+
+    status: str = "wrench_only"
+    link: str | None = None
+    body: str | None = None
+    body_probability: float | None = None
+    position: Array | None = None
+    position_link: Array | None = None
+    time_of_position: float | None = None
+    position_std: float | None = None
+    candidates: tuple[Candidate, ...] = ()
+
+
+@dataclass(kw_only=True)
+class Event(EventAnswer):
+    """One contact from beginning to end; grows while it lasts.
+
+    Attributes, besides those of an `EventAnswer` (`status`, `link`, `position` ...):
+        id: number, from 0 in the order of detection.
+        segment: name of the segment.
+        level: "contact" or "collision": how it began, or a blow while it lasted.
+        detected: time at which the test fired [s], not the onset.
+        cleared: time at which it ended [s]; None while it lasts.
+        joint: the most distal loaded joint; None where no torque tells.
+        force: (3,) [N] in world, mean over the strong samples; None on `root`.
+        force_peak: largest force [N]; None on `root`.
+        torque_peak: largest external torque [Nm] on `joint`.
+        decided: when the level was decided [s]; None while it is a default.
+        zone: "structure", "end_effector" or "handle"; None while that is open.
+        clamped: whether forces on two sides opposed each other; None where that is not known.
+        rate: largest rate of the segment's force [N/s].
+        rank: where no equation is left over: independent ones at hand, for the `unknowns`.
+    """
+
+    id: int
+    segment: str
+    level: str
+    detected: float
+    cleared: float | None = None
+    joint: str | None = None
+    force: Array | None = None
+    force_peak: float | None = None
+    torque_peak: float | None = None
+    decided: float | None = None
+    zone: str | None = None
+    clamped: bool | None = False
+    rate: float | None = None
+    rank: int | None = None
+    unknowns: int | None = None
+
+    @property
+    def at_least(self) -> int | None:
+        """How many pushes explain what is measured, at least, as of a `touchline.Contact`."""
+        return least_contacts(self.status, self.unknowns)
+
+    def as_json(self) -> dict[str, Any]:
+        """The event as in `events.json`."""
+        known = vars(self)
+        return {key: _plain(known[key]) for key in (*FIRST, *known)}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return [float(x) for x in value]
+    if isinstance(value, tuple):
+        return [_plain(part) for part in value]
+    if isinstance(value, Candidate):
+        known = {key: _plain(part) for key, part in vars(value).items()}
+        return known if value.radius else {k: x for k, x in known.items() if k != "radius"}
+    return value
