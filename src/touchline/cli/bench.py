@@ -164,6 +164,25 @@ def detection(
     return 0
 
 
+def real(*, data: Directory = None) -> int:
+    """What holds on recordings of real arms of which nothing but the model is told.
+
+    Example: touchline bench real --data recordings
+
+    Args:
+        data: Folder with the recordings: panda_touches, panda_touches_more, panda_ur10_rosbag2,
+            kuka_lwr4, kinova_gen3; those that are missing are left out, all without a folder. The
+            models of the Panda and the UR10 come with the package example-robot-data.
+    """
+    from touchline.bench.real.run import main
+
+    if data is None:
+        print("Recordings of real arms: none, name their folder with --data")
+    else:
+        main(data)
+    return 0
+
+
 BENCHMARKS: dict[str, Callable[..., int]] = {
     "observer": observer,
     "localization": localization,
@@ -171,4 +190,5 @@ BENCHMARKS: dict[str, Callable[..., int]] = {
     "reaction": reaction,
     "wrench": wrench,
     "detection": detection,
+    "real": real,
 }

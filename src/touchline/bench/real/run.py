@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`touchline bench real`: real arms with the shortest of descriptions.
+
+Nothing is chosen on a recording that is judged: descriptions name the model, locked joints and the
+log's columns, all else is what a new robot starts with.
+"""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from touchline.bench.real.judged import (
+    Free,
+    Touched,
+    events_of,
+    judge_free,
+    judge_touched,
+)
+from touchline.bench.real.matching import MARGIN
+from touchline.bench.real.recordings import read_free, read_touched, touched_files
+from touchline.bench.tables import Row, aligned
+from touchline.errors import InputError
+
+TOUCHED_HEAD = (
+    "file",
+    "link",
+    "touches",
+    "found",
+    "false",
+    "right",
+    "beyond",
+    "in 90 % set",
+    "links in it",
+    "in first two",
+    "above 0.9",
+    "wrong",
+)
+FREE_HEAD = ("recording", "s", "in contact", "longest", "events", "to the end")
+
+
+def main(data: Path) -> None:
+    """Prints what holds on the recordings below `data`.
+
+    Raises:
+        InputError: there are none.
+    """
+    files = touched_files(data)
+    with TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        free = read_free(data.resolve(), folder)
+        if not files and not free:
+            raise InputError(f"{data}: holds neither panda_touches nor recordings of free motion")
+        if files:
+            print(_touched_text([_judged(path, folder) for path in files]))
+        if free:
+            print(_free_text([(r.name, judge_free(r, events_of(r))) for r in free]))
+
+
+def _judged(path: Path, folder: Path) -> tuple[str, int, Touched]:
+    recording = read_touched(path, folder)
+    return recording.name, recording.link, judge_touched(recording, events_of(recording))
+
+
+def _touched_text(judged: list[tuple[str, int, Touched]]) -> str:
+    total = Touched.sum(counts for _, _, counts in judged)
+    rows: list[Row] = [TOUCHED_HEAD]
+    rows += [_touched_row(name, str(link), counts) for name, link, counts in judged]
+    rows.append(_touched_row("all", "", total))
+    found = max(total.found, 1)
+    return "\n".join(
+        [
+            f"A real Panda touched by hand, one event to one touch (margin {MARGIN} s):",
+            aligned(rows),
+            f"found {_percent(total.found, total.touches)}; of these: right link "
+            f"{_percent(total.right, found)}, beyond the touched one "
+            f"{_percent(total.beyond, found)}, in the 90 % set {_percent(total.in_set, found)}; "
+            f"above 0.9 wrong {_percent(total.sure_wrong, max(total.sure, 1))}",
+            "",
+        ]
+    )
+
+
+def _touched_row(name: str, link: str, t: Touched) -> Row:
+    counts = (t.touches, t.found, t.false, t.right, t.beyond, t.in_set)
+    size = f"{t.links / t.found:.1f}" if t.found else "-"
+    return (
+        name,
+        link,
+        *(str(n) for n in counts),
+        size,
+        *(str(n) for n in (t.in_two, t.sure, t.sure_wrong)),
+    )
+
+
+def _free_text(judged: list[tuple[str, Free]]) -> str:
+    rows: list[Row] = [FREE_HEAD]
+    for name, f in judged:
+        rows.append(
+            (
+                name,
+                f"{f.seconds:.1f}",
+                f"{100 * f.share:.1f} %",
+                f"{f.longest:.2f} s",
+                str(f.events),
+                "yes" if f.open else "no",
+            )
+        )
+    return "\n".join(["Motion in which nothing touches:", aligned(rows)])
+
+
+def _percent(part: int, whole: int) -> str:
+    return f"{100 * part / whole:.1f} % ({part} of {whole})"

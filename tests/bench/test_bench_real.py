@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The benchmark on real recordings: one event to one touch, and what is counted."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from touchline.bench.real.judged import Touched, judge_free, judge_touched
+from touchline.bench.real.matching import match
+from touchline.bench.real.recordings import Recording
+from touchline.cli import main
+from touchline.model.robot import load_robot
+from touchline.observer.samples import Samples
+from touchline.result.contact import Candidate
+from touchline.result.event import Event
+
+
+def spans(*intervals):
+    return np.array(intervals, float).reshape(-1, 2)
+
+
+def test_an_event_over_all_touches_is_one_of_them():
+    assert len(match(spans((1, 2), (3, 4), (5, 6)), spans((0.5, np.inf)))) == 1
+
+
+def test_two_events_in_one_touch_are_one_found_and_one_false():
+    assert match(spans((1, 2)), spans((1.0, 1.3), (1.4, 2.1))) == [(0, 1)]
+
+
+def test_a_pairing_that_finds_more_is_taken():
+    pairs = match(spans((1, 2), (3, 4)), spans((1.5, 3.1), (1.0, 1.4)))
+    assert sorted(pairs) == [(0, 1), (1, 0)]
+
+
+def test_the_margin_counts_on_both_sides():
+    touch = spans((1, 2))
+    assert match(touch, spans((2.09, 2.2))) and match(touch, spans((0.5, 0.91)))
+    assert not match(touch, spans((2.11, 2.2))) and not match(touch, spans((0.5, 0.89)))
+
+
+intervals = st.lists(
+    st.tuples(st.floats(0, 20), st.floats(0.05, 3)).map(lambda x: (x[0], x[0] + x[1])), max_size=6
+)
+
+
+@settings(max_examples=100, deadline=None)
+@given(intervals, intervals)
+def test_no_event_and_no_touch_is_paired_twice(touches, events):
+    pairs = match(spans(*touches), spans(*events))
+    assert len({t for t, _ in pairs}) == len({e for _, e in pairs}) == len(pairs)
+    for t, e in pairs:
+        assert events[e][0] <= touches[t][1] + 0.1 and touches[t][0] - 0.1 <= events[e][1]
+
+
+def event(begin, end, **shares):
+    candidates = tuple(Candidate(name, name, share, np.zeros(3)) for name, share in shares.items())
+    return Event(
+        id=0, segment="root", level="contact", detected=begin, cleared=end, candidates=candidates
+    )
+
+
+def recording(touches, link=0):
+    time = np.arange(0.0, 10.0, 0.01)
+    nothing = np.zeros((len(time), 0))
+    samples = Samples(time, nothing, nothing, nothing, nothing)
+    return Recording("made", load_robot("sara"), samples, 0.01, touches, link)
+
+
+def test_links_are_counted_by_their_shares():
+    events = [
+        event(1.0, 1.5, link5=0.95, link4=0.05),  # right and sure
+        event(3.0, 3.5, link6=0.92, link5=0.08),  # beyond, sure and wrong, not in the set
+        event(5.0, 5.5, link4=0.6, link5=0.4),  # wrong, inboard, in the set of two
+        event(7.0, 7.5, link5=1.0),  # no touch
+        event(8.0, 8.5),  # found, but no link is named
+    ]
+    touches = spans((1, 1.5), (3, 3.5), (5, 5.5), (8, 8.5), (9, 9.5))
+    assert judge_touched(recording(touches, 5), events) == Touched(
+        touches=5,
+        found=4,
+        false=1,
+        right=1,
+        beyond=1,
+        in_set=2,
+        in_two=3,
+        sure=2,
+        sure_wrong=1,
+        links=4,
+    )
+
+
+def test_an_arm_that_nothing_touches():
+    free = judge_free(recording(spans()), [event(1.0, 2.0), event(9.0, None)])
+    assert free.share == pytest.approx(0.2, abs=0.01)
+    assert free.longest == pytest.approx(1.0, abs=0.02)
+    assert free.events == 2 and free.open
+    assert judge_free(recording(spans()), []).longest == 0.0
+
+
+def test_a_folder_without_recordings_is_told(tmp_path, capsys):
+    assert main(["bench", "real", "--data", str(tmp_path)]) == 2
+    assert "panda_touches" in capsys.readouterr().err
