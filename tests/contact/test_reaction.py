@@ -162,3 +162,25 @@ def test_a_joint_near_its_limit_is_braked_and_that_is_told(sara):
     acceleration = np.linalg.solve(state.inertia, torque - state.bias_torque)
     assert "position joint2" in told and "torque joint1" in told
     assert torque[1] < state.bias_torque[1] and np.isfinite(acceleration).all()
+
+
+@pytest.mark.parametrize("name", [*REACTIONS, "own:odd"])
+@settings(max_examples=20, deadline=None)
+@given(seed=seeds, silent=st.lists(st.integers(0, 6), max_size=7))
+def test_silent_sensors_leave_every_torque_finite(name, seed, silent):
+    """A dead sensor makes the wrench of its segment, and torques that need it, unknown."""
+    state = state_of(tl.load_robot("sara"), seed)
+    state.tau_ext[silent] = np.nan
+    contact = Contact(
+        "wrist", 0, "collision", "wrench_only", wrench=np.full(6, np.nan), decided=True
+    )
+    reactor = Reactor(
+        state.robot,
+        PolicyDescription(rules=[PolicyRule(name)]),
+        {"odd": lambda contact, state: np.full(7, np.nan)},
+    )
+    command = reactor.update([contact], state)
+    assert np.isfinite(command.torque).all()
+    assert (np.abs(command.torque) <= state.effort + 1e-9).all()
+    if name == "own:odd":
+        assert "no finite torque" in command.reason

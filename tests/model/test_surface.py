@@ -186,10 +186,48 @@ def test_one_unreadable_mesh_disables_only_its_link(tmp_path):
         <link name="c"/><joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>
         <joint name="k" type="fixed"><parent link="a"/><child link="c"/></joint></robot>"""
     )
-    surfaces, (warning,) = mechanism_surfaces(load_mechanism(path))
-    assert list(surfaces) == ["a"]
+    surfaces = mechanism_surfaces(load_mechanism(path))
+    assert list(surfaces.by_link) == ["a"]
+    (warning,) = surfaces.lost
     assert warning.startswith("link 'b': mesh '")
     assert warning.endswith("; no contact is located on it")
+
+
+def stl(vertices, faces) -> bytes:
+    """A binary STL of triangles."""
+    facets = [struct.pack("<12fH", 0, 0, 0, *vertices[f].ravel(), 0) for f in faces]
+    return bytes(80) + struct.pack("<I", len(faces)) + b"".join(facets)
+
+
+@pytest.mark.parametrize("factor", [1000.0, np.nan, np.inf, 1e38])
+def test_a_mesh_of_another_size_or_without_numbers_disables_its_link(tmp_path, factor):
+    vertices = TETRAHEDRON.copy()
+    vertices[1, 0] *= factor
+    (tmp_path / "odd.stl").write_bytes(stl(vertices, TETRAHEDRON_FACES))
+    path = tmp_path / "r.urdf"
+    box_of = '<collision><geometry><box size=".1 .1 .1"/></geometry></collision>'
+    odd = '<collision><geometry><mesh filename="odd.stl"/></geometry></collision>'
+    path.write_text(
+        f"""<robot name="r"><link name="a">{box_of}</link><link name="b">{odd}</link>
+        <joint name="j" type="fixed"><parent link="a"/><child link="b"/>
+        <origin xyz="0 0 1"/></joint></robot>"""
+    )
+    surfaces = mechanism_surfaces(load_mechanism(path))
+    (lost,) = surfaces.lost
+    assert list(surfaces.by_link) == ["a"]
+    assert lost.startswith("link 'b': ") and lost.endswith("; no contact is located on it")
+
+
+def test_a_robot_whose_surfaces_are_all_tiny_is_told(tmp_path):
+    path = tmp_path / "r.urdf"
+    shape = '<collision><geometry><box size="1e-4 1e-4 1e-4"/></geometry></collision>'
+    path.write_text(
+        f"""<robot name="r"><link name="a">{shape}</link><link name="b">{shape}</link>
+        <joint name="j" type="fixed"><parent link="a"/><child link="b"/>
+        <origin xyz="0 0 1"/></joint></robot>"""
+    )
+    (lost,) = mechanism_surfaces(load_mechanism(path)).lost
+    assert lost.startswith("the largest surface is 0.173 mm long, on a robot of 1 m")
 
 
 def test_real_arms(example_urdf):
@@ -197,9 +235,9 @@ def test_real_arms(example_urdf):
     pytest.importorskip("collada")
     mechanism = load_urdf(example_urdf)
     assert mechanism.warnings == ()
-    surfaces, _ = mechanism_surfaces(mechanism)
-    assert len(surfaces) >= 8
-    for surface in surfaces.values():
+    surfaces = mechanism_surfaces(mechanism)
+    assert len(surfaces.by_link) >= 8 and surfaces.lost == ()
+    for surface in surfaces.by_link.values():
         assert np.ptp(surface.vertices, axis=0).max() < 1.0  # metres, not millimetres
         assert volume(surface) > 0
         far = np.argmax(surface.vertices @ [1.0, 0, 0])

@@ -90,3 +90,19 @@ def test_missing_file_and_folder(tmp_path):
         read_yaml(tmp_path / "gone.yaml")
     with pytest.raises(InputError, match="cannot be read"):
         read_yaml(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a: " + "[" * 5000 + "]" * 5000,
+        "a: " + "{b: " * 5000 + "}" * 5000,
+        "a: " + "[" * 5000,
+        "- " * 5000 + "x",
+        "\n".join(" " * i + "a:" for i in range(1500)),
+    ],
+    ids=["lists", "mappings", "unclosed", "dashes", "indented"],
+)
+def test_what_is_nested_too_deeply_is_refused(tmp_path, text):
+    with pytest.raises(InputError, match=r"robot.yaml:\d+:\d+: more than 50 mappings and lists"):
+        read(tmp_path, text)

@@ -5,6 +5,7 @@ import numpy as np
 
 from touchline.check.findings import Findings
 from touchline.check.parity import parity_of
+from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
 from touchline.model.transforms import combine_inertias, move_inertia
 
@@ -26,6 +27,15 @@ def check_model(robot: Robot, findings: Findings) -> None:
     _parity(robot, findings)
     for warning in robot.warnings:
         findings.find(warning)
+    _surfaces(robot, findings)
+
+
+def _surfaces(robot: Robot, findings: Findings) -> None:
+    """Links on which no contact can be located, and surfaces that are odd."""
+    skin = Skin(robot)
+    for line in skin.lost:
+        findings.find(line)
+    findings.note("surfaces", *(f"  {line}" for line in skin.doubts))
 
 
 def outboard_nodes(robot: Robot, node: int) -> list[int]:

@@ -63,17 +63,19 @@ class Skin:
 
     Attributes:
         patches: one per link with a surface.
-        warnings: of surfaces that are doubtful or lost.
+        lost: a line for each surface that cannot be used.
+        doubts: a line for each that is odd but used.
     """
 
     def __init__(self, robot: Robot, kind: str = "collision") -> None:
         self.robot = robot
-        surfaces, self.warnings = mechanism_surfaces(robot.mechanism, kind)
+        surfaces = mechanism_surfaces(robot.mechanism, kind)
+        self.lost, self.doubts = surfaces.lost, surfaces.doubts
         names = set(robot.segment_names)
         bodies = {link: body for body in robot.bodies for link in body.links}
         self.patches = tuple(
             _patch(robot, link, surface, bodies[link].name, bodies[link].segment, names)
-            for link, surface in surfaces.items()
+            for link, surface in surfaces.by_link.items()
             if link in bodies
         )
 

@@ -11,6 +11,11 @@ from touchline.model.mechanism import Array, Geometry, Link, Mechanism
 from touchline.model.mesh_file import MeshError, Triangles, read_mesh
 from touchline.model.tessellation import tessellate
 
+# A mesh in millimetres that is read in metres is 1000 times too large; no link is longer than this
+# many times the whole robot, or than so many metres where the robot has no length of its own.
+LARGEST_SHARE, LARGEST = 10.0, 5.0
+SMALLEST_SHARE = 0.005  # of the robot's length, of the largest link
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -47,28 +52,76 @@ def link_surface(link: Link, kind: str = "collision") -> Surface | None:
         return None
 
 
-def mechanism_surfaces(
-    mechanism: Mechanism, kind: str = "collision"
-) -> tuple[dict[str, Surface], tuple[str, ...]]:
-    """Return the surface of each link that has one, and a warning for each doubtful or lost one."""
-    surfaces: dict[str, Surface] = {}
-    warnings: list[str] = []
+@dataclass(frozen=True)
+class Surfaces:
+    """The surfaces of a robot's links.
+
+    Attributes:
+        by_link: of each link that has one.
+        lost: a line for each surface that cannot be used; no contact is located there.
+        doubts: a line for each that is used although something is odd about it.
+    """
+
+    by_link: dict[str, Surface]
+    lost: tuple[str, ...]
+    doubts: tuple[str, ...]
+
+
+def mechanism_surfaces(mechanism: Mechanism, kind: str = "collision") -> Surfaces:
+    """Return the surface of each link that has one, and what is lost or doubtful."""
+    found: dict[str, Surface] = {}
+    lost: list[str] = []
+    doubts: list[str] = []
+    length = max(LARGEST_SHARE * chain_length(mechanism), LARGEST)
     for link in mechanism.links.values():
         try:
             surface = _surface(link, kind)
+            if surface is not None and (size := _size(surface)) > length:
+                raise MeshError(
+                    f"its surface is {size:.3g} m long, on a robot of "
+                    f"{chain_length(mechanism):.2g} m: a mesh in millimetres needs the scale 0.001"
+                )
         except MeshError as error:
-            warnings.append(f"link '{link.name}': {error}; no contact is located on it")
+            if not any(shape.problem for shape in _shapes(link, kind)):  # else the reader told it
+                lost.append(f"link '{link.name}': {error}; no contact is located on it")
             continue
         if surface is not None:
-            surfaces[link.name] = surface
-            warnings += [f"link '{link.name}': {line}" for line in surface.warnings]
-    return surfaces, tuple(warnings)
+            found[link.name] = surface
+            doubts += [f"link '{link.name}': {line}" for line in surface.warnings]
+    largest = max((_size(surface) for surface in found.values()), default=np.inf)
+    if largest < SMALLEST_SHARE * chain_length(mechanism):
+        lost.append(
+            f"the largest surface is {1e3 * largest:.3g} mm long, on a robot of "
+            f"{chain_length(mechanism):.2g} m: no place on it can be right; is the scale of the "
+            "meshes 0.001 too small?"
+        )
+    return Surfaces(found, tuple(lost), tuple(doubts))
+
+
+def chain_length(mechanism: Mechanism) -> float:
+    """Return the length of the longest chain of joints, from origin to origin [m]."""
+    length = {mechanism.root: 0.0}
+    waiting = list(mechanism.joints.values())
+    while waiting:
+        ready = [joint for joint in waiting if joint.parent in length]
+        for joint in ready:
+            step = float(np.linalg.norm(joint.T_parent_joint[:3, 3]))
+            length[joint.child] = length[joint.parent] + step
+        waiting = [joint for joint in waiting if joint.parent not in length]
+        if not ready:
+            break
+    return max(length.values())
+
+
+def _size(surface: Surface) -> float:
+    """Return the diagonal of the box around a surface [m]."""
+    return float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
 
 
 def _surface(link: Link, kind: str) -> Surface | None:
     if kind not in ("collision", "visual"):
         raise ValueError(f"kind '{kind}' is not allowed; allowed: collision, visual")
-    shapes = getattr(link, kind) or link.collision or link.visual
+    shapes = _shapes(link, kind)
     parts, warnings, offset = [], [], 0
     for shape in shapes:
         vertices, faces, doubts = _shape_triangles(shape)
@@ -80,6 +133,10 @@ def _surface(link: Link, kind: str) -> Surface | None:
     vertices, faces = (np.vstack(part) for part in zip(*parts, strict=True))
     normals, areas = _normals(vertices, faces)
     return Surface(vertices, faces, normals, areas, not warnings, tuple(warnings))
+
+
+def _shapes(link: Link, kind: str) -> tuple[Geometry, ...]:
+    return getattr(link, kind) or link.collision or link.visual
 
 
 def _shape_triangles(shape: Geometry) -> tuple[Array, NDArray[np.int64], list[str]]:

@@ -14,6 +14,7 @@ import yaml
 from touchline.errors import InputError
 
 MAP_TAG = "tag:yaml.org,2002:map"
+DEEPEST = 50  # mappings and lists within each other; a description has five
 
 
 class Yaml12Loader(yaml.SafeLoader):
@@ -61,11 +62,12 @@ def read_yaml(path: Path) -> dict[Any, Any]:
     """Read a YAML file whose top level is a mapping.
 
     Raises:
-        InputError: the file is missing, is no YAML (with line and column), repeats a key, or
-            holds no mapping.
+        InputError: the file is missing, is no YAML (with line and column), repeats a key, holds
+            no mapping, or is nested too deeply.
     """
     text = read_text(path)
     try:
+        _check_depth(text, path)
         loader = Yaml12Loader(text)
         node = loader.get_single_node()
         if node is None:
@@ -79,6 +81,22 @@ def read_yaml(path: Path) -> dict[Any, Any]:
     if not isinstance(data, dict):
         raise InputError(f"{path}: the file holds {kind_of(data)}, not a mapping of keys")
     return data
+
+
+def _check_depth(text: str, path: Path) -> None:
+    """Refuse what the readers, which call themselves for each level, could not get through."""
+    depth = 0
+    for event in yaml.parse(text, Loader=Yaml12Loader):
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+        if depth > DEEPEST:
+            mark = event.start_mark
+            raise InputError(
+                f"{path}:{mark.line + 1}:{mark.column + 1}: more than {DEEPEST} mappings and lists "
+                "stand within each other"
+            )
 
 
 def read_text(path: Path) -> str:

@@ -182,7 +182,7 @@ def _place(contact: Contact, guess: bool) -> tuple[str, Array, Array] | None:
     None as well where the force is not most of what the segment feels: a blow beside a contact that
     was there before is felt some time before its own place is known.
     """
-    whole = None if contact.wrench is None else contact.wrench[:3]
+    whole = known_force(contact)
     force = whole if contact.force is None else contact.force
     if force is None or not np.any(force):
         return None
@@ -193,12 +193,26 @@ def _place(contact: Contact, guess: bool) -> tuple[str, Array, Array] | None:
     return None if best is None else (best.link, best.position, force)
 
 
+def known_force(contact: Contact) -> Array | None:
+    """The force (3,) on the contact's segment [N]; None where a sensor that it needs is silent."""
+    if contact.wrench is None or not np.isfinite(contact.wrench[:3]).all():
+        return None
+    return contact.wrench[:3]
+
+
+def brake(state: State) -> Array:
+    """Torques (n,) that take the velocity out as fast as the limits allow; needs no contact."""
+    return state.bias_torque + within_effort(state, -state.inertia @ state.qd / SERVO_TIME)
+
+
 def _yielding(contact: Contact, state: State) -> tuple[Array, Array] | None:
     """Without a place: along the external joint torques, which are J^T f themselves."""
     if state.tau_ext is None:
         return None
-    force = contact.size if contact.wrench is None else float(np.linalg.norm(contact.wrench[:3]))
-    lever = np.nan_to_num(state.tau_ext) / max(force, 1.0)
+    whole = known_force(contact)
+    force = contact.force if whole is None else whole
+    size = 0.0 if force is None else float(np.linalg.norm(force))
+    lever = np.nan_to_num(state.tau_ext) / max(size, 1.0)
     if np.linalg.norm(lever) < LEAST_LEVER:
         return None
     return lever, _least_energy(state, lever)

@@ -16,6 +16,7 @@ from touchline.reaction.reaction import (
     SERVO_TIME,
     Reaction,
     Retract,
+    brake,
     settled,
     within_effort,
 )
@@ -207,9 +208,12 @@ class Reactor:
             self._active = replace(active, since=since)
             state = replace(state, since=since)
         reaction = self._reactions[active.choice.reaction]
-        torque, clipped = limited(reaction(active.contact, state), state)
-        choice = active.choice
-        return Command(torque, choice.reaction, active.contact, choice.reason, clipped)
+        choice, torque = active.choice, reaction(active.contact, state)
+        reason = choice.reason
+        if not np.isfinite(torque).all():
+            torque, reason = brake(state), f"{choice.reaction} gave no finite torque: brakes"
+        torque, clipped = limited(torque, state)
+        return Command(torque, choice.reaction, active.contact, reason, clipped)
 
 
 def _taken_on(active: _Active | None, choice: Choice, contact: Contact, state: State) -> _Active:

@@ -114,7 +114,7 @@ def analyze(
         for part in _with_progress(recording, chain([first], parts)):
             run.add(part)
         warnings = bandwidth_warnings(bandwidths(model, bandwidth), run.period)
-        warnings += [*recording.warnings, *model.warnings]
+        warnings += [*recording.warnings, *model.warnings, *run.pipeline.localizer.skin.lost]
     analysis = run.finish(log, method, bandwidth, warnings)
     write_origin(out / ANALYSIS, log, robot, _origin(analysis))
     if report:

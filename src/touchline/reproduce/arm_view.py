@@ -36,7 +36,7 @@ class ArmView:
     _surfaces: dict[str, Any] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        surfaces, _ = mechanism_surfaces(self.robot.mechanism, "visual")
+        surfaces = mechanism_surfaces(self.robot.mechanism, "visual").by_link
         object.__setattr__(self, "_surfaces", surfaces)
 
     @property

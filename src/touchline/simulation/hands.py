@@ -17,7 +17,7 @@ EASY, FASTEST = 0.7, 1.2  # m/s: a hand follows so fast with its full force, and
 FELT = 1.0  # N; a contact begins with that much
 
 
-@dataclass
+@dataclass(eq=False)  # each hand is one of its own, whatever it does
 class Hand:
     """One push or pull.
 
@@ -89,10 +89,14 @@ class Hands(Forces):
 
     def add(self, hand: Hand) -> None:
         """Puts a hand on the robot; where there is no room the oldest has to go."""
-        if None not in self.slots:
-            gone = [h for h in self.slots if h is not None and h.released] or self.active()
-            self.slots[self.slots.index(gone[0])] = None
-        self.slots[self.slots.index(None)] = hand
+        self.slots[self._slot_for_another()] = hand
+
+    def _slot_for_another(self) -> int:
+        """An empty slot, else that of a hand on its way off, else that of the oldest."""
+        if None in self.slots:
+            return self.slots.index(None)
+        leaving = [hand for hand in self.slots if hand is not None and hand.released]
+        return self.slots.index((leaving or self.active())[0])
 
     def release_all(self) -> None:
         """Takes all hands away."""

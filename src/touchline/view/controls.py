@@ -34,6 +34,7 @@ class Controls:
         self, gui: viser.GuiApi, push: Callable[[], None], release: Callable[[], None]
     ) -> None:
         gui.add_markdown(ADVICE)
+        self.notice = gui.add_html("")
         self.readout = gui.add_html("")
         gui.add_html(LEGEND)
         self._force = gui.add_slider("Force [N]", 5.0, 60.0, 1.0, 25.0, hint="Of the next push.")

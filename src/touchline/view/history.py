@@ -22,6 +22,11 @@ class History:
     def __init__(self, segments: tuple[str, ...]) -> None:
         self.segments = segments
         self._rows: deque[tuple[float, Array]] = deque()
+        self.clear()
+
+    def clear(self) -> None:
+        """Forgets all; time may begin anew."""
+        self._rows.clear()
         self._next = -np.inf
 
     def add(self, time: Array, segments: tuple[str, ...], wrench: Array) -> None:

@@ -2,10 +2,13 @@
 """The live page: the simulated arm, what touches it and what it feels, in real time."""
 
 import queue
+import sys
 import threading
 import time
+import traceback
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from html import escape
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +35,8 @@ READOUT, PLOTS = 0.2, 0.25  # s between two of them
 LATEST = 0.2  # s by which the simulation may be late before it gives up catching up
 REACTION_ROWS = 4  # samples after which the arm may react
 SMOOTHING = 0.05  # weight of a frame in the mean speed
+NOTICE = 20.0  # s for which the page shows why the arm began anew
+RESTART_PAUSE = 0.5  # s; a fault that comes back at once must not fill the processor
 
 
 class LivePage:
@@ -45,12 +50,14 @@ class LivePage:
         arm: that is simulated.
         verdicts: of the last frame.
         felt: in the last frame.
+        restarts: how often a frame failed and the arm began anew.
     """
 
     def __init__(self, server: PageServer, seed: int = 1) -> None:
         # The sensors of `sara`, and a torque sensor in every joint for the methods that need one.
         self._sara, self._full = load_robot("sara"), load_robot("sara-full")
         self._skin = Skin(self._sara)
+        self._seed, self.restarts = seed, 0
         self.arm = LiveArm(self._full, self._skin, seed)
         self._todo: queue.SimpleQueue[Callable[[], object]] = queue.SimpleQueue()
         self._pulls: dict[int, Hand] = {}
@@ -73,6 +80,7 @@ class LivePage:
         self.verdicts: list[Verdict] = []
         self._speed = Speed()
         self._due = {READOUT: 0.0, PLOTS: 0.0}
+        self._notice_ends = np.inf
         self._stopping = threading.Event()
         self._watched = threading.Event()
         self._page.on_client_connect(lambda _: self._watched.set())
@@ -121,15 +129,44 @@ class LivePage:
             if rows >= 2:
                 self._measure(rows / RATE, now - last)
                 last = now if now - last > LATEST else last + rows / RATE
-                self.frame(rows)
+                self.frame_or_restart(rows)
             self._stopping.wait(max(0.0, FRAME - (time.monotonic() - now)))
 
     def _measure(self, simulated: float, real: float) -> None:
         share = self._speed.real_time + SMOOTHING * (simulated / real - self._speed.real_time)
         self._speed = Speed(self._speed.step, share)
 
+    def frame_or_restart(self, rows: int) -> None:
+        """A frame; if it fails, the page says so and the arm begins anew."""
+        try:
+            self.frame(rows)
+        except Exception as error:  # whatever it is, the page goes on
+            traceback.print_exc(file=sys.stderr)
+            self._restart(error)
+            self._stopping.wait(RESTART_PAUSE)
+        if time.monotonic() > self._notice_ends:
+            self._controls.notice.content, self._notice_ends = "", np.inf
+
+    def _restart(self, error: Exception) -> None:
+        """A new arm with its method, and a notice of what ended the old one."""
+        self.restarts += 1
+        while not self._todo.empty():
+            self._todo.get()
+        self._pulls.clear()
+        self._history.clear()
+        self.felt, self.verdicts = None, []
+        self.arm = LiveArm(self._full, self._skin, self._seed + self.restarts)
+        self._method = _Chosen(self._sara, self._full, self._skin)
+        self._judge = Judge(self._sara)
+        self._controls.notice.content = notice(error)
+        self._notice_ends = time.monotonic() + NOTICE
+
     def frame(self, rows: int) -> None:
-        """Simulates `rows` samples and shows what came of them."""
+        """Simulates `rows` samples and shows what came of them.
+
+        Raises:
+            FloatingPointError: the simulated arm is nowhere.
+        """
         while not self._todo.empty():
             self._todo.get()()
         conditions = self._controls.conditions()
@@ -145,6 +182,8 @@ class LivePage:
         """Simulates and feels; returns the last joint positions and true contacts."""
         method = self._method.get(self._controls.method)
         samples, truth = self.arm.advance(rows)
+        if not np.isfinite(samples.q).all():
+            raise FloatingPointError("the simulated arm's joint positions are not finite")
         began = time.perf_counter()
         felt = self.felt = method.take(samples)
         step = (time.perf_counter() - began) / rows
@@ -172,6 +211,15 @@ class LivePage:
             return False
         self._due[pause] = now + pause
         return True
+
+
+def notice(error: Exception) -> str:
+    """HTML that says why the arm begins anew."""
+    what = escape(f"{type(error).__name__}: {error}"[:200])
+    return (
+        '<div role="alert" style="font-size:12px;padding:0 0.75em;color:#b00020">'
+        f"The simulation failed and the arm was started again. {what}</div>"
+    )
 
 
 class _Chosen:

@@ -17,6 +17,7 @@ import websockets.asyncio.server
 from websockets.http11 import Request, Response
 
 from touchline.errors import InputError
+from touchline.view.gate import Gate, gated
 from touchline.view.guard import LOCAL_NAMES, Guard, is_local
 
 HOST, PORT = "127.0.0.1", 8080
@@ -95,11 +96,15 @@ def _guarded(guard: Guard, label: str, host: str, port: int) -> viser.ViserServe
     does. Without the guard in place there is no server.
     """
     serve, installed = websockets.asyncio.server.serve, []
+    gates: list[Gate] = []
+
+    def admits(message: bytes | str) -> bool:
+        return all(gate.admits(message) for gate in gates)
 
     def serve_guarded(handler: Any, *args: Any, process_request: Any, **options: Any) -> Any:
         installed.append(True)
         answer = _answering(guard, process_request)
-        return serve(handler, *args, process_request=answer, **options)
+        return serve(gated(handler, admits), *args, process_request=answer, **options)
 
     quiet = contextlib.redirect_stdout(io.StringIO())  # viser prints its own address
     with mock.patch.object(websockets.asyncio.server, "serve", serve_guarded), quiet:
@@ -107,6 +112,7 @@ def _guarded(guard: Guard, label: str, host: str, port: int) -> viser.ViserServe
     if not installed:
         page.stop()
         raise RuntimeError(f"viser {viser.__version__} cannot be guarded")
+    gates.append(Gate(page))
     page.request_share_url = _no_sharing  # a visitor's message would open a tunnel to elsewhere
     page.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
     return page
