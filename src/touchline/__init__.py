@@ -8,6 +8,8 @@ pipeline = tl.Pipeline(robot)
 result = pipeline.update(time, q, qd, tau, wrench)
 """
 
+from typing import TYPE_CHECKING, Any
+
 from touchline.detector.detector import Level
 from touchline.errors import InputError
 from touchline.health import Health
@@ -16,6 +18,9 @@ from touchline.observer.observer import Estimate, Observer
 from touchline.pipeline.pipeline import Pipeline, Result
 from touchline.result.contact import Candidate, Contact
 from touchline.result.event import Event
+
+if TYPE_CHECKING:
+    from touchline import live as live
 
 __version__ = "0.1.0"
 
@@ -33,3 +38,12 @@ __all__ = [
     "Robot",
     "load_robot",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Running robots are loaded when they are asked for."""
+    if name == "live":
+        from importlib import import_module
+
+        return import_module("touchline.live")
+    raise AttributeError(f"module 'touchline' has no attribute '{name}'")

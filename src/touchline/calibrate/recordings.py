@@ -9,9 +9,9 @@ import numpy as np
 from touchline.detector.thresholds import PERIOD_RATIO
 from touchline.errors import InputError
 from touchline.logs import open_log
+from touchline.logs.period import typical_period
 from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
-from touchline.report.analysis import typical_period
 
 CHUNK = 1 << 15  # samples
 LEAST_SECONDS = 20.0  # shorter ones have no tail

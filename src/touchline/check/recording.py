@@ -14,8 +14,8 @@ from touchline.check.wrenches import check_wrenches
 from touchline.detector.thresholds import make_thresholds
 from touchline.errors import InputError
 from touchline.logs import open_log
+from touchline.logs.period import typical_period
 from touchline.model.robot import Robot
-from touchline.report.analysis import typical_period
 from touchline.report.facts import bandwidth_warnings, bandwidths
 
 STILL = 0.01  # rad/s or m/s

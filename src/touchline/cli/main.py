@@ -12,6 +12,7 @@ from touchline.cli.bench import BENCHMARKS, bench
 from touchline.cli.calibrate import calibrate
 from touchline.cli.check import check
 from touchline.cli.demo import demo
+from touchline.cli.live import live
 from touchline.cli.reproduce import reproduce
 from touchline.cli.simulate import simulate
 from touchline.cli.view import view
@@ -34,6 +35,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "simulate": simulate,
     "analyze": analyze,
     "view": view,
+    "live": live,
     "check": check,
     "calibrate": calibrate,
     "reproduce": reproduce,

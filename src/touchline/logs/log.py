@@ -2,6 +2,7 @@
 """Opens a recording of any supported kind and hands out its samples."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -10,9 +11,12 @@ import numpy as np
 from touchline.errors import InputError
 from touchline.logs.blocks import windows
 from touchline.logs.columns import signal_shapes
+from touchline.logs.mcap import read_metadata
 from touchline.logs.naming import parse_naming
+from touchline.logs.period import RECORDER, RECORDER_KEY
 from touchline.logs.prepare import Preparation
 from touchline.logs.source import Source
+from touchline.logs.writer import mend_table
 from touchline.model.description import RobotDescription
 from touchline.observer.samples import Samples
 
@@ -83,7 +87,12 @@ def open_log(path: Path | str, description: RobotDescription) -> Log:
             or topics the robot needs.
     """
     path = Path(path)
+    mended = path.suffix == ".parquet" and mend_table(path)
     source = _open_source(path, description)
+    if mended:
+        source.warnings.append(
+            f"{path}: its recorder was killed; put together from {path.stem}.parts"
+        )
     try:
         return Log(path, description, source)
     except BaseException:
@@ -92,9 +101,11 @@ def open_log(path: Path | str, description: RobotDescription) -> Log:
 
 
 def _open_source(path: Path, description: RobotDescription) -> Source:
-    naming = parse_naming(description)
     if not path.exists():
         raise InputError(f"{path}: no such file")
+    if _recorded_live(path):  # in the contract's names and units, whatever the robot's are
+        description = replace(description, log={})
+    naming = parse_naming(description)
     name = path.name.lower()
     if path.is_file() and not path.stat().st_size:
         raise InputError(f"{path}: the file is empty")
@@ -114,6 +125,16 @@ def _open_source(path: Path, description: RobotDescription) -> Source:
         f"{path}: not a known kind of log; tables end in {', '.join(TABLES)}, recordings in "
         f"{', '.join(BAGS)} (a rosbag2 folder holds a metadata.yaml)"
     )
+
+
+def _recorded_live(path: Path) -> bool:
+    if path.is_file() and path.suffix == ".mcap":
+        return RECORDER_KEY in read_metadata(path)
+    if path.is_file() and path.suffix == ".parquet":
+        from touchline.logs.parquet import table_metadata
+
+        return table_metadata(path).get(RECORDER_KEY) == RECORDER
+    return False
 
 
 def read_log(path: Path | str, description: RobotDescription) -> Samples:

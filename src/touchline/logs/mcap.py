@@ -2,13 +2,16 @@
 """Makes an MCAP file readable that was cut off before its index and footer."""
 
 import io
+import struct
 from pathlib import Path
 from typing import Any
 
 MAGIC = b"\x89MCAP0\r\n"
 # A footer record that points at no summary: readers then scan the records.
-_FOOTER = b"\x02" + (20).to_bytes(8, "little") + bytes(20) + MAGIC
+FOOTER = b"\x02" + (20).to_bytes(8, "little") + bytes(20) + MAGIC
 _DATA_END, _FOOTER_CODE = 0x0F, 0x02
+METADATA, NAME = 0x0C, "touchline"  # the record that `McapWriter` puts in front of all messages
+_LONGEST_METADATA = 1 << 20  # bytes
 
 
 def whole_records(path: Path) -> int:
@@ -25,6 +28,39 @@ def whole_records(path: Path) -> int:
             at = end
             file.seek(at)
     return at
+
+
+def read_metadata(path: Path) -> dict[str, str]:
+    """What `McapWriter` was told to keep; empty for a file of another writer."""
+    with path.open("rb") as file:
+        if file.read(len(MAGIC)) != MAGIC:
+            return {}
+        for _ in range(2):  # the header, and what stands behind it
+            head = file.read(9)
+            if len(head) < 9 or (size := int.from_bytes(head[1:], "little")) > _LONGEST_METADATA:
+                return {}
+            content = file.read(size)
+            if head[0] == METADATA:
+                return _entries(content)
+    return {}
+
+
+def _entries(content: bytes) -> dict[str, str]:
+    texts, at = [], 0
+    try:
+        while at < len(content):
+            (size,) = struct.unpack_from("<I", content, at)
+            at += 4
+            if len(texts) == 1:  # behind the name: the size of all entries
+                texts.append("")
+                continue
+            texts.append(content[at : at + size].decode())
+            at += size
+    except (struct.error, UnicodeDecodeError):
+        return {}
+    if not texts or texts[0] != NAME:
+        return {}
+    return dict(zip(texts[2::2], texts[3::2], strict=False))
 
 
 class MendedMcap:
@@ -61,7 +97,7 @@ class _Mended(io.RawIOBase):
         return self._at
 
     def seek(self, offset: int, whence: int = io.SEEK_SET, /) -> int:
-        base = (0, self._at, self._length + len(_FOOTER))[whence]
+        base = (0, self._at, self._length + len(FOOTER))[whence]
         self._at = max(base + offset, 0)
         return self._at
 
@@ -71,7 +107,7 @@ class _Mended(io.RawIOBase):
             piece = self._file.read(min(len(buffer), self._length - self._at))
         else:
             start = self._at - self._length
-            piece = _FOOTER[start : start + len(buffer)]
+            piece = FOOTER[start : start + len(buffer)]
         buffer[: len(piece)] = piece
         self._at += len(piece)
         return len(piece)

@@ -141,3 +141,14 @@ def _metadata(raw: dict[bytes, bytes]) -> dict[str, Any]:
         stored = json.loads(raw.get(METADATA_KEY, b"{}"))
         found.update(stored if isinstance(stored, dict) else {})
     return found
+
+
+def table_metadata(path: Path) -> dict[str, Any]:
+    """What the writer of a table left; empty where the file cannot be read."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        return _metadata(pq.read_schema(path).metadata or {})
+    except (pa.ArrowException, OSError):
+        return {}

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads a rosbag2: one row per joint state, every sensor's wrench interpolated to it."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from touchline.logs.align import REACH_PERIODS, find_bracket
 from touchline.logs.bagfile import Bag
 from touchline.logs.blocks import Block, Window, take, windows
 from touchline.logs.cdr import JOINT_STATE, WRENCH_STAMPED, Decoder
+from touchline.logs.mcap import read_metadata
 from touchline.logs.naming import Naming
 from touchline.logs.source import HEAD_ROWS
 from touchline.logs.survey import Channel, Survey
@@ -44,7 +46,7 @@ class RosbagSource:
         joint_topic, wrench_topics = choose_topics(bag.topics, description, naming, str(path))
         self.path, self.topics, self.duration = path, bag.topics, bag.duration
         self.columns: tuple[str, ...] = ()
-        self.metadata: dict[str, Any] = {}
+        self.metadata: dict[str, Any] = _metadata(path)
         self.rows, self.delayed_wrenches = None, False
         self._joints = Channel(joint_topic, Decoder(JOINT_STATE, naming.joint_names))
         self._wrenches = [
@@ -208,6 +210,13 @@ class _Store:
         cut = max(before - self._first, 0)
         self._stamps, self._values = [stamps[cut:]], [values[cut:]]
         self._first += cut
+
+
+def _metadata(path: Path) -> dict[str, Any]:
+    """What a recorder of running robots has left in an MCAP file."""
+    if not path.is_file() or path.suffix != ".mcap":
+        return {}
+    return {key: json.loads(value) for key, value in read_metadata(path).items()}
 
 
 def _axis_factors(description: RobotDescription, naming: Naming) -> np.ndarray:

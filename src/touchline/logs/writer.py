@@ -56,6 +56,7 @@ class TableWriter:
         path: Path | str,
         schema: Mapping[str, Any],
         metadata: Mapping[str, Any] | None = None,
+        part_seconds: float | None = None,
     ):
         """Remove an old table at `path` and begin a new one.
 
@@ -63,6 +64,7 @@ class TableWriter:
             path: of the Parquet file; its directory is made.
             schema: column name -> numpy dtype or "str".
             metadata: JSON values kept in the file, as `Log.metadata` returns them.
+            part_seconds: after which a part is closed [s]: what a kill can cost.
 
         Raises:
             InputError: nothing can be written there.
@@ -80,6 +82,7 @@ class TableWriter:
         except OSError as error:
             raise InputError(f"{self.path}: cannot be written: {error.strerror}") from error
         self._count = 0  # closed parts
+        self._part_seconds = PART_SECONDS if part_seconds is None else part_seconds
         self._rows = 0
         self._waiting: list[Any] = []  # batches that make no row group yet
         self._waiting_rows = 0
@@ -124,7 +127,10 @@ class TableWriter:
         self._waiting_rows += batch.num_rows
         self._part_rows += batch.num_rows
         self._rows += batch.num_rows
-        if self._part_rows >= PART_ROWS or time.monotonic() - self._part_began >= PART_SECONDS:
+        if (
+            self._part_rows >= PART_ROWS
+            or time.monotonic() - self._part_began >= self._part_seconds
+        ):
             self._close_part()
         elif self._waiting_rows >= _GROUP_ROWS:
             self._write_group()
@@ -205,6 +211,23 @@ def _parquet_writer(path: Path, schema: Any) -> Any:
     return pq.ParquetWriter(
         path, schema, compression="lz4", use_dictionary=words, write_page_checksum=True
     )
+
+
+def mend_table(path: Path) -> bool:
+    """Make the one file of a table whose writer was killed; True where there was one to mend.
+
+    The parts stay: the next writer of this table removes them.
+    """
+    import pyarrow.parquet as pq
+
+    parts = sorted(path.with_suffix(".parts").glob("part-*.parquet"))
+    if path.exists() or not parts:
+        return False
+    with _parquet_writer(_unfinished(path), pq.read_schema(parts[0])) as writer:
+        for part in parts:
+            writer.write_table(pq.read_table(part), row_group_size=_GROUP_ROWS)
+    _unfinished(path).rename(path)
+    return True
 
 
 class EstimateWriter:

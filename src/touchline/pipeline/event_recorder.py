@@ -50,7 +50,8 @@ class _Gathered:
             self._count = 0
         start = leaps[-1] if len(leaps) else 0
         strong = strength[start:] >= STRONG * peaks[start + 1 :]
-        self._sum += rows[start:][strong].sum(axis=0)
+        # One after the other: the same bits in whatever parts the samples come.
+        self._sum = np.cumsum(np.vstack([self._sum, rows[start:][strong]]), axis=0)[-1]
         self._count += int(strong.sum())
         self.strength = float(peaks[-1])
 

@@ -12,6 +12,7 @@ import numpy as np
 from touchline.detector.thresholds import Thresholds
 from touchline.errors import InputError
 from touchline.logs import Log, open_log
+from touchline.logs.period import sample_period
 from touchline.model.robot import Robot, load_robot
 from touchline.observer.observer import METHODS
 from touchline.observer.samples import Samples
@@ -110,7 +111,8 @@ def analyze(
         if first is None or not len(first):
             raise InputError(f"{log}: holds no samples")
         prepare_directory(out, log, Path(robot))
-        run = _Run(Pipeline(model, bandwidth, method, typical_period(first.time)), out, first)
+        period = sample_period(recording, first.time)
+        run = _Run(Pipeline(model, bandwidth, method, period), out, period)
         for part in _with_progress(recording, chain([first], parts)):
             run.add(part)
         warnings = bandwidth_warnings(bandwidths(model, bandwidth), run.period)
@@ -128,13 +130,6 @@ def _origin(analysis: Analysis) -> dict[str, Any]:
     return facts | {"start": clock.first, "end": clock.last, "samples": clock.rows}
 
 
-def typical_period(time: np.ndarray) -> float:
-    """Median step of time stamps [s] that go forward, to six digits; 1 ms where there is none."""
-    steps = np.diff(time[np.isfinite(time)])
-    steps = steps[steps > 0]
-    return float(f"{np.median(steps):.6g}") if len(steps) else 1e-3
-
-
 def _check_options(bandwidth: float | None, method: str) -> None:
     if bandwidth is not None and not (np.isfinite(bandwidth) and bandwidth > 0):
         raise InputError(f"--bandwidth {bandwidth}: must be a positive number [rad/s]")
@@ -145,9 +140,8 @@ def _check_options(bandwidth: float | None, method: str) -> None:
 class _Run:
     """One recording on its way through the pipeline, a part at a time."""
 
-    def __init__(self, pipeline: Pipeline, out: Path, first: Samples) -> None:
-        self.pipeline = pipeline
-        self.period = typical_period(first.time)
+    def __init__(self, pipeline: Pipeline, out: Path, period: float) -> None:
+        self.pipeline, self.period = pipeline, period
         robot = pipeline.robot
         self._out = out
         self._outputs = Outputs(out, robot)

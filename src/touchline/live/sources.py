@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From the address of a source to the source."""
+
+from collections.abc import Callable
+
+from touchline.live.connection import Connection
+from touchline.live.source import Address, Source, parse_address
+from touchline.model.robot import Robot, load_robot
+
+
+def _simulated(address: Address, robot: Robot) -> Source:
+    from touchline.live.simulated import SimulatedArm
+
+    return SimulatedArm(address, robot)
+
+
+def _replayed(address: Address, robot: Robot) -> Source:
+    from touchline.live.replayed import ReplayedLog
+
+    return ReplayedLog(address, robot)
+
+
+SCHEMES: dict[str, tuple[str, Callable[[Address, Robot], Source]]] = {
+    "sim": ("sim://", _simulated),
+    "replay": ("replay://LOG?speed=1", _replayed),
+}
+
+
+def make_source(source: str, robot: Robot) -> Source:
+    """The source of an address, not opened yet.
+
+    Raises:
+        InputError: the address is of no known kind, or cannot be a source of this robot.
+    """
+    address = parse_address(source, {name: form for name, (form, _) in SCHEMES.items()})
+    return SCHEMES[address.scheme][1](address, robot)
+
+
+def connect(source: str, robot: Robot | str) -> Connection:
+    """Connects to a running robot; iterate over what it returns.
+
+        with tl.live.connect("sim://", robot) as samples:
+            for sample in samples:
+                result = pipeline.update(*sample)
+
+    Args:
+        source: an address as `touchline live --source` takes it.
+        robot: the robot, or what `touchline.load_robot` takes.
+
+    Raises:
+        InputError: with one clear line, where nothing can be read there.
+    """
+    model = load_robot(robot) if isinstance(robot, str) else robot
+    connection = Connection(make_source(source, model))
+    connection.open()
+    return connection

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One line for everything that happens while a robot runs."""
+
+import numpy as np
+
+from touchline.live.connection import Notice
+from touchline.live.session import Session
+from touchline.result.event import Event
+
+WITHHELD = {"stale", "invalid", "not received"}
+
+
+def began_line(event: Event, origin: float) -> str:
+    """An event that has begun."""
+    return (
+        f"{event.detected - origin:10.3f} s  {event.level} {event.id} {_where(event)}{_size(event)}"
+    )
+
+
+def ended_line(event: Event, origin: float) -> str:
+    """An event that is over."""
+    assert event.cleared is not None
+    lasted = event.cleared - event.detected
+    return (
+        f"{event.cleared - origin:10.3f} s  {event.level} {event.id} over after {lasted:.2f} s: "
+        f"{_where(event)}{_size(event)}"
+    )
+
+
+def notice_line(notice: Notice, session: Session) -> str:
+    """Something that happened to the link."""
+    first = session.connection.streams[0].name
+    withheld = notice.stream == first and notice.state in WITHHELD
+    return f"{'':10}    {notice.text}{'; estimates are withheld' if withheld else ''}"
+
+
+def summary_lines(session: Session, events: int, now: float) -> list[str]:
+    """What there is to say at the end."""
+    lines = [f"{session.samples} samples, {events} events"]
+    return lines + [f"  {stream.describe(now)}" for stream in session.connection.streams]
+
+
+def _where(event: Event) -> str:
+    if event.link is not None:
+        share = f" ({100 * event.body_probability:.0f} %)" if event.body_probability else ""
+        return f"on {event.link}{share}"
+    if event.candidates:
+        return f"perhaps on {event.candidates[0].link}, segment {event.segment}"
+    return f"on segment {event.segment}"
+
+
+def _size(event: Event) -> str:
+    if event.force_peak is not None:
+        force = f", up to {event.force_peak:.1f} N"
+        if event.position is not None and event.link is not None:
+            force += f" at {np.array2string(np.asarray(event.position), precision=3)}"
+        return force
+    if event.torque_peak is not None and event.joint is not None:
+        return f", up to {event.torque_peak:.2f} Nm on {event.joint}"
+    return ""
