@@ -45,6 +45,12 @@ inline std::size_t length(nb::handle object) {
   return PyArray_NDIM(array) == 1 ? static_cast<std::size_t>(PyArray_DIMS(array)[0]) : 0;
 }
 
+// The same; `missing` where the object is None.
+inline const double* numbers_or(nb::handle object, std::initializer_list<std::size_t> shape,
+                                const double* missing) {
+  return object.is_none() ? missing : numbers(object, shape);
+}
+
 // A new array, not initialized.
 class Out {
  public:
@@ -63,6 +69,13 @@ class Out {
  private:
   nb::object object_;
 };
+
+// Numbers as a new array with one axis.
+inline nb::object line(const std::vector<double>& values) {
+  Out out({values.size()});
+  std::copy(values.begin(), values.end(), out.data());
+  return out.release();
+}
 
 // Numbers row by row as a new array.
 inline nb::object table(const std::vector<double>& values, std::size_t columns) {

@@ -12,10 +12,13 @@
 #include "arrays.hpp"
 #include "classifier_bindings.hpp"
 #include "detector_bindings.hpp"
+#include "guard.hpp"
 #include "localizer_bindings.hpp"
 #include "mesh_bindings.hpp"
+#include "pipeline_bindings.hpp"
 #include "samples.hpp"
 #include "touchline/detail/observer/observer.hpp"
+#include "touchline/version.hpp"
 
 // Types for the stub; what is not an array of float64 of the right shape is a TypeError.
 #define TOUCHLINE_ARRAY "numpy.typing.NDArray[numpy.float64]"
@@ -38,38 +41,49 @@ tl::Mat3 mat3(const std::vector<double>& m) {
   return {{m[0], m[3], m[6]}, {m[1], m[4], m[7]}, {m[2], m[5], m[8]}};
 }
 
-void step(tl::Observer& o, double time, nb::handle q, nb::handle qd, nb::handle tau,
+using Observer = guard::Shared<tl::Observer>;
+
+void step(Observer& o, double time, nb::handle q, nb::handle qd, nb::handle tau,
           nb::handle wrench) {
-  o.step(samples::one(o, time, q, qd, tau, wrench));
+  const tl::Sample in = samples::one(o.value.row_layout(), time, q, qd, tau, wrench);
+  const guard::Turn turn(o.turn);
+  o.value.step(in);
 }
 
-nb::object update(tl::Observer& o, double time, nb::handle q, nb::handle qd, nb::handle tau,
+nb::object update(Observer& o, double time, nb::handle q, nb::handle qd, nb::handle tau,
                   nb::handle wrench) {
-  const double* row = o.step(samples::one(o, time, q, qd, tau, wrench));
-  arrays::Out out({o.output().size()});
-  std::copy_n(row, o.output().size(), out.data());
+  const tl::Sample in = samples::one(o.value.row_layout(), time, q, qd, tau, wrench);
+  const std::size_t width = o.value.output().size();
+  arrays::Out out({width});
+  const guard::Turn turn(o.turn);
+  std::copy_n(o.value.step(in), width, out.data());
   return out.release();
 }
 
-nb::object run(tl::Observer& o, nb::handle time, nb::handle q, nb::handle qd, nb::handle tau,
+nb::object run(Observer& o, nb::handle time, nb::handle q, nb::handle qd, nb::handle tau,
                nb::handle wrench) {
-  const samples::Many in = samples::many(o, time, q, qd, tau, wrench);
-  arrays::Out out({in.rows, o.output().size()});
+  const samples::Many in = samples::many(o.value.row_layout(), time, q, qd, tau, wrench);
+  arrays::Out out({in.rows, o.value.output().size()});
   {
+    const guard::Turn turn(o.turn);
     nb::gil_scoped_release release;
-    o.run(in.rows, in.time, in.first.q, in.first.qd, in.first.tau, in.first.wrench, out.data());
+    o.value.run(in.rows, in.time, in.first.q, in.first.qd, in.first.tau, in.first.wrench,
+                out.data());
   }
   return out.release();
 }
 
 // Momentum and n-bar: joint rows, then six rows per sensor in its own frame.
-nb::tuple terms(tl::Observer& o, nb::handle q, nb::handle qd) {
+nb::tuple terms(Observer& shared, nb::handle q, nb::handle qd) {
+  tl::Observer& o = shared.value;
   const tl::RowLayout& layout = o.row_layout();
   const std::size_t joints = layout.joints, size = joints + 6 * layout.sensors;
   const double* speeds = arrays::numbers(qd, {joints});
   tl::Terms<double>& model = o.terms();
-  model.sweep(arrays::numbers(q, {joints}), speeds);
+  const double* positions = arrays::numbers(q, {joints});
   arrays::Out p({size}), n({size});
+  const guard::Turn turn(shared.turn);
+  model.sweep(positions, speeds);
   for (std::size_t j = 0; j < joints; ++j)
     model.joint_row(j, speeds[j], p.data()[j], n.data()[j]);
   for (int s = 0; s < layout.sensors; ++s) {
@@ -82,11 +96,14 @@ nb::tuple terms(tl::Observer& o, nb::handle q, nb::handle qd) {
 }
 
 // Poses (n_nodes, 4, 4) of all nodes in world.
-nb::object poses(tl::Observer& o, nb::handle q) {
+nb::object poses(Observer& shared, nb::handle q) {
+  tl::Observer& o = shared.value;
   const std::size_t n = o.row_layout().joints, count = o.tree().nodes().size();
   const std::vector<double> rest(n, 0.0);
-  o.terms().sweep(arrays::numbers(q, {n}), rest.data());
+  const double* positions = arrays::numbers(q, {n});
   arrays::Out out({count, 4, 4});
+  const guard::Turn turn(shared.turn);
+  o.terms().sweep(positions, rest.data());
   for (std::size_t i = 0; i < count; ++i) {
     const tl::NodeState<double>& X = o.terms().state().node(static_cast<int>(i));
     const double rows[16] = {X.R.x.x, X.R.y.x, X.R.z.x, X.p.x, X.R.x.y, X.R.y.y, X.R.z.y, X.p.y,
@@ -96,8 +113,8 @@ nb::object poses(tl::Observer& o, nb::handle q) {
   return out.release();
 }
 
-nb::dict row_slices(const tl::Observer& o) {
-  const tl::RowLayout& l = o.row_layout();
+nb::dict row_slices(const Observer& o) {
+  const tl::RowLayout& l = o.value.row_layout();
   nb::dict d;
   const auto add = [&d](const char* name, int start, int size) {
     d[name] = nb::make_tuple(start, start + size);
@@ -205,18 +222,20 @@ NB_MODULE(TOUCHLINE_MODULE, m) {
   if (!__builtin_cpu_supports("avx2")) throw nb::import_error("this processor has no AVX2");
 #endif
   arrays::initialize();
+  m.attr("VERSION") = tl::kVersion;
   bind_enums(m);
   bind_rows(m);
   classification::bind(m);
   meshes::bind(m);
   localization::bind(m);
   detection::bind(m);
-  nb::class_<tl::Observer>(m, "Observer")
+  pipelines::bind(m);
+  nb::class_<Observer>(m, "Observer")
       .def("__init__",
-           [](tl::Observer* self, std::vector<tl::Node> nodes, const std::vector<double>& gravity,
+           [](Observer* self, std::vector<tl::Node> nodes, const std::vector<double>& gravity,
               std::vector<tl::JointRow> joints, std::vector<tl::SensorRow> sensors,
               tl::Method method, tl::Discretization discretization) {
-             new (self) tl::Observer(tl::Tree(std::move(nodes), vec3(gravity)), std::move(joints),
+             new (self) Observer(tl::Tree(std::move(nodes), vec3(gravity)), std::move(joints),
                                      std::move(sensors), method, discretization);
            })
       .def("step", &step, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a,
@@ -229,12 +248,16 @@ NB_MODULE(TOUCHLINE_MODULE, m) {
            nb::sig("def terms(self, q: object, qd: object) -> "
                    "tuple[" TOUCHLINE_ARRAY ", " TOUCHLINE_ARRAY "]"))
       .def("poses", &poses, "q"_a, nb::sig("def poses(self, q: object) -> " TOUCHLINE_ARRAY))
-      .def("reset", &tl::Observer::reset)
+      .def("reset",
+           [](Observer& o) {
+             const guard::Turn turn(o.turn);
+             o.value.reset();
+           })
       .def_prop_ro("slices", &row_slices,
                    nb::sig("def slices(self, /) -> dict[str, tuple[int, int]]"))
-      .def_prop_ro("segment_sensors", [](const tl::Observer& o) {
+      .def_prop_ro("segment_sensors", [](const Observer& o) {
         std::vector<int> sensors;
-        for (const tl::Segment& s : o.layout().segments) sensors.push_back(s.sensor);
+        for (const tl::Segment& s : o.value.layout().segments) sensors.push_back(s.sensor);
         return sensors;
       });
 }

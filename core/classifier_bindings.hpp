@@ -9,26 +9,26 @@
 #include <vector>
 
 #include "arrays.hpp"
+#include "guard.hpp"
 #include "touchline/detail/classifier/classifier.hpp"
 
 namespace classification {
 
 namespace nb = nanobind;
 namespace tl = touchline;
-using namespace nb::literals;
 
-// One sample: the observer's row and the detector's levels.
-inline void step(tl::Classifier& c, double time, nb::handle row, nb::handle levels) {
-  c.step(time, arrays::numbers(row, {c.width()}), arrays::numbers(levels, {c.segments()}));
-}
+using namespace nb::literals;
+using Classifier = guard::Shared<tl::Classifier>;
 
 // N samples: kinds (N, m), and rates (N, m) of the segments' forces.
-inline nb::tuple follow(tl::Classifier& c, nb::handle time, nb::handle rows, nb::handle levels) {
+inline nb::tuple follow(Classifier& shared, nb::handle time, nb::handle rows, nb::handle levels) {
+  tl::Classifier& c = shared.value;
   const std::size_t count = arrays::length(time), m = c.segments();
   const double* stamps = arrays::numbers(time, {count});
   const double* row = arrays::numbers(rows, {count, c.width()});
   const double* level = arrays::numbers(levels, {count, m});
   arrays::Out kinds({count, m}), rates({count, m});
+  const guard::Turn turn(shared.turn);
   for (std::size_t i = 0; i < count; ++i) {
     c.step(stamps[i], row + i * c.width(), level + i * m);
     for (std::size_t g = 0; g < m; ++g) {
@@ -48,16 +48,15 @@ inline void bind(nb::module_& m) {
             new (self) tl::BlowLimits{onset, collision, std::move(joints)};
           },
           "onset"_a, "collision"_a, "joints"_a);
-  nb::class_<tl::Classifier> classifier(m, "Classifier");
+  nb::class_<Classifier> classifier(m, "Classifier");
   classifier
       .def(
           "__init__",
-          [](tl::Classifier* self, const tl::Observer& observer,
+          [](Classifier* self, const guard::Shared<tl::Observer>& observer,
              std::vector<tl::BlowLimits> limits) {
-            new (self) tl::Classifier(observer, std::move(limits));
+            new (self) Classifier(observer.value, std::move(limits));
           },
           "observer"_a, "limits"_a)
-      .def("step", &step, "time"_a, "row"_a, "levels"_a)
       .def("follow", &follow, "time"_a, "rows"_a, "levels"_a);
   classifier.attr("WINDOW") = tl::ForceHistory::kWindow;
   classifier.attr("LEVER") = tl::Classifier::kLever;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "arrays.hpp"
+#include "guard.hpp"
 #include "samples.hpp"
 #include "touchline/detail/detector/detector.hpp"
 
@@ -19,16 +20,26 @@ namespace detection {
 namespace nb = nanobind;
 using namespace nb::literals;
 namespace tl = touchline;
+using Observer = guard::Shared<tl::Observer>;
+
+// The observer that a detector belongs to.
+inline tl::Observer& own(Observer& shared, const tl::Detector& d) {
+  if (&shared.value != &d.observer())
+    throw std::invalid_argument("the detector belongs to another observer");
+  return shared.value;
+}
 
 // One sample through observer and detector: the observer's row, the level of each segment, the
 // normalized rows, their drifts, for how long each segment's baseline has been averaged.
-inline nb::tuple detect(tl::Observer& o, tl::Detector& d, double time, nb::handle q, nb::handle qd,
-                 nb::handle tau, nb::handle wrench) {
-  const tl::Sample in = samples::one(o, time, q, qd, tau, wrench);
-  const double* row = o.step(in);
-  d.step(row, in.q, in.qd);
+inline nb::tuple detect(Observer& shared, tl::Detector& d, double time, nb::handle q, nb::handle qd,
+                        nb::handle tau, nb::handle wrench) {
+  tl::Observer& o = own(shared, d);
+  const tl::Sample in = samples::one(o.row_layout(), time, q, qd, tau, wrench);
   arrays::Out out({o.output().size()}), levels({d.levels().size()}), tests({d.rows().size()}),
       drift({d.rows().size()}), quiet({d.quiet().size()});
+  const guard::Turn turn(shared.turn);
+  const double* row = o.step(in);
+  d.step(row, in.q, in.qd);
   std::copy_n(row, o.output().size(), out.data());
   std::copy(d.levels().begin(), d.levels().end(), levels.data());
   std::copy(d.normalized().begin(), d.normalized().end(), tests.data());
@@ -40,8 +51,9 @@ inline nb::tuple detect(tl::Observer& o, tl::Detector& d, double time, nb::handl
 
 // Runs samples `from` to `to` through observer and detector; calls `each(i)` after every one.
 template <class Each>
-void detect_all(tl::Observer& o, tl::Detector& d, const samples::Many& in, std::size_t from,
+void detect_all(Observer& shared, tl::Detector& d, const samples::Many& in, std::size_t from,
                 std::size_t to, double* rows, Each each) {
+  tl::Observer& o = shared.value;
   nb::gil_scoped_release release;
   const std::size_t n = o.row_layout().joints, w = 6 * o.row_layout().sensors;
   std::size_t i = from;
@@ -53,14 +65,16 @@ void detect_all(tl::Observer& o, tl::Detector& d, const samples::Many& in, std::
 }
 
 // The same for N samples.
-inline nb::tuple detect_run(tl::Observer& o, tl::Detector& d, nb::handle time, nb::handle q,
+inline nb::tuple detect_run(Observer& shared, tl::Detector& d, nb::handle time, nb::handle q,
                      nb::handle qd, nb::handle tau, nb::handle wrench) {
-  const samples::Many in = samples::many(o, time, q, qd, tau, wrench);
+  tl::Observer& o = own(shared, d);
+  const samples::Many in = samples::many(o.row_layout(), time, q, qd, tau, wrench);
   arrays::Out out({in.rows, o.output().size()}), levels({in.rows, d.levels().size()}),
       tests({in.rows, d.rows().size()}), drift({in.rows, d.rows().size()}),
       quiet({in.rows, d.quiet().size()});
+  const guard::Turn turn(shared.turn);
   double *level = levels.data(), *x = tests.data(), *y = drift.data(), *since = quiet.data();
-  detect_all(o, d, in, 0, in.rows, out.data(), [&](std::size_t) {
+  detect_all(shared, d, in, 0, in.rows, out.data(), [&](std::size_t) {
     level = std::copy(d.levels().begin(), d.levels().end(), level);
     x = std::copy(d.normalized().begin(), d.normalized().end(), x);
     y = std::copy(d.drift().begin(), d.drift().end(), y);
@@ -73,9 +87,10 @@ inline nb::tuple detect_run(tl::Observer& o, tl::Detector& d, nb::handle time, n
 // N samples, for those who set thresholds: levels (N, m), statistics (N, m, tests), and of every
 // `every`-th sample the residuals (r) less baseline, the same low-passed once more, less reference
 // and low-passed, the variance (r) of the latter by noise, and the activity (2).
-inline nb::tuple detect_details(tl::Observer& o, tl::Detector& d, nb::handle time, nb::handle q,
+inline nb::tuple detect_details(Observer& shared, tl::Detector& d, nb::handle time, nb::handle q,
                          nb::handle qd, nb::handle tau, nb::handle wrench, std::size_t every) {
-  const samples::Many in = samples::many(o, time, q, qd, tau, wrench);
+  tl::Observer& o = own(shared, d);
+  const samples::Many in = samples::many(o.row_layout(), time, q, qd, tau, wrench);
   if (every == 0) throw std::invalid_argument("every must be at least 1");
   const std::size_t segments = d.levels().size(), rows = d.rows().size();
   const std::size_t kept = (in.rows + every - 1) / every;
@@ -85,6 +100,7 @@ inline nb::tuple detect_details(tl::Observer& o, tl::Detector& d, nb::handle tim
       activity({kept, 2});
   constexpr std::size_t kBlock = 256;  // samples whose rows are held at a time
   std::vector<double> scratch(kBlock * o.output().size());
+  const guard::Turn turn(shared.turn);
   double *level = levels.data(), *value = statistics.data(), *x = residual.data(), *a = slow.data(),
          *b = quick.data(), *v = noise.data(), *c = activity.data();
   const auto each = [&](std::size_t i) {
@@ -105,7 +121,7 @@ inline nb::tuple detect_details(tl::Observer& o, tl::Detector& d, nb::handle tim
     *c++ = d.activity().acceleration;
   };
   for (std::size_t from = 0; from < in.rows; from += kBlock)
-    detect_all(o, d, in, from, std::min(from + kBlock, in.rows), scratch.data(), each);
+    detect_all(shared, d, in, from, std::min(from + kBlock, in.rows), scratch.data(), each);
   return nb::make_tuple(levels.release(), statistics.release(), residual.release(),
                         slow.release(), quick.release(), noise.release(), activity.release());
 }
@@ -125,8 +141,9 @@ inline void check_detector(const tl::Observer& o, const std::vector<tl::Detectio
 
 // What noise leaves in rows at joint positions q, per sample: variances of their loads by the
 // readings, and of their momenta by the velocities.
-inline nb::tuple row_variances(const tl::Observer& o, const std::vector<tl::DetectionRow>& rows,
+inline nb::tuple row_variances(const Observer& shared, const std::vector<tl::DetectionRow>& rows,
                                const tl::NoiseFigures& noise, nb::handle q) {
+  const tl::Observer& o = shared.value;  // only what never changes
   const std::size_t size = rows.size();
   tl::Posture posture(o.tree(), o.row_layout().joints);
   tl::RowCovariance covariance(o, rows, noise);
@@ -192,10 +209,10 @@ inline void bind(nb::module_& m) {
   nb::class_<tl::Detector>(m, "Detector")
       .def(
           "__init__",
-          [](tl::Detector* self, const tl::Observer& observer, std::vector<tl::DetectionRow> rows,
+          [](tl::Detector* self, const Observer& observer, std::vector<tl::DetectionRow> rows,
              tl::DetectionSettings settings) {
-            check_detector(observer, rows, settings);
-            new (self) tl::Detector(observer, std::move(rows), std::move(settings));
+            check_detector(observer.value, rows, settings);
+            new (self) tl::Detector(observer.value, std::move(rows), std::move(settings));
           },
           "observer"_a, "rows"_a, "settings"_a, nb::keep_alive<1, 2>())
       .def("baseline", &tl::Detector::baseline, "row"_a);

@@ -13,9 +13,9 @@ namespace nb = nanobind;
 namespace tl = touchline;
 
 // One sample, checked.
-inline tl::Sample one(const tl::Observer& o, double time, nb::handle q, nb::handle qd, nb::handle tau,
+inline tl::Sample one(const tl::RowLayout& layout, double time, nb::handle q, nb::handle qd, nb::handle tau,
                       nb::handle wrench) {
-  const std::size_t n = o.row_layout().joints, k = o.row_layout().sensors;
+  const std::size_t n = layout.joints, k = layout.sensors;
   return {time, arrays::numbers(q, {n}), arrays::numbers(qd, {n}), arrays::numbers(tau, {n}),
           arrays::numbers(wrench, {k, 6})};
 }
@@ -27,9 +27,9 @@ struct Many {
   tl::Sample first;
 };
 
-inline Many many(const tl::Observer& o, nb::handle time, nb::handle q, nb::handle qd,
+inline Many many(const tl::RowLayout& layout, nb::handle time, nb::handle q, nb::handle qd,
                  nb::handle tau, nb::handle wrench) {
-  const std::size_t n = o.row_layout().joints, k = o.row_layout().sensors;
+  const std::size_t n = layout.joints, k = layout.sensors;
   const std::size_t rows = arrays::length(time);
   return {rows, arrays::numbers(time, {rows}),
           {0.0, arrays::numbers(q, {rows, n}), arrays::numbers(qd, {rows, n}),

@@ -15,3 +15,5 @@ class Health(IntFlag):
     SATURATED = 32  # a reading is at the end of its range
     SENSOR_EXCLUDED = 64  # a sensor has been absent for longer than a gap
     MODEL_LIMIT = 128  # a joint is outside its limits in the model
+    PERIOD = 256  # stamps are not as far apart as the pipeline was told: thresholds do not fit
+    NO_ROOM = 512  # more events at a time than there is room for: the oldest was ended

@@ -13,7 +13,7 @@ from touchline.bench.localization.compatible import (
     scatter,
 )
 from touchline.bench.localization.scene import FRICTION, arm_and_skin, make_scene
-from touchline.bench.localization.touched import last_answers
+from touchline.bench.localization.touched import last_contacts
 from touchline.bench.localization.trial import make_pipeline, pair_rank
 from touchline.errors import InputError
 from touchline.observer.dynamics import contact_loads
@@ -84,7 +84,7 @@ def test_the_set_holds_what_is_possible_and_little_else(pair):
     robot, skin = arm_and_skin("panda", 0)
     pipeline, s = make_pipeline(robot, skin), scene.signals
     pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
-    answers = [answer for _, answer in last_answers(pipeline, scene)]
+    answers = last_contacts(pipeline, scene)
     assert [answer.status for answer in answers] == ["not_separable"]
     assert answers[0].unknowns == 10
     inside, allowed = covered(answers, points), possible.touched(points)

@@ -7,7 +7,6 @@ import pytest
 from touchline.bench.localization.scene import FRICTION, arm_and_skin
 from touchline.bench.localization.trial import make_pipeline
 from touchline.bench.touches import TouchSampler, resting_signals
-from touchline.localizer.answer import STATUS
 
 # Two-sided for the pitch of the wrench, one-sided for chi2, 4 sigma each (`pitch_limit`).
 STATED = 6.3e-5 + 3.2e-5
@@ -28,7 +27,7 @@ def test_a_held_contact_looks_like_several_as_often_as_is_said(arm, tier):
         assert len(pipeline.events) == 1
         assert len(np.unique(table.sample[held])) == held.sum()  # never two places
         looks += int(held.sum())
-        several += int((table.answers[held, 0] == STATUS.index("not_separable")).sum())
+        several += int((table.columns()["status"][held] == "not_separable").sum())
     assert looks == 8 * 9999
     # Samples nearer than 2 / K are not independent: alarms come in twos and threes.
     assert several < 3 * STATED * looks

@@ -56,10 +56,8 @@ def test_one_touch_of_a_wrong_model_in_motion_is_one():
         assert trial.course.samples > 400
         assert trial.course.several == trial.course.wrong == 0
         robot, _, skin = told_and_real(OFF, run)
-        blind = Pipeline(robot, skin=skin, torque_error=0.0, friction=0.5)
-        thresholds = expecting(blind.detector.thresholds, 0.0, 0.0, 0.0)
-        blind.detector = Detector(blind.observer, thresholds)
-        blind.recorder.detector = blind.detector
+        thresholds = expecting(make_thresholds(robot), 0.0, 0.0, 0.0)
+        blind = Pipeline(robot, skin=skin, torque_error=0.0, friction=0.5, thresholds=thresholds)
         scene = make_scene(OFF, run)
         s = scene.signals
         blind.run(s.time, s.q, s.qd, s.tau, s.wrench)
@@ -159,7 +157,7 @@ def judged(cell, run):
     s = scene.signals
     pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
     (event,) = pipeline.events
-    answer = pipeline.localizer.answer(pipeline.contacts.answers[-1])
+    answer = pipeline.contacts[-1]
     row = np.searchsorted(s.time, event.time_of_position)
     off = np.linalg.norm(event.position - true_places(robot, scene, s.q[row])[0])
     return event.position_std, np.sqrt(np.trace(answer.covariance)), off

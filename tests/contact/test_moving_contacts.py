@@ -36,8 +36,7 @@ def touched(robot, skin, speed, swing, seed, segments=None):
     pipeline.run(signals.time, signals.q, signals.qd, signals.tau, signals.wrench)
     table = pipeline.contacts
     answers = {}
-    for row, sample, segment in zip(table.answers, table.sample, table.segment, strict=True):
-        answer = pipeline.localizer.answer(row)
+    for answer, sample, segment in zip(table, table.sample, table.segment, strict=True):
         answers.setdefault((sample, robot.segment_names[segment]), []).append(answer)
     places = [carried(robot, touch, signals.q) for touch in touches]
     return touches, places, answers

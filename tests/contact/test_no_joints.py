@@ -57,7 +57,7 @@ def test_a_tool_without_joints_is_felt(probe):
     robot = tl.load_robot(probe)
     assert robot.joint_names == () and robot.segment_names == ("mount",)
     live, recorded = tl.Pipeline(robot), tl.Pipeline(robot)
-    touch, s = touched(robot, live.localizer.skin)
+    touch, s = touched(robot, live.skin)
     for sample in zip(s.time, s.q, s.qd, s.tau, s.wrench, strict=True):
         result = live.update(*sample)
     (contact,) = result.contacts
@@ -72,7 +72,7 @@ def test_a_tool_without_joints_is_felt(probe):
 
 def test_every_command_takes_it(probe, tmp_path, capsys):
     robot = tl.load_robot(probe)
-    touch, s = touched(robot, tl.Pipeline(robot).localizer.skin, 2.0, 4.0)
+    touch, s = touched(robot, tl.Pipeline(robot).skin, 2.0, 4.0)
     write_log(tmp_path / "log.csv", s)
     quiet = resting_signals(robot, s.q[0], [], 30.0, np.random.default_rng(2))
     write_log(tmp_path / "quiet.csv", quiet)

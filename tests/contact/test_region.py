@@ -91,11 +91,11 @@ def test_a_region_is_that_of_one_contact_or_an_error():
     s = three_touches(robot, speed=0.0, seconds=0.5).samples
     pipeline, several = tl.Pipeline(robot), 0
     with pytest.raises(ValueError, match="single contact"):
-        pipeline.localizer.region()
+        pipeline.region()
     for sample in zip(s.time, s.q, s.qd, s.tau, s.wrench, strict=True):
         contacts = pipeline.update(*sample).contacts
         if len(contacts) > 1 and several < 5:
             several += 1
             with pytest.raises(ValueError, match="single contact"):
-                pipeline.localizer.region()
+                pipeline.region()
     assert several == 5

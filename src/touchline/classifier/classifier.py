@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from touchline.classifier.zones import Zones
 from touchline.detector.thresholds import RowThreshold, Thresholds
+from touchline.model.robot import Robot
 from touchline.native import core
 from touchline.observer.observer import Estimate, Observer
 
@@ -56,12 +57,7 @@ class Classifier:
     """
 
     def __init__(self, observer: Observer, thresholds: Thresholds, zones: Zones) -> None:
-        robot, limits = observer.robot, []
-        for g, segment in enumerate(robot.segment_names):
-            rows = [row for row in thresholds.rows if row.segment == g]
-            onset, collision = _blow(rows)
-            torques = [row.joint for row in rows if row.joint >= 0] if segment == "root" else []
-            limits.append(core.BlowLimits(max(zones.onset(segment), onset), collision, torques))
+        limits = blow_limits(observer.robot, thresholds, zones)
         self.core = core.Classifier(observer.kernel, limits)
 
     def follow(self, time: Array, estimate: Estimate, levels: Array) -> Classes:
@@ -74,6 +70,17 @@ class Classifier:
         """
         stamps = np.ascontiguousarray(time, dtype=float)
         return Classes(*self.core.follow(stamps, estimate.rows, levels))
+
+
+def blow_limits(robot: Robot, thresholds: Thresholds, zones: Zones) -> list[core.BlowLimits]:
+    """From when on a touch is a blow, for each segment, in the words of the native core."""
+    limits = []
+    for g, segment in enumerate(robot.segment_names):
+        rows = [row for row in thresholds.rows if row.segment == g]
+        onset, collision = _blow(rows)
+        torques = [row.joint for row in rows if row.joint >= 0] if segment == "root" else []
+        limits.append(core.BlowLimits(max(zones.onset(segment), onset), collision, torques))
+    return limits
 
 
 def _blow(rows: Sequence[RowThreshold]) -> tuple[float, float]:

@@ -2,8 +2,7 @@
 """Which part of a robot is meant to be touched: structure, end effector or handle."""
 
 from touchline.model.robot import Robot
-
-Zone = str
+from touchline.result.kinds import Zone
 
 
 class Zones:
@@ -25,8 +24,8 @@ class Zones:
             for link in body.links:
                 zone = given.get(link) or given.get(body.segment)
                 zone = zone or _guess(body.segment, link, body.node not in parents)
-                self._links[link] = zone
-                self._segments.setdefault(body.segment, set()).add(zone)
+                self._links[link] = Zone(zone)
+                self._segments.setdefault(body.segment, set()).add(Zone(zone))
         self._onset = vars(robot.description.policy.onset)
 
     def of(self, segment: str, link: str | None = None) -> Zone | None:
@@ -38,11 +37,11 @@ class Zones:
 
     def onset(self, segment: str) -> float:
         """The rate of force [N/s] of a collision on a segment: the lowest of its zones."""
-        zones = self._segments.get(segment) or {"structure"}
+        zones = self._segments.get(segment) or {Zone.STRUCTURE}
         return min(self._onset[zone] for zone in zones)
 
 
 def _guess(segment: str, link: str, outermost: bool) -> Zone:
     if "handle" in (segment, link):
-        return "handle"
-    return "end_effector" if outermost and segment != "root" else "structure"
+        return Zone.HANDLE
+    return Zone.END_EFFECTOR if outermost and segment != "root" else Zone.STRUCTURE

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Detection of contacts and collisions on the residuals, one sample or a recording at a time."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from touchline.detector.residual_noise import native_noise
 from touchline.detector.thresholds import Thresholds, make_thresholds
+from touchline.model.robot import Robot
 from touchline.native import core
 from touchline.observer.observer import Estimate, Observer
 
@@ -41,16 +41,6 @@ class Detection:
     drift: Array
     quiet: Array
 
-    @staticmethod
-    def joined(samples: "Sequence[Detection]") -> "Detection":
-        """Single samples as N samples."""
-        return Detection(
-            np.array([sample.levels for sample in samples]),
-            np.array([sample.normalized for sample in samples]),
-            np.array([sample.drift for sample in samples]),
-            np.array([sample.quiet for sample in samples]),
-        )
-
 
 @dataclass(frozen=True)
 class Details:
@@ -75,6 +65,29 @@ class Details:
     activity: Array
 
 
+def native_rows(thresholds: Thresholds) -> list[core.DetectionRow]:
+    """What is tested, in the words of the native core."""
+    return [core.DetectionRow(**vars(row)) for row in thresholds.rows]
+
+
+def native_settings(robot: Robot, thresholds: Thresholds, period: float) -> core.DetectionSettings:
+    """How it is tested, in the words of the native core; `period`: between samples [s]."""
+    detection = robot.description.detection
+    times = core.DetectionTimes(
+        detection.min_duration, detection.hold, detection.baseline.time, detection.release
+    )
+    return core.DetectionSettings(
+        [
+            core.TestSetting(getattr(core.Test, method), limits.tolist())
+            for method, limits in thresholds.limits.items()
+        ],
+        thresholds.sum_limit.tolist(),
+        times,
+        native_noise(robot, period),
+        list(detection.windows),
+    )
+
+
 class Detector:
     """Runs an observer and tests its residuals (see the native `detector.hpp`).
 
@@ -89,23 +102,10 @@ class Detector:
     ) -> None:
         self.observer = observer
         self.thresholds = thresholds or make_thresholds(observer.robot, period)
-        detection = observer.robot.description.detection
-        times = core.DetectionTimes(
-            detection.min_duration, detection.hold, detection.baseline.time, detection.release
-        )
         self._core = core.Detector(
             observer.kernel,
-            [core.DetectionRow(**vars(row)) for row in self.thresholds.rows],
-            core.DetectionSettings(
-                [
-                    core.TestSetting(getattr(core.Test, method), limits.tolist())
-                    for method, limits in self.thresholds.limits.items()
-                ],
-                self.thresholds.sum_limit.tolist(),
-                times,
-                native_noise(observer.robot, period),
-                list(detection.windows),
-            ),
+            native_rows(self.thresholds),
+            native_settings(observer.robot, self.thresholds, period),
         )
 
     def update(self, time, q, qd, tau=None, wrench=None) -> tuple[Estimate, Detection]:

@@ -4,16 +4,15 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from touchline.classifier.classifier import Classifier
 from touchline.detector.detector import Detection
 from touchline.detector.residual_noise import native_noise
 from touchline.detector.thresholds import Thresholds
-from touchline.localizer.answer import ENDED, NUMBER, Answer, Names, event_answer
 from touchline.localizer.region import Region
 from touchline.localizer.skin import Skin
 from touchline.native import core
 from touchline.observer.observer import Estimate, Observer
-from touchline.result.event import EventAnswer
+from touchline.result.contact import Contact
+from touchline.result.native import Names
 
 Array = NDArray[np.float64]
 
@@ -21,6 +20,20 @@ RULES = ("likelihood", "paper")
 FRICTION = 0.8  # coefficient of the friction cone: skin and rubber
 TORQUE_ERROR = 0.02  # a joint's torque sensor is no better, and a touch is no point
 MODEL_ERROR = 0.02  # masses and inertias of a good model from CAD are no better
+
+
+def localizer_settings(rule: str, friction: float) -> core.LocalizerSettings:
+    """In the words of the native core.
+
+    Raises:
+        ValueError: for an unknown rule.
+    """
+    if rule not in RULES:
+        raise ValueError(f"rule is '{rule}', allowed: {', '.join(RULES)}")
+    settings = core.LocalizerSettings()
+    settings.friction = friction
+    settings.first_entry = rule == "paper"
+    return settings
 
 
 class Localizer:
@@ -56,15 +69,17 @@ class Localizer:
         torque_error: float = TORQUE_ERROR,
         skin: Skin | None = None,
     ) -> None:
-        if rule not in RULES:
-            raise ValueError(f"rule is '{rule}', allowed: {', '.join(RULES)}")
+        settings = localizer_settings(rule, friction)
         self.observer, self.robot = observer, observer.robot
         self.skin = skin or Skin(self.robot)
-        self._names = Names(self.skin.patches, {body.node: body.name for body in self.robot.bodies})
+        self.skin.check_robot(self.robot)
+        self._names = Names.of(
+            self.robot.segment_names,
+            self.robot.joint_names,
+            [patch.link for patch in self.skin.patches],
+            [patch.body for patch in self.skin.patches],
+        )
         graspable = self.robot.description.graspable
-        settings = core.LocalizerSettings()
-        settings.friction = friction
-        settings.first_entry = rule == "paper"
         rows = thresholds.rows if thresholds else ()
         self.core = core.Localizer(
             observer.kernel,
@@ -84,7 +99,7 @@ class Localizer:
         estimate: Estimate,
         detection: Detection | None = None,
         qd: ArrayLike | None = None,
-    ) -> Answer:
+    ) -> Contact:
         """The contact on a segment at one instant.
 
         Args:
@@ -104,84 +119,17 @@ class Localizer:
             None if detection is None else detection.drift,
             None if detection is None else detection.quiet,
         )
-        return self.answer(row[0])
-
-    def follow(
-        self,
-        classifier: Classifier,
-        time: Array,
-        q: Array,
-        qd: Array,
-        estimate: Estimate,
-        detection: Detection,
-    ) -> tuple[Array, Array]:
-        """Takes N samples, and the classifier with it: who is touched where, and how.
-
-        Returns:
-            (M, w): a row for each sample and contact on a touched segment, with the columns of
-            `touchline.localizer.answer`. And (E, v): sample, segment, number of the contact, then a
-            native event, for `event_answer`, of each event that ended.
-        """
-        return self.core.follow(
-            classifier.core,
-            np.ascontiguousarray(time, float),
-            estimate.rows,
-            detection.normalized,
-            detection.drift,
-            detection.levels,
-            detection.quiet,
-            np.ascontiguousarray(q, float),
-            np.ascontiguousarray(qd, float),
-        )
-
-    def follow_sample(
-        self,
-        classifier: Classifier,
-        time: float,
-        q: Array,
-        qd: Array,
-        estimate: Estimate,
-        detection: Detection,
-    ) -> tuple[Array, Array]:
-        """Takes one sample, as `follow` takes N."""
-        return self.core.follow_sample(
-            classifier.core,
-            time,
-            estimate.rows,
-            detection.normalized,
-            detection.drift,
-            detection.levels,
-            detection.quiet,
-            q,
-            qd,
-        )
+        return Contact.of(row, self._names)
 
     def region(self) -> Region:
-        """The posterior over links and surfaces of the only contact of the last sample.
+        """The posterior over links and surfaces of the contact of the last `locate`.
 
-        Of the last call of `locate`, or of the last sample of `Pipeline.update` or `run` in which
-        something touched. Takes milliseconds: worked out when asked for.
+        Takes milliseconds: worked out when asked for.
 
         Raises:
-            ValueError: there are several contacts, or none whose place follows from that sample
-                alone; a `Contact` has `candidates` and `covariance` in any case.
+            ValueError: nothing was located.
         """
-        cells = self.core.region()
-        return Region(
-            tuple(patch.link for patch in self.skin.patches),
-            cells[:, 0].astype(int),
-            cells[:, 1:4],
-            cells[:, 4],
-            np.exp(cells[:, 5]),
-        )
-
-    def open_events(self) -> dict[int, EventAnswer]:
-        """The events that last, by the number of the contact."""
-        return {int(row[NUMBER]): self.event_answer(row[ENDED:]) for row in self.core.events()}
-
-    def event_answer(self, row: Array) -> EventAnswer:
-        """Names the numbers of a native event."""
-        return event_answer(row, self._names, self.robot)
+        return Region.of(self.skin, self.core.region())
 
     def wrench_covariance(
         self,
@@ -200,7 +148,3 @@ class Localizer:
         q = np.ascontiguousarray(q, float)
         drift = None if detection is None else detection.drift
         return self.core.wrench_covariance(q, estimate.rows, index, drift)
-
-    def answer(self, row: Array) -> Answer:
-        """Names the numbers of a native answer."""
-        return Answer(row, self._names)

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from touchline.localizer.skin import Skin
+
 Array = NDArray[np.float64]
 
 
@@ -26,6 +28,17 @@ class Region:
     points: Array
     probability: Array
     density: Array
+
+    @staticmethod
+    def of(skin: Skin, cells: Array) -> "Region":
+        """From native cells: surface, centre, probability, log of the density."""
+        return Region(
+            tuple(patch.link for patch in skin.patches),
+            cells[:, 0].astype(int),
+            cells[:, 1:4],
+            cells[:, 4],
+            np.exp(cells[:, 5]),
+        )
 
     def level(self, link: str, point: ArrayLike) -> float:
         """Probability of the smallest highest-posterior region that holds a point of a link.

@@ -79,6 +79,24 @@ class Skin:
             if link in bodies
         )
 
+    def check_robot(self, robot: Robot) -> None:
+        """Checks that these are the surfaces of a robot, or of one with the same links.
+
+        Raises:
+            ValueError: they are another robot's.
+        """
+        if robot is self.robot:
+            return
+        for patch in self.patches:
+            place = robot.places.get(patch.link)
+            if place is None:
+                what = f"'{patch.link}', which {robot.name} lacks"
+            elif place.node != patch.node or not np.allclose(place.T_node_link, patch.T_node_link):
+                what = f"'{patch.link}', which stands elsewhere on {robot.name}"
+            else:
+                continue
+            raise ValueError(f"skin is that of another robot ({self.robot.name}): it has {what}")
+
     def crossings(
         self, q: ArrayLike, origin: ArrayLike, direction: ArrayLike, segment: str | None = None
     ) -> list[Crossing]:

@@ -20,16 +20,17 @@ def native_observer(
 ) -> core.Observer:
     """A native observer; `bandwidth` [rad/s] overrides the description's."""
     return core.Observer(
-        [_node(node) for node in robot.nodes],
+        [native_node(node) for node in robot.nodes],
         robot.gravity.tolist(),
-        [_joint_row(robot, i, bandwidth) for i in range(len(robot.joint_names))],
-        [_sensor_row(robot, i, bandwidth) for i in range(len(robot.sensor_names))],
+        [joint_row(robot, i, bandwidth) for i in range(len(robot.joint_names))],
+        [sensor_row(robot, i, bandwidth) for i in range(len(robot.sensor_names))],
         getattr(core.Method, method),
         getattr(core.Discretization, discretization),
     )
 
 
-def _node(node: Node) -> core.Node:
+def native_node(node: Node) -> core.Node:
+    """A body on its joint or sensor."""
     T, body = node.T_parent_node, node.inertia
     return core.node(
         node.parent,
@@ -45,7 +46,8 @@ def _node(node: Node) -> core.Node:
     )
 
 
-def _joint_row(robot: Robot, index: int, bandwidth: float | None) -> core.JointRow:
+def joint_row(robot: Robot, index: int, bandwidth: float | None) -> core.JointRow:
+    """A joint with its channel; `bandwidth` [rad/s] overrides the description's."""
     joint = robot.description.joints[index]
     row = core.JointRow()
     row.torque = getattr(core.Torque, {"from": "from_sensors"}.get(joint.torque, joint.torque))
@@ -64,7 +66,8 @@ def _joint_row(robot: Robot, index: int, bandwidth: float | None) -> core.JointR
     return row
 
 
-def _sensor_row(robot: Robot, index: int, bandwidth: float | None) -> core.SensorRow:
+def sensor_row(robot: Robot, index: int, bandwidth: float | None) -> core.SensorRow:
+    """A sensor with its channels; `bandwidth` [rad/s] overrides the description's."""
     sensor = robot.description.sensors[index]
     row = core.SensorRow()
     row.node = next(i for i, node in enumerate(robot.nodes) if node.sensor == sensor.name)

@@ -90,7 +90,7 @@ class Estimate:
     @property
     def health(self) -> Any:
         """Health bits (see `touchline.Health`): an int, or (N,) integers for a recording."""
-        value = self._part("health")[..., 0].astype(np.uint8)
+        value = self._part("health")[..., 0].astype(np.uint32)
         return int(value) if value.ndim == 0 else value
 
 
@@ -165,11 +165,8 @@ class Observer:
         Raises:
             ValueError: for a wrong shape.
         """
-        stamps = _numbers(time, "time", None)
-        if stamps.ndim != 1:
-            raise ValueError(f"time has shape {stamps.shape}, expected (N,)")
-        rows = self.kernel.run(stamps, *self.arrays(stamps.shape, q, qd, tau, wrench))
-        return Estimate(rows, self._slices)
+        stamps, signals = self.recording(time, q, qd, tau, wrench)
+        return Estimate(self.kernel.run(stamps, *signals), self._slices)
 
     def reset(self) -> None:
         """Forgets the past: the next sample starts anew."""
@@ -178,6 +175,17 @@ class Observer:
     def estimate(self, rows: Array) -> Estimate:
         """Names the parts of the kernel's rows."""
         return Estimate(rows, self._slices)
+
+    def recording(self, time: ArrayLike, *signals: ArrayLike | None) -> tuple[Array, list[Array]]:
+        """Stamps (N,) and the signals of N samples as the kernel wants them.
+
+        Raises:
+            ValueError: for a wrong shape.
+        """
+        stamps = _numbers(time, "time", None)
+        if stamps.ndim != 1:
+            raise ValueError(f"time has shape {stamps.shape}, expected (N,)")
+        return stamps, self.arrays(stamps.shape, *signals)
 
     def arrays(self, lead: tuple[int, ...], *signals: ArrayLike | None) -> list[Array]:
         """Signals q, qd, tau, wrench as the kernel wants them, `lead` being () or (N,).

@@ -1,82 +1,99 @@
 # SPDX-License-Identifier: Apache-2.0
 """The contacts of a recording as columns: one row per contact and sample."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.localizer.answer import (
-    COVARIANCE,
-    FORCE,
-    HEAD,
-    POSITION,
-    PROBABILITY,
-    STATUS,
-    SURFACE,
-)
-from touchline.localizer.localizer import Localizer
+from touchline.result.contact import Contact
+from touchline.result.native import CONTACT, Names, names_of
+from touchline.result.value import Field
 
 Array = NDArray[np.float64]
 
-UPPER = {"pxx": 0, "pxy": 1, "pxz": 2, "pyy": 4, "pyz": 5, "pzz": 8}
+LEFT_OUT = "-"  # a number of a field that has no column
+
+
+def contact_schema() -> dict[str, str]:
+    """Type of each column of a contact: "f8", "i8" or "str"."""
+    return {
+        column: {"number": "f8", "vector": "f8", "count": "i8"}.get(field.kind, "str")
+        for field in CONTACT
+        for column in field.columns
+        if column != LEFT_OUT
+    }
 
 
 @dataclass(frozen=True)
 class ContactTable:
-    """M rows in the order of the samples.
+    """M rows in the order of the samples; `table[i]` is a `Contact`.
 
     Attributes:
         sample: (M,) index of the sample in its part of the recording.
-        segment: (M,) index of the segment.
-        event: (M,) number of the event.
-        answers: (M, w) native answers, see `Localizer.answer`.
-        localizer: that made them.
+        numbers: (M, w) of the core, see `touchline.result.native`.
+        names: of the robot.
     """
 
     sample: NDArray[np.int64]
-    segment: NDArray[np.int64]
-    event: NDArray[np.int64]
-    answers: Array
-    localizer: Localizer
+    numbers: Array
+    names: Names
 
     @staticmethod
-    def empty(localizer: Localizer) -> "ContactTable":
+    def empty(names: Names) -> "ContactTable":
         """No contacts."""
-        none = np.empty(0, dtype=np.int64)
-        return ContactTable(none, none, none, np.empty((0, HEAD)), localizer)
+        width = CONTACT[-1].begin + CONTACT[-1].size
+        return ContactTable(np.empty(0, dtype=np.int64), np.empty((0, width)), names)
 
     def __len__(self) -> int:
         return len(self.sample)
+
+    def __getitem__(self, row: int) -> Contact:
+        return Contact.of(self.numbers[row], self.names)
+
+    def __iter__(self) -> Iterator[Contact]:
+        return (self[row] for row in range(len(self)))
+
+    @property
+    def segment(self) -> NDArray[np.int64]:
+        """(M,) index of the segment."""
+        return self._field("segment")[:, 0].astype(np.int64)
+
+    @property
+    def event(self) -> NDArray[np.int64]:
+        """(M,) number of the event."""
+        return self._field("event")[:, 0].astype(np.int64)
+
+    @property
+    def position(self) -> Array:
+        """(M, 3) [m] in world; NaN where there is no honest answer."""
+        return self._field("position")
 
     def columns(self) -> dict[str, NDArray]:
         """Columns as in `contacts.parquet`, without `time` and `health`.
 
         Names are objects, None where there is no honest answer; numbers are NaN there. The force is
-        that of the contact where it is located, and the segment's where it is not.
+        that of the contact where it is located, and the segment's where it is not; the moment is
+        the segment's about the world origin.
         """
-        answers = self.answers
-        status = answers[:, 0].astype(int)
-        placed = (status == STATUS.index("located")) | (status == STATUS.index("ambiguous"))
-        robot, patches = self.localizer.robot, self.localizer.skin.patches
-        surface = np.where(placed, answers[:, SURFACE], -1).astype(int)
-        covariance = np.where(placed[:, None], answers[:, COVARIANCE], np.nan)
-        position = np.where(placed[:, None], answers[:, POSITION], np.nan)
-        variance = covariance[:, [0, 4, 8]].sum(axis=1)
         return {
-            "event": self.event,
-            "segment": _names(robot.segment_names, self.segment),
-            "link": _names([patch.link for patch in patches], surface),
-            "body": _names([patch.body for patch in patches], surface),
-            "body_probability": np.where(placed, answers[:, PROBABILITY], np.nan),
-            "status": _names(STATUS, np.where(status == 0, STATUS.index("wrench_only"), status)),
-            **dict(zip("xyz", position.T, strict=True)),
-            **dict(zip(("fx", "fy", "fz"), answers[:, FORCE].T, strict=True)),
-            "position_std": np.sqrt(np.maximum(variance, 0.0)),
-            **{name: covariance[:, i] for name, i in UPPER.items()},
+            column: self._column(field, i)
+            for field in CONTACT
+            for i, column in enumerate(field.columns)
+            if column != LEFT_OUT
         }
 
+    def _field(self, name: str) -> Array:
+        field = next(field for field in CONTACT if field.name == name)
+        return self.numbers[:, field.begin : field.begin + field.size]
 
-def _names(names, index: NDArray[np.int64]) -> NDArray[np.object_]:
-    """The name at each index; None for -1."""
-    return np.array([*names, None], dtype=object)[index]
+    def _column(self, field: Field, i: int) -> NDArray:
+        numbers = self.numbers[:, field.begin + i]
+        if field.kind in ("number", "vector"):
+            return numbers
+        if field.kind == "count":
+            return numbers.astype(np.int64)
+        names = names_of(field.kind, self.names) or ()
+        words = [None if name is None else str(name) for name in names]
+        return np.array(words, dtype=object)[numbers.astype(np.int64)]

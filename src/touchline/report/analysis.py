@@ -116,7 +116,7 @@ def analyze(
         for part in _with_progress(recording, chain([first], parts)):
             run.add(part)
         warnings = bandwidth_warnings(bandwidths(model, bandwidth), run.period)
-        warnings += [*recording.warnings, *model.warnings, *run.pipeline.localizer.skin.lost]
+        warnings += [*recording.warnings, *model.warnings, *run.pipeline.skin.lost]
     analysis = run.finish(log, method, bandwidth, warnings)
     write_origin(out / ANALYSIS, log, robot, _origin(analysis))
     if report:
@@ -182,7 +182,7 @@ class _Run:
             method=method,
             bandwidth=bandwidth,
             period=self.period,
-            thresholds=self.pipeline.detector.thresholds,
+            thresholds=self.pipeline.thresholds,
             statistics=self._statistics,
             curves=self._curves,
             events=events,

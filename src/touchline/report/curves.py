@@ -53,7 +53,7 @@ class Curves:
 
     def __init__(self, pipeline: Pipeline, period: float) -> None:
         self._robot = pipeline.robot
-        self._rows = pipeline.detector.thresholds.rows
+        self._rows = pipeline.thresholds.rows
         self._joint_rows = {row.joint: i for i, row in enumerate(self._rows) if row.joint >= 0}
         self._segments = [i for i, s in enumerate(self._robot.segment_names) if s != "root"]
         self._columns = 0

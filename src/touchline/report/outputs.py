@@ -13,10 +13,9 @@ import numpy as np
 from touchline import __version__
 from touchline.errors import InputError
 from touchline.logs import EstimateWriter, TableWriter
-from touchline.model.description import AXES
 from touchline.model.robot import Robot
 from touchline.observer.observer import Estimate
-from touchline.pipeline.table import ContactTable
+from touchline.pipeline.table import ContactTable, contact_schema
 from touchline.report.postures import PostureWriter
 from touchline.result.event import Event
 
@@ -24,12 +23,7 @@ ESTIMATES, CONTACTS, POSTURES = "estimates.parquet", "contacts.parquet", "postur
 EVENTS, ANALYSIS, REPORT = "events.json", "analysis.json", "report.html"
 NAMES = (ESTIMATES, CONTACTS, POSTURES, EVENTS, ANALYSIS, REPORT)
 PARTS = tuple(f"{name.removesuffix('.parquet')}.parts" for name in NAMES[:3])
-CONTACT_SCHEMA: dict[str, Any] = (
-    {"time": "f8", "health": "u4", "event": "i8", "segment": "str", "link": "str", "body": "str"}
-    | {"body_probability": "f8", "status": "str"}
-    | dict.fromkeys(("x", "y", "z", *AXES, "position_std"), "f8")
-    | dict.fromkeys(("pxx", "pxy", "pxz", "pyy", "pyz", "pzz"), "f8")
-)
+CONTACT_SCHEMA = {"time": "f8", "health": "u4"} | contact_schema()
 
 
 def prepare_directory(directory: Path, *inputs: Path) -> None:
@@ -125,14 +119,9 @@ class Outputs:
         self._postures.add(time, q)
 
     def contacts(self, time: np.ndarray, estimate: Estimate, table: ContactTable) -> None:
-        """Append the contacts of N samples.
-
-        `fx fy fz` is the contact's force, `mx my mz` the segment's moment about the world origin.
-        """
-        moments = estimate.segment_wrench[table.sample, table.segment, 3:]
+        """Append the contacts of N samples."""
         rows = {"time": time[table.sample], "health": estimate.health[table.sample].astype("u4")}
-        moment_columns = dict(zip(("mx", "my", "mz"), moments.T, strict=True))
-        self._contacts.write(rows | table.columns() | moment_columns)
+        self._contacts.write(rows | table.columns())
 
     def events(self, events: Sequence[Event]) -> None:
         """Bring `events.json` up to date: an event is in it as soon as it begins."""

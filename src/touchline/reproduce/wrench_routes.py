@@ -42,7 +42,7 @@ class Routes:
 
     def __init__(self, replay: Replay) -> None:
         self.replay, self.robot = replay, replay.robot
-        self.skin: Skin = replay.pipeline.localizer.skin
+        self.skin: Skin = replay.pipeline.skin
 
     @cached_property
     def _classical(self) -> Array:

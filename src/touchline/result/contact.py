@@ -6,16 +6,18 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.result.kinds import ContactLevel, Status
 from touchline.result.line import line_point
+from touchline.result.native import CONTACT, decoders
+from touchline.result.value import Value, lazily
 
 Array = NDArray[np.float64]
 
-STATUSES = ("located", "ambiguous", "not_separable", "wrench_only")
 UNKNOWNS = 5  # of one contact
 
 
-@dataclass(frozen=True)
-class Candidate:
+@dataclass(frozen=True, eq=False, repr=False)
+class Candidate(Value):
     """One explanation of a contact: `position` (3,) [m] in world on `link`, of rigid `body`.
 
     Where contacts cannot be told apart, it stands for the part of the link within `radius` [m].
@@ -35,9 +37,11 @@ def least_contacts(status: str, unknowns: int | None) -> int | None:
     return unknowns // UNKNOWNS if unknowns else None
 
 
-@dataclass(frozen=True)
-class Contact:
+@dataclass(frozen=True, eq=False, repr=False)
+class Contact(Value):
     """A contact on one segment at one instant; what is not known is None.
+
+    One of a pipeline works its attributes out when they are asked for.
 
     Attributes:
         segment: name of the segment.
@@ -58,12 +62,14 @@ class Contact:
         rank: where no equation is left over, for one contact (joint torques alone) or for several
             that begin together: how many independent ones there are, for the `unknowns` (two for
             each place, three for each force). With fewer than unknowns no place is named.
+        pitch: how far the segment's wrench is from that of one pure force [standard deviations].
+        chi2: misfit of the best explanation, with `degrees` of freedom.
     """
 
     segment: str
     event: int
-    level: str
-    status: str = "wrench_only"
+    level: ContactLevel | str
+    status: Status | str = Status.WRENCH_ONLY
     wrench: Array | None = None
     link: str | None = None
     body: str | None = None
@@ -78,6 +84,9 @@ class Contact:
     rate: float | None = None
     rank: int | None = None
     unknowns: int | None = None
+    pitch: float | None = None
+    chi2: float | None = None
+    degrees: int | None = None
 
     @property
     def at_least(self) -> int | None:
@@ -130,3 +139,6 @@ class Contact:
     def position_std(self) -> float | None:
         """Square root of the covariance's trace [m]."""
         return None if self.covariance is None else float(np.sqrt(np.trace(self.covariance)))
+
+
+lazily(Contact, decoders(CONTACT, Candidate))

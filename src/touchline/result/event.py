@@ -8,18 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.result.contact import Candidate, least_contacts
+from touchline.result.kinds import ContactLevel, Happened, Status
+from touchline.result.native import EVENT, decoders
+from touchline.result.value import Value, lazily
 
 Array = NDArray[np.float64]
 
 
-FIRST = ("id", "segment", "level", "detected", "cleared")  # in `events.json`, for its readers
-
-
-@dataclass
-class EventAnswer:
-    """Where an event is, from all its strong samples; what is not known is None.
+@dataclass(kw_only=True, eq=False, repr=False)
+class Event(Value):
+    """One contact from beginning to end, or so far; what is not known is None.
 
     Attributes:
+        id: number, from 0 in the order of detection.
+        segment: name of the segment.
+        level: "contact" or "collision": how it began, or a blow while it lasted.
+        detected: time at which the test fired [s], not the onset.
+        cleared: time at which it ended [s]; None while it lasts.
         status: as of a `Contact`, over the event.
         link: the link that carries the point, of the rigid `body`.
         body_probability: of that body, 0 to 1.
@@ -28,29 +33,6 @@ class EventAnswer:
         time_of_position: the last strong sample [s].
         position_std: root of the trace of its covariance [m].
         candidates: all explanations, best first, at `time_of_position`.
-    """
-
-    status: str = "wrench_only"
-    link: str | None = None
-    body: str | None = None
-    body_probability: float | None = None
-    position: Array | None = None
-    position_link: Array | None = None
-    time_of_position: float | None = None
-    position_std: float | None = None
-    candidates: tuple[Candidate, ...] = ()
-
-
-@dataclass(kw_only=True)
-class Event(EventAnswer):
-    """One contact from beginning to end; grows while it lasts.
-
-    Attributes, besides those of an `EventAnswer` (`status`, `link`, `position` ...):
-        id: number, from 0 in the order of detection.
-        segment: name of the segment.
-        level: "contact" or "collision": how it began, or a blow while it lasted.
-        detected: time at which the test fired [s], not the onset.
-        cleared: time at which it ended [s]; None while it lasts.
         joint: the most distal loaded joint; None where no torque tells.
         force: (3,) [N] in world, mean over the strong samples; None on `root`.
         force_peak: largest force [N]; None on `root`.
@@ -64,9 +46,18 @@ class Event(EventAnswer):
 
     id: int
     segment: str
-    level: str
+    level: ContactLevel | str
     detected: float
     cleared: float | None = None
+    status: Status | str = Status.WRENCH_ONLY
+    link: str | None = None
+    body: str | None = None
+    body_probability: float | None = None
+    position: Array | None = None
+    position_link: Array | None = None
+    time_of_position: float | None = None
+    position_std: float | None = None
+    candidates: tuple[Candidate, ...] = ()
     joint: str | None = None
     force: Array | None = None
     force_peak: float | None = None
@@ -85,8 +76,18 @@ class Event(EventAnswer):
 
     def as_json(self) -> dict[str, Any]:
         """The event as in `events.json`."""
-        known = vars(self)
-        return {key: _plain(known[key]) for key in (*FIRST, *known)}
+        return {name: _plain(value) for name, value in self._known().items()}
+
+
+lazily(Event, decoders(EVENT, Candidate))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class EventChange(Value):
+    """What a sample did to an event: it began, changed or ended; and the event from then on."""
+
+    happened: Happened
+    event: Event
 
 
 def _plain(value: Any) -> Any:
@@ -94,7 +95,9 @@ def _plain(value: Any) -> Any:
         return [float(x) for x in value]
     if isinstance(value, tuple):
         return [_plain(part) for part in value]
+    if isinstance(value, str):
+        return str(value)
     if isinstance(value, Candidate):
-        known = {key: _plain(part) for key, part in vars(value).items()}
+        known = {key: _plain(part) for key, part in value._known().items()}
         return known if value.radius else {k: x for k, x in known.items() if k != "radius"}
     return value

@@ -116,7 +116,7 @@ class JointsOnly:
                     "root",
                     0,
                     level,
-                    answer.status or "wrench_only",
+                    answer.status,
                     None,
                     answer.link,
                     answer.body,

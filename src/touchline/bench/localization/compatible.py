@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from touchline.bench.localization.touched import NEAR
 from touchline.bench.touches import Touch
-from touchline.localizer.answer import Answer
 from touchline.localizer.skin import Patch, Skin
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import contact_loads
+from touchline.result.contact import Contact
 
 Array = NDArray[np.float64]
 
@@ -97,7 +97,7 @@ def exact_readings(robot: Robot, touches: Sequence[Touch]) -> Readings:
     return Readings(q, np.sum(wrenches, axis=0), np.where(own, torque, np.nan))
 
 
-def covered(answers: Sequence[Answer], points: SurfacePoints) -> NDArray[np.bool_]:
+def covered(answers: Sequence[Contact], points: SurfacePoints) -> NDArray[np.bool_]:
     """For each point (N,): does it lie in a part of a link that answers name?"""
     inside = np.zeros(len(points.patch), dtype=bool)
     links = np.array([patch.link for patch in points.patches])[points.patch]
@@ -236,7 +236,7 @@ class CompatiblePairs:
 
 
 def surface_shares(
-    skin: Skin, touches: Sequence[Touch], answers: Sequence[Answer], friction: float, seed: int
+    skin: Skin, touches: Sequence[Touch], answers: Sequence[Contact], friction: float, seed: int
 ) -> tuple[float, float]:
     """Which share of a segment's surface is named for two touches, and which exact readings allow.
 

@@ -12,7 +12,6 @@ from touchline.bench.localization.moving import carried
 from touchline.bench.localization.scene import Scene
 from touchline.bench.localization.touched import NEAR
 from touchline.bench.tables import Row, aligned
-from touchline.localizer.answer import POSITION, STATUS
 from touchline.pipeline.pipeline import Pipeline
 
 SHOWN = 0.02  # s after an onset: the filter shows most of the force
@@ -47,18 +46,17 @@ def follow_course(pipeline: Pipeline, scene: Scene) -> Course:
     robot, signals, table = pipeline.robot, scene.signals, pipeline.contacts
     begin = max(onset for _, onset in scene.touches) + SHOWN
     late = signals.time[table.sample] >= begin
-    sample, answers = table.sample[late], table.answers[late]
+    sample, status = table.sample[late], table.columns()["status"][late]
     if not len(sample):
         return Course(0, 0, 0)
     sample = sample - sample[0]
     q = signals.q[table.sample[late][0] :]
-    status = answers[:, 0].astype(int)
     count = np.bincount(sample)
     several = count > len(scene.touches)
-    several[sample[status == STATUS.index("not_separable")]] = True
+    several[sample[status == "not_separable"]] = True
     places = np.array([carried(robot, touch, q)[0] for touch, _ in scene.touches])
-    off = np.linalg.norm(places[:, sample] - answers[:, POSITION], axis=2).min(axis=0) > NEAR
-    wrong = np.unique(sample[off & (status == STATUS.index("located"))])
+    off = np.linalg.norm(places[:, sample] - table.position[late], axis=2).min(axis=0) > NEAR
+    wrong = np.unique(sample[off & (status == "located")])
     return Course(int((count > 0).sum()), int(several.sum()), len(wrong))
 
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.localizer.answer import Answer
+from touchline.result.contact import Contact
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ def mixture_level(
     return float(np.mean(density(points, np.array(list(kinds))[which]) > here))
 
 
-def credibility(answer: Answer, body: str, place: Array) -> float:
+def credibility(answer: Contact, body: str, place: Array) -> float:
     """Level of the region of an answer that just holds a place (3,) [m] on a body.
 
     Every candidate has the covariance of the best one, which is all that an answer tells.

@@ -13,9 +13,9 @@ from touchline.bench.localization.matching import distances, match
 from touchline.bench.localization.moving import carried
 from touchline.bench.localization.scene import Scene, true_places
 from touchline.bench.touches import Touch
-from touchline.localizer.answer import Answer
 from touchline.model.robot import Robot
 from touchline.pipeline.pipeline import Pipeline
+from touchline.result.contact import Contact
 from touchline.result.event import Event
 
 Array = NDArray[np.float64]
@@ -83,14 +83,11 @@ class Touched:
         return self.status == "located" and not self.error < NEAR
 
 
-def last_answers(pipeline: Pipeline, scene: Scene) -> list[tuple[str, Answer]]:
-    """What is said of each contact at the last sample, and on which segment it is."""
+def last_contacts(pipeline: Pipeline, scene: Scene) -> list[Contact]:
+    """What is said of each contact at the last sample."""
     table = pipeline.contacts
-    last = table.sample == len(scene.signals.time) - 1
-    return [
-        (pipeline.robot.segment_names[segment], pipeline.localizer.answer(row))
-        for segment, row in zip(table.segment[last], table.answers[last], strict=True)
-    ]
+    last = np.flatnonzero(table.sample == len(scene.signals.time) - 1)
+    return [table[row] for row in last.tolist()]
 
 
 def judge(pipeline: Pipeline, scene: Scene, with_region: bool) -> list[Touched]:
@@ -103,15 +100,14 @@ def judge(pipeline: Pipeline, scene: Scene, with_region: bool) -> list[Touched]:
     """
     robot, signals = pipeline.robot, scene.signals
     places = true_places(robot, scene, signals.q[-1])
-    said = last_answers(pipeline, scene)
-    answers = [answer for _, answer in said]
+    answers = last_contacts(pipeline, scene)
     mine = match(distances(places, [answer.position for answer in answers]))
     apart = _event_distances(pipeline.events, robot, scene)
     my_event = match(apart)
     judged = []
     for i, (touch, _) in enumerate(scene.touches):
         about = _where(robot, touch)
-        on_segment = [a for segment, a in said if segment == about["segment"]]
+        on_segment = [a for a in answers if a.segment == about["segment"]]
         about["on_segment"] = sum(answer.position is not None for answer in on_segment)
         if (k := my_event[i]) is not None:
             body = pipeline.events[k].body or ""
@@ -121,7 +117,7 @@ def judge(pipeline: Pipeline, scene: Scene, with_region: bool) -> list[Touched]:
             about |= _in_motion(answers[k], robot, scene, touch)
             if with_region and len(answers) == 1:
                 with suppress(ValueError):  # else as of a known contact, from its covariance
-                    region = pipeline.localizer.region()
+                    region = pipeline.region()
                     about["level"] = region.level(touch.patch.link, places[i])
         about |= _of_candidates(answers, touch, places[i])
         judged.append(Touched(**about))
@@ -146,7 +142,7 @@ def _event_distances(events: list[Event], robot: Robot, scene: Scene) -> Array:
     return np.array(columns).reshape(len(events), len(scene.touches)).T
 
 
-def _of_answer(answer: Answer, touch: Touch, place: Array) -> dict:
+def _of_answer(answer: Contact, touch: Touch, place: Array) -> dict:
     """What is said of a touch by an answer with a position."""
     covariance = np.full((3, 3), np.nan) if answer.covariance is None else answer.covariance
     position, force = (
@@ -157,13 +153,13 @@ def _of_answer(answer: Answer, touch: Touch, place: Array) -> dict:
         "force_error": float(np.linalg.norm(force - touch.force)),
         "found_link": answer.link or "",
         "found_body": answer.body or "",
-        "status": answer.status or "",
+        "status": str(answer.status),
         "std": float(np.sqrt(np.trace(covariance))),
         "level": credibility(answer, touch.patch.body, place),
     }
 
 
-def _in_motion(answer: Answer, robot: Robot, scene: Scene, touch: Touch) -> dict:
+def _in_motion(answer: Contact, robot: Robot, scene: Scene, touch: Touch) -> dict:
     """Lag, and the error of a force that has turned with its link, on an arm in motion."""
     s = scene.signals
     points, forces = carried(robot, touch, s.q[-2:])
@@ -180,7 +176,7 @@ def _in_motion(answer: Answer, robot: Robot, scene: Scene, touch: Touch) -> dict
     return about
 
 
-def _of_candidates(answers: list[Answer], touch: Touch, place: Array) -> dict:
+def _of_candidates(answers: list[Contact], touch: Touch, place: Array) -> dict:
     known = [k for answer in answers for k in answer.candidates if k.body == touch.patch.body]
     if not known:
         return {}

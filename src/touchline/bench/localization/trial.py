@@ -17,7 +17,7 @@ from touchline.bench.localization.scene import (
     told_and_real,
     true_places,
 )
-from touchline.bench.localization.touched import NEAR, Touched, judge, last_answers
+from touchline.bench.localization.touched import NEAR, Touched, judge, last_contacts
 from touchline.detector.detector import Detection
 from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
@@ -79,7 +79,7 @@ def run_trial(cell: Cell, run: int, seed: int = 0, baselines: tuple[str, ...] = 
     s = scene.signals
     estimate, detection = pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
     touches = tuple(judge(pipeline, scene, with_region=cell.begin != "segments"))
-    answers = [answer for _, answer in last_answers(pipeline, scene)]
+    answers = last_contacts(pipeline, scene)
     named = sum(answer.position is not None for answer in answers)
     rank = pair_rank(robot, [touch.body for touch in touches])
     surfaces = (np.nan, np.nan)
@@ -92,7 +92,7 @@ def run_trial(cell: Cell, run: int, seed: int = 0, baselines: tuple[str, ...] = 
         touches,
         named,
         len(pipeline.events),
-        tuple(answer.status or "" for answer in answers),
+        tuple(str(answer.status) for answer in answers),
         rank,
         follow_course(pipeline, scene),
         tuple(

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include "touchline/detail/model/spatial.hpp"
@@ -40,6 +41,7 @@ struct Triangle {
 
 class Mesh {
  public:
+  Mesh() = default;  // without triangles
   Mesh(const std::vector<Vec3>& vertices, const std::vector<std::array<int, 3>>& faces) {
     for (std::size_t i = 0; i < faces.size(); ++i) {
       const Vec3 a = vertices[faces[i][0]];
@@ -48,8 +50,13 @@ class Mesh {
       const double length = norm(n);
       if (length > 0.0) triangles_.push_back({a, ab, ac, (1.0 / length) * n, static_cast<int>(i)});
     }
-    boxes_.reserve(triangles_.size() + 1);
-    if (!triangles_.empty()) build(0, static_cast<int>(triangles_.size()));
+    order();
+  }
+  // From the triangles of another mesh, in any order: answers are the same, to the last bit.
+  explicit Mesh(std::vector<Triangle> triangles) : triangles_(std::move(triangles)) {
+    std::sort(triangles_.begin(), triangles_.end(),
+              [](const Triangle& s, const Triangle& t) { return s.face < t.face; });
+    order();
   }
 
   const std::vector<Triangle>& triangles() const { return triangles_; }
@@ -125,6 +132,11 @@ class Mesh {
     int next;   // a leaf's first triangle, or an inner box's second child (the first follows it)
     int count;  // triangles of a leaf; 0: an inner box
   };
+
+  void order() {
+    boxes_.reserve(triangles_.size() + 1);
+    if (!triangles_.empty()) build(0, static_cast<int>(triangles_.size()));
+  }
 
   int build(int begin, int end) {
     const int index = static_cast<int>(boxes_.size());

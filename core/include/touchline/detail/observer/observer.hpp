@@ -21,15 +21,9 @@
 #include "touchline/detail/observer/row.hpp"
 #include "touchline/detail/observer/signals.hpp"
 #include "touchline/detail/observer/terms.hpp"
+#include "touchline/sample.hpp"
 
 namespace touchline {
-
-// One sample as the robot reports it: q, qd, tau have one number per joint, wrench six per sensor;
-// NaN where not measured.
-struct Sample {
-  double time;
-  const double *q, *qd, *tau, *wrench;
-};
 
 class Observer {
  public:
@@ -111,6 +105,8 @@ class Observer {
   const std::vector<SensorRow>& sensors() const { return sensors_; }
   const std::vector<double>& output() const { return output_; }
   double time() const { return now_.time; }  // of the last accepted sample
+  // Steps in time beyond this [s] are gaps.
+  double max_gap() const { return clock_.max_gap(); }
   // Of sensor s in world, at the last accepted sample.
   Pose sensor_pose(int s) const {
     return load_pose(before_ + terms_.at().sensor(s) + TermsLayout::kPose);

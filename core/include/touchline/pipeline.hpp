@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+// From samples to contacts and events: observer, detection, localization, classification and the
+// record of events in one object. One pipeline belongs to one thread at a time. After construction
+// neither `update` nor `run` allocates, locks, throws or prints.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "touchline/detail/classifier/classifier.hpp"
+#include "touchline/detail/detector/detector.hpp"
+#include "touchline/detail/events/describe.hpp"
+#include "touchline/detail/events/event_recorder.hpp"
+#include "touchline/detail/events/period_watch.hpp"
+#include "touchline/detail/localizer/localizer.hpp"
+#include "touchline/detail/observer/observer.hpp"
+#include "touchline/result.hpp"
+#include "touchline/robot.hpp"
+#include "touchline/sample.hpp"
+#include "touchline/tuning.hpp"
+
+namespace touchline {
+
+class Pipeline {
+ public:
+  // Throws std::invalid_argument with what is wrong where the parts of the robot do not fit.
+  explicit Pipeline(Robot robot, const Tuning& tuning = {})
+      : robot_(checked(std::move(robot))),
+        tuning_(tuning),
+        observer_(Tree(robot_.nodes, robot_.gravity), robot_.joints, robot_.sensors, tuning.method,
+                  tuning.discretization),
+        detector_(observer_, robot_.rows, robot_.detection),
+        localizer_(observer_, robot_.rows, robot_.noise, std::move(robot_.surfaces),
+                   tuning.localizer),
+        classifier_(observer_, robot_.blows),
+        recorder_(robot_, observer_, localizer_),
+        period_(robot_.noise.period),
+        levels_(robot_.segment_names.size(), 0.0),
+        contacts_(robot_.segment_names.size() * Reports::kMost) {}
+
+  Pipeline(const Pipeline&) = delete;
+  Pipeline& operator=(const Pipeline&) = delete;
+
+  // Takes one sample. A bad one is told in `Result::health`. What is returned is valid until the
+  // next call.
+  Result update(const Sample& sample) { return follow(sample, observer_.step(sample)); }
+
+  // Takes N samples, whose signals stand one after the other in each array, and calls
+  // `each(Result)` after each. `rows` has room for N rows of the observer. The numbers are those of
+  // `update`, to the last bit, in whatever parts the samples come.
+  template <class Each>
+  void run(std::size_t samples, const double* time, const Sample& first, double* rows, Each&& each) {
+    const std::size_t n = robot_.joints.size(), w = 6 * robot_.sensors.size();
+    std::size_t i = 0;
+    observer_.run(samples, time, first.q, first.qd, first.tau, first.wrench, rows,
+                  [&](const double* row) {
+                    const Sample sample{time[i], first.q + i * n, first.qd + i * n,
+                                        first.tau + i * n, first.wrench + i * w};
+                    ++i;
+                    each(follow(sample, row));
+                  });
+  }
+
+  // Calls `visit(Event)` for each event that lasts, in the order of detection. It takes as long as
+  // a few samples; those that have ended were told by the sample that ended them.
+  template <class Visit>
+  void visit_lasting(Visit&& visit) {
+    recorder_.visit_lasting(visit);
+  }
+
+  // The posterior over surfaces of the only contact of the last sample; takes milliseconds and
+  // allocates. Throws std::invalid_argument where there are several or none.
+  std::vector<SurfaceCell> region() const { return localizer_.region(); }
+
+  // Without its surfaces, which are the localizer's: `surfaces()`.
+  const Robot& robot() const { return robot_; }
+  const std::vector<LinkSurface>& surfaces() const { return localizer_.surfaces(); }
+  const Tuning& tuning() const { return tuning_; }
+  const RowLayout& row_layout() const { return observer_.row_layout(); }
+  std::size_t rows() const { return robot_.rows.size(); }  // of the detector
+
+ private:
+  static Robot checked(Robot robot) {
+    check(robot);
+    return robot;
+  }
+
+  Result follow(const Sample& sample, const double* row) {
+    detector_.step(row, sample.q, sample.qd);
+    std::copy(detector_.levels().begin(), detector_.levels().end(), levels_.begin());
+    classifier_.step(sample.time, row, levels_.data());
+    recorder_.begin();
+    count_ = 0;
+    if (touched()) localize(sample, row);
+    recorder_.finish();
+    period_.take(observer_.time(), observer_.max_gap());
+    return result(sample, row);
+  }
+
+  // Is a segment touched, or was it at the last sample?
+  bool touched() {
+    const bool before = touched_;
+    touched_ = std::any_of(levels_.begin(), levels_.end(), [](double x) { return x > 0.0; });
+    return before || touched_;
+  }
+
+  void localize(const Sample& sample, const double* row) {
+    const Estimate estimate(row, observer_.row_layout());
+    const Span<double> normalized{detector_.normalized().data(), detector_.normalized().size()};
+    if (touched_) {
+      localizer_.set_state(sample.q, sample.qd, detector_.drift().data(), detector_.quiet().data());
+    }
+    for (std::size_t segment = 0; segment < levels_.size(); ++segment) {
+      const int g = static_cast<int>(segment);
+      const bool felt = levels_[segment] > 0.0;
+      localizer_.follow(g, felt, row, normalized.data(), sample.time, sample.q);
+      const Reports& reports = localizer_.reports();
+      if (felt) {
+        classifier_.consider(g, reports);
+        for (int k = 0; k < reports.count(); ++k) {
+          Contact& contact = contacts_[count_++];
+          fill(contact, g, k, estimate);
+          contact.event = recorder_.add(reports[k].serial, contact, reports.share(k), sample.time,
+                                        sample.q, estimate.tau_ext(), normalized);
+        }
+      }
+      for (Localizer::Memory* memory : localizer_.ended()) {
+        recorder_.end(*memory, sample.time);
+        memory->serial = -1;
+      }
+    }
+  }
+
+  // All of contact k on segment g but its event.
+  void fill(Contact& c, int g, int k, const Estimate& estimate) const {
+    const Answer& answer = localizer_.reports()[k].answer;
+    const Kind kind = classifier_.kind(g, localizer_.reports().share(k));
+    describe(answer, g, c);
+    c.zone = c.link >= 0 ? robot_.links[c.link].zone : robot_.segment_zones[g];
+    c.level = kind == Kind::collision ? ContactLevel::collision : ContactLevel::contact;
+    c.decided = kind >= Kind::contact;
+    c.clamped = classifier_.clamped(g, k)             ? Clamped::yes
+                : c.status == Status::not_separable ? Clamped::unknown
+                                                      : Clamped::no;
+    c.rate = classifier_.rate(g);
+    const bool root = observer_.layout().segments[g].sensor < 0;
+    const Span<double> wrench = estimate.segment_wrench(g);
+    for (int i = 0; i < 6; ++i) c.wrench[i] = root ? kUnknown : wrench[i];
+  }
+
+  Result result(const Sample& sample, const double* row) const {
+    const RowLayout& layout = observer_.row_layout();
+    const Health health = static_cast<Health>(row[layout.health()]) |
+                          (period_.differs() ? kPeriodDiffers : 0) |
+                          (recorder_.crowded() ? kNoRoom : 0);
+    return {sample.time,
+            health,
+            Estimate(row, layout),
+            view(detector_.levels()),
+            view(detector_.normalized()),
+            view(detector_.drift()),
+            view(detector_.quiet()),
+            {contacts_.data(), count_},
+            view(recorder_.changes())};
+  }
+
+  template <class T>
+  static Span<T> view(const std::vector<T>& values) {
+    return {values.data(), values.size()};
+  }
+
+  Robot robot_;
+  Tuning tuning_;
+  Observer observer_;
+  Detector detector_;
+  Localizer localizer_;
+  Classifier classifier_;
+  EventRecorder recorder_;
+  PeriodWatch period_;
+  std::vector<double> levels_;  // of the segments, as the classifier takes them
+  std::vector<Contact> contacts_;
+  std::size_t count_ = 0;  // of contacts in the last sample
+  bool touched_ = false;
+};
+
+}  // namespace touchline

@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: Apache-2.0
+// The pipeline for Python: one native call per sample, or one for many.
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "arrays.hpp"
+#include "fields.hpp"
+#include "guard.hpp"
+#include "localizer_bindings.hpp"
+#include "samples.hpp"
+#include "touchline/touchline.hpp"
+
+namespace pipelines {
+
+namespace nb = nanobind;
+namespace tl = touchline;
+using namespace nb::literals;
+
+// The pipeline, and what a user of Python may ask for later: the events that have ended.
+struct Pipeline {
+  Pipeline(tl::Robot robot, const tl::Tuning& tuning)
+      : value(std::move(robot), tuning),
+        unmeasured(value.robot().joints.size() + 6 * value.robot().sensors.size(), tl::kUnknown) {}
+
+  tl::Pipeline value;
+  std::mutex turn;
+  std::vector<double> ended;       // numbers of events, one after the other
+  std::vector<double> unmeasured;  // NaN for each torque and wrench
+  std::vector<double> snapshot;    // of the last sample, on its way to Python
+};
+
+// Where the parts of a snapshot stand: the observer's row with the health of the pipeline, what the
+// detector says, how many contacts and changes of events follow.
+struct Snapshot {
+  explicit Snapshot(const tl::Pipeline& p)
+      : width(p.row_layout().width()),
+        segments(p.row_layout().segments),
+        rows(p.rows()),
+        levels(width),
+        normalized(levels + segments),
+        drift(normalized + rows),
+        quiet(drift + rows),
+        contacts(quiet + segments),
+        changes(contacts + 1),
+        end(changes + 1) {}
+  std::size_t width, segments, rows;
+  std::size_t levels, normalized, drift, quiet, contacts, changes, end;
+};
+
+inline void write_row(const tl::Result& result, const tl::RowLayout& layout, double* out) {
+  const tl::Span<double> row = result.estimate.row();
+  std::copy(row.begin(), row.end(), out);
+  out[layout.health()] = static_cast<double>(result.health);
+}
+
+// Keeps the events that a sample has ended.
+inline void keep_ended(Pipeline& p, const tl::Result& result) {
+  for (const tl::EventChange& change : result.events) {
+    if (change.happened != tl::Happened::ended) continue;
+    p.ended.resize(p.ended.size() + fields::width<tl::Event>());
+    tl::write_numbers(change.event, &*p.ended.end() - fields::width<tl::Event>());
+  }
+}
+
+inline void take_snapshot(const tl::Pipeline& p, const tl::Result& result,
+                          std::vector<double>& out) {
+  const Snapshot at(p);
+  const std::size_t contact = fields::width<tl::Contact>(), event = fields::width<tl::Event>() + 1;
+  out.resize(at.end + result.contacts.size() * contact + result.events.size() * event);
+  write_row(result, p.row_layout(), out.data());
+  std::copy(result.levels.begin(), result.levels.end(), out.data() + at.levels);
+  std::copy(result.normalized.begin(), result.normalized.end(), out.data() + at.normalized);
+  std::copy(result.drift.begin(), result.drift.end(), out.data() + at.drift);
+  std::copy(result.quiet.begin(), result.quiet.end(), out.data() + at.quiet);
+  out[at.contacts] = static_cast<double>(result.contacts.size());
+  out[at.changes] = static_cast<double>(result.events.size());
+  double* to = out.data() + at.end;
+  for (const tl::Contact& c : result.contacts) to = tl::write_numbers(c, to);
+  for (const tl::EventChange& change : result.events) {
+    *to++ = static_cast<double>(change.happened);
+    to = tl::write_numbers(change.event, to);
+  }
+}
+
+inline nb::object update(Pipeline& p, double time, nb::handle q, nb::handle qd, nb::handle tau,
+                         nb::handle wrench) {
+  const tl::RowLayout& layout = p.value.row_layout();
+  const std::size_t n = layout.joints, k = layout.sensors;
+  const double* missing = p.unmeasured.data();
+  const tl::Sample sample{time, arrays::numbers(q, {n}), arrays::numbers(qd, {n}),
+                          arrays::numbers_or(tau, {n}, missing),
+                          arrays::numbers_or(wrench, {k, 6}, missing)};
+  std::vector<double> numbers;  // taken out of its turn: a new array may run any code of Python
+  {
+    const guard::Turn turn(p.turn);
+    const tl::Result result = p.value.update(sample);
+    keep_ended(p, result);
+    take_snapshot(p.value, result, p.snapshot);
+    numbers.swap(p.snapshot);
+  }
+  const nb::object out = arrays::line(numbers);
+  numbers.swap(p.snapshot);
+  return out;
+}
+
+// N samples: rows of the observer, what the detector says of each, and contacts: the sample, then
+// the numbers of the contact.
+inline nb::tuple run(Pipeline& p, nb::handle time, nb::handle q, nb::handle qd, nb::handle tau,
+                     nb::handle wrench) {
+  const samples::Many in = samples::many(p.value.row_layout(), time, q, qd, tau, wrench);
+  const Snapshot at(p.value);
+  arrays::Out rows({in.rows, at.width}), levels({in.rows, at.segments}),
+      normalized({in.rows, at.rows}), drift({in.rows, at.rows}), quiet({in.rows, at.segments});
+  std::vector<double> contacts;
+  const std::size_t contact = fields::width<tl::Contact>() + 1;
+  double *level = levels.data(), *x = normalized.data(), *y = drift.data(), *since = quiet.data();
+  {
+    const guard::Turn turn(p.turn);
+    nb::gil_scoped_release release;
+    std::size_t i = 0;
+    p.value.run(in.rows, in.time, in.first, rows.data(), [&](const tl::Result& result) {
+      level = std::copy(result.levels.begin(), result.levels.end(), level);
+      x = std::copy(result.normalized.begin(), result.normalized.end(), x);
+      y = std::copy(result.drift.begin(), result.drift.end(), y);
+      since = std::copy(result.quiet.begin(), result.quiet.end(), since);
+      for (const tl::Contact& c : result.contacts) {
+        contacts.resize(contacts.size() + contact);
+        double* to = &*contacts.end() - contact;
+        *to = static_cast<double>(i);
+        tl::write_numbers(c, to + 1);
+      }
+      keep_ended(p, result);
+      const std::size_t health = i * at.width + p.value.row_layout().health();
+      rows.data()[health] = static_cast<double>(result.health);
+      ++i;
+    });
+  }
+  return nb::make_tuple(rows.release(), levels.release(), normalized.release(), drift.release(),
+                        quiet.release(), arrays::table(contacts, contact));
+}
+
+// The events that have ended, from number `from` of them on, and those that last.
+inline nb::tuple events(Pipeline& p, std::size_t from) {
+  const std::size_t width = fields::width<tl::Event>();
+  std::vector<double> ended, lasting;
+  {
+    const guard::Turn turn(p.turn);
+    ended.assign(p.ended.begin() + std::min(from * width, p.ended.size()), p.ended.end());
+    p.value.visit_lasting([&](const tl::Event& event) {
+      lasting.resize(lasting.size() + width);
+      tl::write_numbers(event, &*lasting.end() - width);
+    });
+  }
+  return nb::make_tuple(arrays::table(ended, width), arrays::table(lasting, width));
+}
+
+inline nb::dict slices(const Pipeline& p) {
+  const Snapshot at(p.value);
+  nb::dict d;
+  const auto add = [&d](const char* name, std::size_t begin, std::size_t end) {
+    d[name] = nb::make_tuple(begin, end);
+  };
+  add("row", 0, at.width);
+  add("levels", at.levels, at.normalized);
+  add("normalized", at.normalized, at.drift);
+  add("drift", at.drift, at.quiet);
+  add("quiet", at.quiet, at.contacts);
+  add("counts", at.contacts, at.end);
+  add("contact", 0, fields::width<tl::Contact>());
+  add("event", 0, fields::width<tl::Event>());
+  return d;
+}
+
+inline tl::Link link(std::string name, std::string body, tl::Zone zone,
+                     const std::vector<double>& R, const std::vector<double>& p) {
+  if (R.size() != 9 || p.size() != 3) throw std::invalid_argument("nine and three numbers are needed");
+  return {std::move(name), std::move(body), zone,
+          {{{R[0], R[3], R[6]}, {R[1], R[4], R[7]}, {R[2], R[5], R[8]}}, {p[0], p[1], p[2]}}};
+}
+
+inline void bind(nb::module_& m) {
+  fields::bind(m);
+  nb::enum_<tl::Zone>(m, "Zone")
+      .value("structure", tl::Zone::structure)
+      .value("end_effector", tl::Zone::end_effector)
+      .value("handle", tl::Zone::handle)
+      .value("open", tl::Zone::open);
+  nb::class_<tl::Link>(m, "Link");
+  m.def("link", &link, "name"_a, "body"_a, "zone"_a, "R"_a, "p"_a);
+  nb::class_<tl::Tuning>(m, "Tuning")
+      .def(nb::init<>())
+      .def_rw("method", &tl::Tuning::method)
+      .def_rw("discretization", &tl::Tuning::discretization)
+      .def_rw("localizer", &tl::Tuning::localizer);
+  nb::class_<tl::Robot>(m, "Robot")
+      .def(nb::init<>())
+      .def_rw("name", &tl::Robot::name)
+      .def_rw("nodes", &tl::Robot::nodes)
+      .def_rw("joints", &tl::Robot::joints)
+      .def_rw("sensors", &tl::Robot::sensors)
+      .def_rw("joint_names", &tl::Robot::joint_names)
+      .def_rw("sensor_names", &tl::Robot::sensor_names)
+      .def_rw("segment_names", &tl::Robot::segment_names)
+      .def_rw("rows", &tl::Robot::rows)
+      .def_rw("detection", &tl::Robot::detection)
+      .def_rw("noise", &tl::Robot::noise)
+      .def_rw("blows", &tl::Robot::blows)
+      .def_rw("segment_zones", &tl::Robot::segment_zones)
+      .def_rw("surfaces", &tl::Robot::surfaces)
+      .def_rw("links", &tl::Robot::links)
+      .def("set_gravity",
+           [](tl::Robot& robot, double x, double y, double z) { robot.gravity = {x, y, z}; })
+      .def("check", [](const tl::Robot& robot) { tl::check(robot); })
+      .def("to_bytes", [](const tl::Robot& robot) {
+        const std::string content = tl::robot_bytes(robot);
+        return nb::bytes(content.data(), content.size());
+      });
+  nb::exception<tl::RobotFileError>(m, "RobotFileError", PyExc_ValueError);
+  m.def("read_robot", &tl::read_robot, "path"_a);
+  nb::class_<Pipeline>(m, "Pipeline")
+      .def(
+          "__init__",
+          [](Pipeline* self, const tl::Robot& robot, const tl::Tuning& tuning) {
+            new (self) Pipeline(robot, tuning);
+          },
+          "robot"_a, "tuning"_a)
+      .def("update", &update, "time"_a, "q"_a, "qd"_a, "tau"_a.none(), "wrench"_a.none())
+      .def("run", &run, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a)
+      .def("events", &events, "since"_a)
+      .def("region",
+           [](Pipeline& p) {
+             const guard::Turn turn(p.turn);
+             return localization::region(p.value.region());
+           })
+      .def_prop_ro("slices", &slices);
+}
+
+}  // namespace pipelines

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A robot with its surfaces and thresholds in the words of the native core, and as a file of it."""
+
+from pathlib import Path
+
+from touchline.classifier.classifier import blow_limits
+from touchline.classifier.zones import Zones
+from touchline.detector.detector import native_rows, native_settings
+from touchline.detector.residual_noise import native_noise
+from touchline.detector.thresholds import Thresholds
+from touchline.localizer.skin import Skin
+from touchline.model.kernel import joint_row, native_node, sensor_row
+from touchline.model.robot import Robot
+from touchline.native import core
+
+
+def native_robot(
+    robot: Robot,
+    thresholds: Thresholds,
+    skin: Skin,
+    period: float,
+    bandwidth: float | None,
+    wrench_error: float,
+    torque_error: float,
+) -> core.Robot:
+    """All that the native pipeline has to know of a robot; arguments as of `Pipeline`."""
+    zones, graspable = Zones(robot), robot.description.graspable
+    native = core.Robot()
+    native.name = robot.name
+    native.nodes = [native_node(node) for node in robot.nodes]
+    native.set_gravity(*robot.gravity.tolist())
+    native.joints = [joint_row(robot, i, bandwidth) for i in range(len(robot.joint_names))]
+    native.sensors = [sensor_row(robot, i, bandwidth) for i in range(len(robot.sensor_names))]
+    native.joint_names = list(robot.joint_names)
+    native.sensor_names = list(robot.sensor_names)
+    native.segment_names = list(robot.segment_names)
+    native.rows = native_rows(thresholds)
+    native.detection = native_settings(robot, thresholds, period)
+    native.noise = native_noise(robot, period, wrench_error, torque_error)
+    native.blows = blow_limits(robot, thresholds, zones)
+    native.segment_zones = [_zone(zones.of(segment)) for segment in robot.segment_names]
+    native.surfaces = [
+        core.LinkSurface(patch.node, patch.mesh, patch.link in graspable) for patch in skin.patches
+    ]
+    native.links = [
+        core.link(
+            patch.link,
+            patch.body,
+            _zone(zones.of(patch.segment or "", patch.link)),
+            patch.T_node_link[:3, :3].ravel().tolist(),
+            patch.T_node_link[:3, 3].tolist(),
+        )
+        for patch in skin.patches
+    ]
+    return native
+
+
+def write_robot(path: Path, robot: core.Robot) -> None:
+    """Write the file that `touchline::read_robot` reads, in one step.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    draft = path.with_name(f".{path.name}.part")
+    draft.write_bytes(robot.to_bytes())
+    draft.replace(path)
+
+
+def _zone(zone: str | None) -> core.Zone:
+    return getattr(core.Zone, zone or "open")

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What one sample brought."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.detector.detector import Detection
+from touchline.native import core
+from touchline.observer.observer import Estimate
+from touchline.result.contact import Contact
+from touchline.result.event import Event, EventChange
+from touchline.result.kinds import Happened
+from touchline.result.native import Names
+from touchline.result.value import Value, lazily
+
+Array = NDArray[np.float64]
+
+HAPPENED = tuple(Happened)  # in the order of the core
+
+
+class Layout:
+    """Where the parts of a native snapshot stand.
+
+    Args:
+        native: whose snapshots they are.
+        estimate: slices of the observer's row.
+        names: of the robot.
+    """
+
+    def __init__(self, native: core.Pipeline, estimate: dict[str, slice], names: Names) -> None:
+        slices = {name: slice(*ends) for name, ends in native.slices.items()}
+        self.estimate, self.names = estimate, names
+        self.row, self.levels = slices["row"], slices["levels"]
+        self.normalized, self.drift, self.quiet = (
+            slices[name] for name in ("normalized", "drift", "quiet")
+        )
+        self.health = estimate["health"].start
+        self.contacts, self.changes = slices["counts"].start, slices["counts"].start + 1
+        self.end = slices["counts"].stop
+        self.contact, self.event = slices["contact"].stop, slices["event"].stop
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Result(Value):
+    """What one sample brought; worked out when it is asked for.
+
+    Attributes:
+        estimate: torques and wrenches.
+        contacts: at least one per segment that is touched.
+        detection: levels per segment.
+        health: health bits of the sample (`touchline.Health`).
+        events: those that began, changed or ended with this sample.
+    """
+
+    estimate: Estimate
+    contacts: list[Contact]
+    detection: Detection
+    health: int
+    events: tuple[EventChange, ...] = ()
+
+
+def _estimate(row: Array, at: Layout) -> Estimate:
+    return Estimate(row[at.row], at.estimate)
+
+
+def _contacts(row: Array, at: Layout) -> list[Contact]:
+    return [
+        Contact.of(row[begin : begin + at.contact], at.names)
+        for begin in range(at.end, _end_of_contacts(row, at), at.contact)
+    ]
+
+
+def _end_of_contacts(row: Array, at: Layout) -> int:
+    return at.end + at.contact * int(row.item(at.contacts))
+
+
+def _detection(row: Array, at: Layout) -> Detection:
+    return Detection(row[at.levels], row[at.normalized], row[at.drift], row[at.quiet])
+
+
+def _health(row: Array, at: Layout) -> int:
+    return int(row.item(at.health))
+
+
+def _events(row: Array, at: Layout) -> tuple[EventChange, ...]:
+    begin, width = _end_of_contacts(row, at), at.event + 1
+    return tuple(
+        EventChange(HAPPENED[int(row.item(i))], Event.of(row[i + 1 : i + width], at.names))
+        for i in range(begin, begin + width * int(row.item(at.changes)), width)
+    )
+
+
+lazily(
+    Result,
+    {
+        "estimate": _estimate,
+        "contacts": _contacts,
+        "detection": _detection,
+        "health": _health,
+        "events": _events,
+    },
+)

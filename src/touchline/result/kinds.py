@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The words in which contacts and events are told: text with a fixed choice."""
+
+from enum import StrEnum
+
+
+class Status(StrEnum):
+    """How much of the place of a contact is known."""
+
+    LOCATED = "located"  # one place, and sure of it
+    AMBIGUOUS = "ambiguous"  # the best of several places, or a place that is not sure
+    NOT_SEPARABLE = "not_separable"  # several contacts that cannot be told apart
+    WRENCH_ONLY = "wrench_only"  # no place is an honest answer
+
+
+class ContactLevel(StrEnum):
+    """Contact or collision."""
+
+    CONTACT = "contact"
+    COLLISION = "collision"
+
+
+class Zone(StrEnum):
+    """Which part of a robot is meant to be touched."""
+
+    STRUCTURE = "structure"
+    END_EFFECTOR = "end_effector"
+    HANDLE = "handle"
+
+
+class Happened(StrEnum):
+    """What a sample did to an event; changed are its level, its decision or its clamping."""
+
+    BEGAN = "began"
+    CHANGED = "changed"
+    ENDED = "ended"
