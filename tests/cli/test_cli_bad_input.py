@@ -18,6 +18,7 @@ from free_motion import free_motion
 
 import touchline as tl
 from touchline.cli import main
+from touchline.folder import UNFINISHED
 from touchline.logs import write_table
 from touchline.logs.truth import read_truth
 
@@ -141,7 +142,7 @@ def test_word_in_a_column_of_numbers(capsys, robot, samples, tmp_path):
     path = tmp_path / "log.csv"
     write_table(path, samples, robot.description)
     lines = path.read_text().splitlines()
-    column = lines[0].split(",").index('"tau.joint3"')
+    column = lines[0].split(",").index("tau.joint3")
     cells = lines[101].split(",")
     cells[column] = "oops"
     lines[101] = ",".join(cells)
@@ -259,7 +260,9 @@ def test_truncated_stream_leaves_what_was_read(capsys, robot, tmp_path, monkeypa
     captured = capsys.readouterr()
     assert status in (0, 2) and "log.csv.gz" in captured.err + captured.out
     folder = tmp_path / "r"
-    table = estimates(folder) if status == 0 else pq.read_table(folder / "estimates.parts")
+    table = (
+        estimates(folder) if status == 0 else pq.read_table(folder / UNFINISHED / "estimates.parts")
+    )
     assert 1000 < table.num_rows < 6000
     assert isinstance(table, pa.Table)
 
@@ -296,13 +299,13 @@ def test_a_killed_run_leaves_what_it_had_finished(robot, tmp_path):
     assert process.stdout.readline() == "nine parts\n"
     process.send_signal(signal.SIGKILL)
     process.communicate()
-    table = pq.read_table(out / "estimates.parts")
+    assert [p.name for p in out.iterdir()] == [UNFINISHED]
+    table = pq.read_table(out / UNFINISHED / "estimates.parts")
     np.testing.assert_array_equal(table["time"], samples.time[:2000])
-    assert not (out / "estimates.parquet").exists()
-    text = (out / "events.json").read_text()
+    text = (out / UNFINISHED / "events.json").read_text()
     assert '"segment": "base"' in text and "NaN" not in text
     assert main(arguments) == 0  # and the next run clears up
-    assert not (out / "estimates.parts").exists()
+    assert not (out / UNFINISHED).exists()
     assert pq.read_table(out / "estimates.parquet").num_rows == 3000
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import yaml
 
 from touchline.errors import InputError
+from touchline.folder import check_file, replaced_file
 from touchline.model.packages import shipped_descriptions
 from touchline.model.yaml_file import read_yaml
 
@@ -38,18 +39,11 @@ def write_description(source: Path, out: Path, changes: dict[str, dict[str, Any]
     for key, values in changes.items():
         expected[key] = (data.get(key) or {}) | values
         lines = _merged(lines, key, values, expected[key])
-    part = out.with_name(out.name + ".part")
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
+    check_file(out)
+    with replaced_file(out) as part:
         part.write_text("\n".join(lines) + "\n", encoding="utf-8")
         if not _says(part, expected):  # an unusual layout: written anew, without comments
             part.write_text(_dumped_all(expected), encoding="utf-8")
-        part.replace(out)
-    except OSError as error:
-        raise InputError(f"--out {out}: cannot be written: {error.strerror}") from None
-    finally:
-        if part.exists():
-            part.unlink()
 
 
 def _says(path: Path, expected: dict[str, Any]) -> bool:

@@ -25,6 +25,7 @@ from touchline.detector.calibration import (
 )
 from touchline.detector.tail import Tail
 from touchline.errors import InputError
+from touchline.folder import check_file
 from touchline.model.description import CalibrationDescription, Noise, RowCalibration
 from touchline.model.robot import Robot, load_robot
 from touchline.model.values import METHODS
@@ -130,6 +131,7 @@ def _check(logs: list[Path], out: Path, false_alarms: float | None) -> None:
         raise InputError(f"--out {out}: a robot description ends in .yaml")
     if out.is_dir():
         raise InputError(f"--out {out}: is a folder")
+    check_file(out)
     seen: set[Path] = set()
     for log in logs:
         if log.resolve() in seen:

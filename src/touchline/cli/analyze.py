@@ -23,9 +23,10 @@ def analyze(
     sample), events.json (a list of contacts from beginning to end) and report.html (open it in a
     browser; it needs no network); and for `touchline view DIR` analysis.json (what the results were
     made from) and postures.parquet (joint positions, at most 100 a second). Prints a summary.
-    Older results in DIR are replaced, other files in it are left alone. If it is stopped, what was
-    finished stays: events.json, and the folders
-    estimates.parts and contacts.parts with Parquet files.
+    Older results in DIR are replaced when the new ones are whole; other files in it are left alone.
+    If it is stopped, the older results stand, and what was finished of the new ones is in the
+    folder touchline.unfinished: events.json, and estimates.parts and contacts.parts with Parquet
+    files.
 
     Args:
         log: The recording: a table (.parquet, .csv, .csv.gz) or a rosbag2 (.mcap, .db3, or its

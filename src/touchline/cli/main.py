@@ -54,6 +54,8 @@ usage: touchline bench [NAME] [OPTIONS], or several names; without a name: all o
 EXTRAS = {
     "pyarrow": "logs",
     "rosbags": "logs",
+    "lz4": "logs",
+    "backports": "logs",
     "collada": "meshes",
     "matplotlib": "report",
     "viser": "view",

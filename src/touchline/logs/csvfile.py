@@ -9,19 +9,17 @@ from typing import Any
 
 import numpy as np
 
+from touchline import _logs
 from touchline.errors import InputError
-from touchline.logs.blocks import Block, block_rows, take
+from touchline.logs.blocks import Block, take
 from touchline.logs.columns import Selection, select_columns
 from touchline.logs.lines import WholeLines
 from touchline.logs.naming import Naming
-from touchline.logs.parquet import numbers
 from touchline.logs.source import HEAD_ROWS
 from touchline.model.description import RobotDescription
 
-# A block of text is parsed at once; the streaming reader holds a few of them.
-_BLOCK_BYTES = 4 << 20
+_BLOCK_BYTES = 1 << 20  # of text that is read at once
 _DELIMITERS = (",", ";", "\t")
-_NULLS = ("", "nan", "NaN", "NAN", "-nan", "null", "NULL", "None", "NA", "N/A")
 
 
 def _header(path: Path) -> tuple[list[str], str]:
@@ -89,58 +87,38 @@ class CsvSource:
         yield from self._blocks(quiet=False)
 
     def _blocks(self, quiet: bool) -> Generator[Block, None, None]:
-        import pyarrow as pa
-
         self.close()
         stream = WholeLines(self.path, self._delimiter.encode(), len(self.columns))
         self._stream = stream
-        rows = 0
-        try:
-            for batch in self._batches(stream):
-                block = self._selection.assemble(
-                    lambda name, batch=batch: numbers(batch.column(name)), batch.num_rows
+        stream.readline()
+        columns = sorted(self.columns.index(name) for name in self._selection.names)
+        place = {self.columns[column]: i for i, column in enumerate(columns)}
+        rows, lines = 0, 1
+        while text := stream.read(_BLOCK_BYTES):
+            values, read, problem = _logs.read_csv(
+                text, self._delimiter, len(self.columns), columns
+            )
+            rows += len(values)
+            if len(values):
+                yield self._selection.assemble(
+                    lambda name, values=values: values[:, place[name]], len(values)
                 )
-                rows += block_rows(block)
-                yield block
-        except pa.ArrowInvalid as error:
-            raise InputError(self._diagnose() or f"{self.path}: {error}") from error
+            if problem is not None:
+                raise InputError(self._told(rows, lines, problem))
+            lines += read
         if not rows:
             damage = f" ({stream.damage})" if stream.damage else ""
             raise InputError(f"{self.path}: no rows below the header{damage}")
         if not quiet:
             self._report_cut(stream, rows)
 
-    def _batches(self, stream: WholeLines) -> Iterator[Any]:
-        import pyarrow as pa
-        import pyarrow.csv as arrow_csv
-
-        wanted = self._selection.names
-        # Columns that are not wanted may have any names, even the same one twice.
-        unique = [n if n in wanted else f"{i}\0{n}" for i, n in enumerate(self.columns)]
-        stream.readline()
-        reader = self._open(arrow_csv, pa, stream, unique)
-        if reader is None:
-            return
-        with reader:
-            yield from reader
-
-    def _open(self, arrow_csv: Any, pa: Any, stream: WholeLines, unique: list[str]) -> Any:
-        wanted = self._selection.names
-        try:
-            return arrow_csv.open_csv(
-                stream,
-                read_options=arrow_csv.ReadOptions(column_names=unique, block_size=_BLOCK_BYTES),
-                parse_options=arrow_csv.ParseOptions(delimiter=self._delimiter),
-                convert_options=arrow_csv.ConvertOptions(
-                    include_columns=wanted,
-                    column_types=dict.fromkeys(wanted, pa.float64()),
-                    null_values=list(_NULLS),
-                ),
-            )
-        except pa.ArrowInvalid as error:
-            if "Empty CSV" in str(error):
-                return None
-            raise
+    def _told(self, row: int, lines: int, problem: tuple[int, int, int, bytes]) -> str:
+        line, cells, column, cell = problem
+        where = f"{self.path}: row {row} (line {lines + line + 1})"
+        if cells:
+            return f"{where} has {cells} cells; the header has {len(self.columns)}"
+        text = cell.decode("utf-8", errors="replace")[:80]
+        return f"{where}, column {self.columns[column]!r}: {text!r} is not a number"
 
     def _report_cut(self, stream: WholeLines, rows: int) -> None:
         if stream.damage:
@@ -152,27 +130,6 @@ class CsvSource:
             self.warnings.append(
                 f"{self.path}: the last line (after row {rows}) is incomplete and is left out"
             )
-
-    def _diagnose(self) -> str | None:
-        """Find the first bad cell or row by reading the text again, slowly."""
-        wanted = [(self.columns.index(name), name) for name in self._selection.names]
-        with WholeLines(self.path, self._delimiter.encode(), len(self.columns)) as stream:
-            text = io.TextIOWrapper(io.BufferedReader(stream), encoding="utf-8", errors="replace")
-            reader = csv.reader(text, delimiter=self._delimiter)
-            next(reader, None)
-            row = 0
-            for cells in reader:
-                if not cells:
-                    continue
-                where = f"{self.path}: row {row} (line {reader.line_num})"
-                if len(cells) != len(self.columns):
-                    return f"{where} has {len(cells)} cells; the header has {len(self.columns)}"
-                for at, name in wanted:
-                    cell = cells[at].strip()
-                    if cell not in _NULLS and not _is_number(cell):
-                        return f"{where}, column {name!r}: {cells[at]!r} is not a number"
-                row += 1
-        return None
 
     def progress(self) -> float:
         """Fraction of the file's bytes read."""

@@ -3,6 +3,7 @@
 
 import json
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,15 @@ from touchline.logs.bagfile import Bag
 from touchline.logs.blocks import Block, Window, take, windows
 from touchline.logs.cdr import JOINT_STATE, WRENCH_STAMPED, Decoder
 from touchline.logs.mcap import read_metadata
+from touchline.logs.messages import Messages
 from touchline.logs.naming import Naming
 from touchline.logs.source import HEAD_ROWS
 from touchline.logs.survey import Channel, Survey
 from touchline.logs.topics import choose_topics
 from touchline.model.description import AXES, RobotDescription
 
-_BATCH = 8192
+_BATCH = 8192  # rows
+_TOGETHER = 4096  # messages that are decoded at a time, at least
 # A wrench and the joint state it belongs to are received within this time of each other [s].
 _SKEW = 2.0
 _SIGNALS = {"q": "position", "qd": "velocity", "tau": "effort"}
@@ -99,38 +102,31 @@ class RosbagSource:
 
         The wrenches themselves go into `stores`.
         """
-        topics = {channel.topic: k for k, channel in enumerate(self._wrenches)}
-        joints, wrenches = _Batch(), [_Batch() for _ in stores]
-        counts = [0] * len(stores)
-        seen: list[tuple[int, ...]] = []
-        pending = 0
-        for topic, received, data in self._bag.messages([self._joints.topic, *topics]):
-            if (k := topics.get(topic)) is None:
-                joints.add(received, data)
-                seen.append(tuple(counts))
-            else:
-                wrenches[k].add(received, data)
-                counts[k] += 1
-            pending += 1
-            if len(seen) >= _BATCH or pending >= 8 * _BATCH:
-                yield self._flush(joints, wrenches, seen, stores)
-                pending = 0
-        yield self._flush(joints, wrenches, seen, stores)
+        counts = np.zeros(len(stores), np.intp)
+        held: list[Messages] = []
+        waiting = 0
+        topics = [channel.topic for channel in (self._joints, *self._wrenches)]
+        for part in self._bag.messages(topics):
+            held.append(part)
+            waiting += len(part)
+            if waiting >= _TOGETHER:
+                yield self._decoded(Messages.joined(held), counts, stores)
+                held, waiting = [], 0
+        if held:
+            yield self._decoded(Messages.joined(held), counts, stores)
 
-    def _flush(
-        self,
-        joints: "_Batch",
-        wrenches: list["_Batch"],
-        seen: list[tuple[int, ...]],
-        stores: list["_Store"],
-    ) -> Block:
-        for channel, batch, store in zip(self._wrenches, wrenches, stores, strict=True):
-            decoded = channel.decode(*batch.empty())
+    def _decoded(self, messages: Messages, counts: np.ndarray, stores: list["_Store"]) -> Block:
+        """Rows of some messages; `counts` of wrenches received go on from the messages before."""
+        is_state = messages.topic == 0
+        seen = np.empty((int(is_state.sum()), len(stores)), np.intp)
+        for k, (channel, store) in enumerate(zip(self._wrenches, stores, strict=True)):
+            own = messages.topic == k + 1
+            seen[:, k] = counts[k] + np.cumsum(own)[is_state]
+            counts[k] += own.sum()
+            decoded = channel.decode(messages[own])
             store.append(decoded["time"], decoded["wrench"])
-        decoded = self._joints.decode(*joints.empty())
-        rows = self._rows_of(decoded)
-        rows["seen"] = np.array(seen, dtype=np.intp).reshape(len(seen), len(stores))
-        seen.clear()
+        decoded = self._joints.decode(messages[is_state])
+        rows = self._rows_of(decoded) | {"seen": seen}
         complete = decoded["complete"]
         return {name: values[complete] for name, values in rows.items()}
 
@@ -156,32 +152,12 @@ class RosbagSource:
         return bracket.interpolate(values) if len(values) else np.full((len(own), 6), np.nan)
 
     def progress(self) -> float:
-        """Fraction of the messages read."""
-        channels = {c.topic for c in (self._joints, *self._wrenches)}
-        total = sum(self._bag.counts[topic] for topic in channels)
-        return self._bag.done / total if total else 1.0
+        """Fraction of the files read."""
+        return self._bag.progress
 
     def close(self) -> None:
         """Release the files."""
         self._bag.close()
-
-
-class _Batch:
-    """Messages of one topic that wait to be decoded together."""
-
-    def __init__(self) -> None:
-        self._received: list[int] = []
-        self._data: list[bytes] = []
-
-    def add(self, received: int, data: bytes) -> None:
-        self._received.append(received)
-        self._data.append(data)
-
-    def empty(self) -> tuple[list[int], list[bytes]]:
-        """Hand out everything."""
-        result = self._received, self._data
-        self._received, self._data = [], []
-        return result
 
 
 class _Store:
@@ -216,7 +192,11 @@ def _metadata(path: Path) -> dict[str, Any]:
     """What a recorder of running robots has left in an MCAP file."""
     if not path.is_file() or path.suffix != ".mcap":
         return {}
-    return {key: json.loads(value) for key, value in read_metadata(path).items()}
+    found: dict[str, Any] = {}
+    for key, value in read_metadata(path).items():
+        with suppress(ValueError):  # damaged
+            found[key] = json.loads(value)
+    return found
 
 
 def _axis_factors(description: RobotDescription, naming: Naming) -> np.ndarray:

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A look at the first messages of a rosbag2: periods, clocks, and what is missing."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +9,7 @@ from touchline.errors import InputError
 from touchline.logs.align import typical_period
 from touchline.logs.bagfile import Bag
 from touchline.logs.cdr import Decoder
+from touchline.logs.messages import Messages
 from touchline.model.description import RobotDescription
 from touchline.suggest import did_you_mean, listing
 
@@ -34,12 +34,12 @@ class Channel:
         self.unstamped = False
         self.notes: list[str] = []
 
-    def decode(self, received: Sequence[int], messages: Sequence[bytes]) -> dict[str, np.ndarray]:
+    def decode(self, messages: Messages) -> dict[str, np.ndarray]:
         """Fields of the messages, their `time` [s] and which are `complete`."""
         decoded = self.decoder.decode(messages)
         time = decoded.stamps
         if self.unstamped:
-            time = np.where(time == 0.0, np.array(received, dtype=np.float64) * 1e-9, time)
+            time = np.where(time == 0.0, messages.received * 1e-9, time)
         return decoded.fields | {"time": time, "complete": decoded.complete}
 
     def warnings(self) -> list[str]:
@@ -48,13 +48,13 @@ class Channel:
         bad = [f"{self.topic}: {count} messages cannot be decoded"] if count else []
         return self.notes + bad
 
-    def look(self, received: list[int], messages: list[bytes]) -> dict[str, np.ndarray]:
+    def look(self, messages: Messages) -> dict[str, np.ndarray]:
         """Decode the first messages and learn clock and period from them."""
         stamps = self.decoder.decode(messages).stamps
-        self.unstamped = bool(np.mean(stamps == 0.0) > 0.5) and any(received)
+        self.unstamped = bool(np.mean(stamps == 0.0) > 0.5) and bool(messages.received.any())
         if self.unstamped:
             self.notes.append(f"{self.topic}: headers without a stamp; the receive time is used")
-        found = self.decode(received, messages)
+        found = self.decode(messages)
         self.decoder.undecodable = 0
         self.period = typical_period(found["time"][found["complete"]])
         return found
@@ -70,18 +70,19 @@ class Survey:
 
     def __init__(self, bag: Bag, joints: Channel, wrenches: list[Channel]):
         channels = {channel.topic: channel for channel in (joints, *wrenches)}
-        received: dict[str, list[int]] = {topic: [] for topic in channels}
-        data: dict[str, list[bytes]] = {topic: [] for topic in channels}
-        for number, (topic, stamp, message) in enumerate(bag.messages(list(channels))):
-            if len(data[topic]) < _ENOUGH:
-                received[topic].append(stamp)
-                data[topic].append(message)
-                if all(len(messages) >= _ENOUGH for messages in data.values()):
-                    break
-            if number > _PATIENCE:
+        parts: list[Messages] = []
+        counts, number = np.zeros(len(channels), int), 0
+        for part in bag.messages(list(channels)):
+            ranks = _ranks(part.topic, counts)
+            parts.append(part[ranks < _ENOUGH].compact())
+            counts += np.bincount(part.topic, minlength=len(counts))
+            number += len(part)
+            if (counts >= _ENOUGH).all() or number > _PATIENCE:
                 break
+        head = Messages.joined(parts) if parts else Messages.of([], [], [])
+        first = {topic: head[head.topic == n] for n, topic in enumerate(channels)}
         self._joints, self._bag = joints, bag
-        looks = {t: c.look(received[t], data[t]) for t, c in channels.items() if data[t]}
+        looks = {t: c.look(first[t]) for t, c in channels.items() if len(first[t])}
         empty = {"time": np.empty(0), "complete": np.empty(0, dtype=bool)}
         found = looks.get(joints.topic, empty)
         complete = found["complete"]
@@ -90,7 +91,7 @@ class Survey:
         if len(self.joint_states["time"]):
             lacking = np.all(np.isnan(self.joint_states["velocity"]), axis=0)
             self.without_velocity = tuple(np.flatnonzero(lacking).tolist())
-        self._compare_clocks(wrenches, looks, received)
+        self._compare_clocks(wrenches, looks, first)
         for channel in wrenches:
             if not bag.counts[channel.topic]:
                 channel.notes.append(f"{channel.topic}: no messages; its wrench is not measured")
@@ -101,13 +102,13 @@ class Survey:
         self,
         wrenches: list[Channel],
         looks: dict[str, dict[str, np.ndarray]],
-        received: dict[str, list[int]],
+        first: dict[str, Messages],
     ) -> None:
         """Stamps of two topics should be equally far from their receive times."""
 
         def lag(topic: str) -> float:
             with np.errstate(invalid="ignore"):
-                lags = looks[topic]["time"] - np.array(received[topic]) * 1e-9
+                lags = looks[topic]["time"] - first[topic].received * 1e-9
             return float(np.median(lags[np.isfinite(lags)])) if len(lags) else 0.0
 
         if self._joints.topic not in looks:
@@ -138,6 +139,15 @@ class Survey:
             problems = _missing_values(path, topic, description, states)
         if problems:
             raise InputError(problems)
+
+
+def _ranks(topic: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """(M,) how many messages of its own topic came before each."""
+    ranks = np.zeros(len(topic), int)
+    for number, count in enumerate(before):
+        own = topic == number
+        ranks[own] = count + np.arange(own.sum())
+    return ranks
 
 
 def _missing_joints(path: Path, topic: str, decoder: Decoder) -> list[str]:

@@ -9,6 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from touchline.errors import InputError
+from touchline.folder import replaced_file
+from touchline.logs.csvtext import write_csv
 from touchline.logs.parquet import METADATA_KEY
 from touchline.model.description import AXES, RobotDescription
 
@@ -46,6 +48,8 @@ def write_table(
 ) -> None:
     """Write a recording as Parquet, CSV or CSV.gz, by the name's ending.
 
+    An older file stands until the new one is whole.
+
     Args:
         path: ends in `.parquet`, `.csv` or `.csv.gz`.
         samples: arrays in the robot's order.
@@ -56,33 +60,26 @@ def write_table(
     Raises:
         InputError: another ending, or metadata for a CSV file.
     """
-    import pyarrow as pa
-
     path = Path(path)
-    columns = table_columns(samples, description) | dict(extra or {})
-    table = pa.table({name: pa.array(v, from_pandas=True) for name, v in columns.items()})
-    if path.name.endswith(".parquet"):
-        _write_parquet(path, table, metadata or {})
-    elif path.name.endswith((".csv", ".csv.gz")):
-        if metadata:
-            raise InputError(f"{path}: only Parquet keeps metadata")
-        _write_csv(path, table)
-    else:
+    if not path.name.endswith((".parquet", ".csv", ".csv.gz")):
         raise InputError(f"{path}: a table's name ends in .parquet, .csv or .csv.gz")
+    if metadata and not path.name.endswith(".parquet"):
+        raise InputError(f"{path}: only Parquet keeps metadata")
+    columns = table_columns(samples, description) | dict(extra or {})
+    with replaced_file(path) as draft:
+        if path.name.endswith(".parquet"):
+            _write_parquet(draft, columns, metadata or {})
+        else:
+            write_csv(draft, columns)
 
 
-def _write_parquet(path: Path, table: Any, metadata: Mapping[str, Any]) -> None:
+def _write_parquet(
+    path: Path, columns: Mapping[str, np.ndarray], metadata: Mapping[str, Any]
+) -> None:
+    import pyarrow as pa
     import pyarrow.parquet as pq
 
+    table = pa.table({name: pa.array(v, from_pandas=True) for name, v in columns.items()})
     table = table.replace_schema_metadata({METADATA_KEY: json.dumps(dict(metadata))})
     options: dict[str, Any] = {"compression": "lz4", "use_dictionary": False}
     pq.write_table(table, path, row_group_size=1 << 17, write_page_checksum=True, **options)
-
-
-def _write_csv(path: Path, table: Any) -> None:
-    import pyarrow as pa
-    import pyarrow.csv as arrow_csv
-
-    # The ending decides: pyarrow compresses what ends in .gz.
-    with pa.output_stream(str(path), compression="detect") as stream:
-        arrow_csv.write_csv(table, stream)

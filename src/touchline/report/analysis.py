@@ -11,6 +11,7 @@ import numpy as np
 
 from touchline.detector.thresholds import Thresholds
 from touchline.errors import InputError
+from touchline.folder import ResultsFolder
 from touchline.logs import Log, open_log
 from touchline.logs.period import sample_period
 from touchline.model.robot import Robot, load_robot
@@ -24,9 +25,10 @@ from touchline.report.event_windows import EventWindows
 from touchline.report.facts import bandwidth_warnings, bandwidths
 from touchline.report.outputs import (
     ANALYSIS,
+    NAMES,
     REPORT,
     Outputs,
-    prepare_directory,
+    check_inputs,
     write_origin,
     write_text,
 )
@@ -99,28 +101,34 @@ def analyze(
         report: whether the report is made; its pictures take a while.
 
     Raises:
-        InputError: an input cannot be used; what had been written before stays readable.
+        InputError: an input cannot be used, or another process writes into the directory.
+            Older results in it stay then, and what this run had written stays readable in the
+            folder `touchline.unfinished`.
     """
-    from touchline.report.page import page_text
+    import pyarrow.parquet  # noqa: F401  the results need it: told before the work begins
 
     _check_options(bandwidth, method)
     log, out, model = Path(log), Path(out), load_robot(robot)
+    check_inputs(out, log, Path(robot))
     with open_log(log, model.description) as recording:
         parts = recording.chunks(CHUNK)
         first = next(parts, None)
         if first is None or not len(first):
             raise InputError(f"{log}: holds no samples")
-        prepare_directory(out, log, Path(robot))
-        period = sample_period(recording, first.time)
-        run = _Run(Pipeline(model, bandwidth, method, period), out, period)
-        for part in _with_progress(recording, chain([first], parts)):
-            run.add(part)
-        warnings = bandwidth_warnings(bandwidths(model, bandwidth), run.period)
-        warnings += [*recording.warnings, *model.warnings, *run.pipeline.skin.lost]
-    analysis = run.finish(log, method, bandwidth, warnings)
-    write_origin(out / ANALYSIS, log, robot, _origin(analysis))
-    if report:
-        write_text(out / REPORT, page_text(analysis))
+        with ResultsFolder(out, NAMES) as folder:
+            period = sample_period(recording, first.time)
+            run = _Run(Pipeline(model, bandwidth, method, period), folder.draft, period)
+            for part in _with_progress(recording, chain([first], parts)):
+                run.add(part)
+            warnings = bandwidth_warnings(bandwidths(model, bandwidth), run.period)
+            warnings += [*recording.warnings, *model.warnings, *run.pipeline.skin.lost]
+            analysis = run.finish(log, out, method, bandwidth, warnings)
+            write_origin(folder.draft / ANALYSIS, log, robot, _origin(analysis))
+            if report:
+                from touchline.report.page import page_text
+
+                write_text(folder.draft / REPORT, page_text(analysis))
+            folder.commit()
     return analysis
 
 
@@ -140,11 +148,10 @@ def _check_options(bandwidth: float | None, method: str) -> None:
 class _Run:
     """One recording on its way through the pipeline, a part at a time."""
 
-    def __init__(self, pipeline: Pipeline, out: Path, period: float) -> None:
+    def __init__(self, pipeline: Pipeline, draft: Path, period: float) -> None:
         self.pipeline, self.period = pipeline, period
         robot = pipeline.robot
-        self._out = out
-        self._outputs = Outputs(out, robot)
+        self._outputs = Outputs(draft, robot)
         self._statistics = Statistics.of(len(robot.joint_names), len(robot.segment_names))
         self._curves = Curves(pipeline, self.period)
         self._poses = EventPoses()
@@ -170,7 +177,7 @@ class _Run:
         self._poses.add(time, part.q, self.pipeline.events)
 
     def finish(
-        self, log: Path, method: str, bandwidth: float | None, warnings: list[str]
+        self, log: Path, out: Path, method: str, bandwidth: float | None, warnings: list[str]
     ) -> Analysis:
         """Close the files; returns what there is to tell."""
         events = self.pipeline.events
@@ -178,7 +185,7 @@ class _Run:
         return Analysis(
             robot=self.pipeline.robot,
             log=log,
-            out=self._out,
+            out=out,
             method=method,
             bandwidth=bandwidth,
             period=self.period,

@@ -2,8 +2,6 @@
 """The files that an analysis leaves in its directory, readable even if it is killed."""
 
 import json
-import os
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -22,37 +20,19 @@ from touchline.result.event import Event
 ESTIMATES, CONTACTS, POSTURES = "estimates.parquet", "contacts.parquet", "postures.parquet"
 EVENTS, ANALYSIS, REPORT = "events.json", "analysis.json", "report.html"
 NAMES = (ESTIMATES, CONTACTS, POSTURES, EVENTS, ANALYSIS, REPORT)
-PARTS = tuple(f"{name.removesuffix('.parquet')}.parts" for name in NAMES[:3])
 CONTACT_SCHEMA = {"time": "f8", "health": "u4"} | contact_schema()
 
 
-def prepare_directory(directory: Path, *inputs: Path) -> None:
-    """Make the directory, and take an older analysis out of it; other files stay as they are.
-
-    Args:
-        directory: where the results go.
-        inputs: files that are read; none of them may be among those that are replaced.
+def check_inputs(directory: Path, *inputs: Path) -> None:
+    """Make sure that no result would replace what it is made from.
 
     Raises:
-        InputError: it is a file, cannot be written, or a result would replace an input.
+        InputError: it would.
     """
     targets = {(directory / name).resolve() for name in NAMES}
     for path in inputs:
         if path.resolve() in targets:
             raise InputError(f"{path}: would be replaced by the results; choose another --out")
-    if directory.exists() and not directory.is_dir():
-        raise InputError(f"--out {directory}: is a file; a directory is needed")
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        for name in NAMES:
-            (directory / name).unlink(missing_ok=True)
-        for name in PARTS:
-            if (directory / name).is_dir():
-                shutil.rmtree(directory / name)
-    except OSError as error:
-        raise InputError(f"--out {directory}: cannot be written: {error.strerror}") from error
-    if not os.access(directory, os.W_OK):
-        raise InputError(f"--out {directory}: cannot be written")
 
 
 def write_text(path: Path, text: str) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from touchline.errors import InputError
+from touchline.folder import check_file
 from touchline.model.robot import Robot
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scenario import SCENARIOS
@@ -74,11 +75,9 @@ def find_scenario(name: str) -> Callable[..., Simulated]:
 
 
 def _prepare(out: Path) -> None:
-    """Make the log's folder before the work begins, so that nothing simulated is lost."""
+    """Find what is in the way before the work begins, so that nothing simulated is lost."""
     if not out.name.endswith((".parquet", ".csv", ".csv.gz")):
         raise InputError(f"{out}: a table's name ends in .parquet, .csv or .csv.gz")
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        out.open("ab").close()
-    except OSError as error:
-        raise InputError(f"{out}: cannot be written: {error.strerror}") from error
+    if out.suffix == ".parquet":
+        import pyarrow.parquet  # noqa: F401
+    check_file(out)

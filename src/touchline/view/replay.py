@@ -2,6 +2,7 @@
 """An analyzed recording, asked for how things stood at a time; the rest of it is not read."""
 
 import json
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.errors import InputError
+from touchline.folder import is_unfinished, settle
 from touchline.logs.truth import TrueContact, read_truth
 from touchline.model.description import AXES
 from touchline.model.robot import load_robot
@@ -47,7 +49,11 @@ class Origin:
 
 def is_results(path: Path) -> bool:
     """Whether a path is a directory with the results of an analysis, whole or not."""
-    return path.is_dir() and any((path / name).exists() for name in (*NEEDED, ORIGIN))
+    if not path.is_dir():
+        return False
+    with suppress(OSError):  # a folder that only its owner may write
+        settle(path)
+    return is_unfinished(path) or any((path / name).exists() for name in (*NEEDED, ORIGIN))
 
 
 def read_origin(directory: Path) -> Origin:
@@ -57,6 +63,8 @@ def read_origin(directory: Path) -> Origin:
         InputError: the results are not complete, or `analysis.json` cannot be understood.
     """
     missing = [name for name in (*NEEDED, ORIGIN) if not (directory / name).is_file()]
+    if missing and is_unfinished(directory):
+        raise InputError(f"{directory}: the analysis did not finish; analyze the recording again")
     if missing:
         raise InputError(
             f"{directory}: {', '.join(missing)} missing: not the whole result of `touchline "

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads the messages of a rosbag2 sqlite3 file, also of one that was cut off or is damaged."""
+
+import sqlite3
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from touchline.logs.messages import Messages
+
+_BATCH = 8192  # rows that are handed out at a time
+_MOST_SKIPS = 64  # places behind damage at which reading is tried again
+_Row = tuple[Any, Any, Any]
+
+
+class SqliteFile:
+    """An opened sqlite3 recording.
+
+    Attributes:
+        path: of the file.
+        topics: topic -> message type.
+        counts: topic -> number of messages that can be read.
+        first: time of the first message received [ns], and `last` of the last.
+        damage: what was wrong when it was opened, or None.
+        odd: rows that are no messages, in the last call of `messages`.
+        done: fraction of the messages that the last call of `messages` has handed out.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Open the file, find its topics and where damage begins.
+
+        Raises:
+            sqlite3.Error: not even its topics can be read.
+        """
+        self.path = path
+        self.damage: str | None = None
+        self.odd, self.done = 0, 0.0
+        self._file = sqlite3.connect(
+            f"{path.absolute().as_uri()}?immutable=1", uri=True, check_same_thread=False
+        )
+        self._file.text_factory = lambda text: text.decode("utf-8", errors="replace")
+        # Without this a file that is shorter than its header says is refused as a whole.
+        self._file.execute("PRAGMA writable_schema=ON")
+        self._file.execute("PRAGMA cell_size_check=ON")
+        self._file.execute(f"PRAGMA mmap_size={1 << 40}")
+        try:
+            rows = self._file.execute("SELECT id, name, type FROM topics").fetchall()
+            self._topics = {
+                number: topic
+                for number, topic, kind in rows
+                if isinstance(number, int) and isinstance(topic, str) and isinstance(kind, str)
+            }
+            self.topics = {t: k for _, t, k in rows if isinstance(t, str) and isinstance(k, str)}
+            self._look()
+        except sqlite3.Error:
+            self._file.close()
+            raise
+
+    def messages(self, topics: Collection[str]) -> Iterator[Messages]:
+        """The messages of some topics, in the order received; `topic` counts them.
+
+        Of a damaged file: in the order written, those before and behind the damage.
+        """
+        self.odd, self.done, taken = 0, 0.0, 0
+        order = {topic: number for number, topic in enumerate(topics)}
+        wanted = {n: order[topic] for n, topic in self._topics.items() if topic in order}
+        for rows in self._batches(wanted) if self.damage is None else self._salvaged():
+            good = [row for row in rows if row[0] in wanted and _is_message(row)]
+            taken += len(rows)
+            self.odd += sum(1 for row in rows if not _is_message(row))
+            self.done = min(taken / max(self._total, 1), 1.0)
+            if good:
+                numbers, received, data = zip(*good, strict=True)
+                yield Messages.of(data, [wanted[number] for number in numbers], received)
+        self.done = 1.0
+
+    def _batches(self, wanted: Collection[int]) -> Iterator[list[_Row]]:
+        numbers = ",".join(map(str, wanted))
+        rows = self._file.execute(
+            "SELECT topic_id, timestamp, data FROM messages "
+            f"WHERE topic_id IN ({numbers}) ORDER BY timestamp"
+        )
+        while part := rows.fetchmany(_BATCH):
+            yield part
+
+    def _salvaged(self) -> Iterator[list[_Row]]:
+        """The rows that can be read, from front to back; behind damage it goes on where it can."""
+        last, skips, step, together = -(2**63), 0, 1, _BATCH
+        while skips < _MOST_SKIPS:
+            try:
+                rows = self._file.execute(
+                    "SELECT id, topic_id, timestamp, data FROM messages NOT INDEXED "
+                    f"WHERE id > {last} ORDER BY id"
+                )
+                while part := rows.fetchmany(together):
+                    # Of a page that is not whole the cells that are lost come out as numbers 0.
+                    ids = np.maximum.accumulate([last, *(row[0] for row in part)])
+                    rises = ids[1:] > ids[:-1]
+                    yield [row[1:] for row, good in zip(part, rises, strict=True) if good]
+                    last, step = int(ids[-1]), 1
+                return
+            except (sqlite3.Error, OverflowError):
+                if together > 1:  # up to the damage row by row
+                    together = 1
+                else:
+                    last, step, skips = max(last, 0) + step, 2 * step, skips + 1
+
+    def _look(self) -> None:
+        """Count the messages, by walking through the whole table."""
+        query = "SELECT topic_id, count(*), min(timestamp), max(timestamp), sum(length(data)) "
+        try:
+            found = self._file.execute(query + "FROM messages NOT INDEXED GROUP BY topic_id")
+            rows = [row[:4] for row in found if all(isinstance(cell, int) for cell in row[:4])]
+        except sqlite3.Error as error:
+            self.damage = str(error)
+            rows = [
+                (n, 1, t, t) for part in self._salvaged() for n, t, _ in filter(_is_message, part)
+            ]
+        counts: dict[int, int] = {}
+        for number, count, _, _ in rows:
+            counts[number] = counts.get(number, 0) + count
+        self._total = sum(counts.get(number, 0) for number in self._topics)
+        self.counts = dict.fromkeys(self.topics, 0)
+        for number, topic in self._topics.items():
+            self.counts[topic] += counts.get(number, 0)
+        self.first = min((row[2] for row in rows), default=0)
+        self.last = max((row[3] for row in rows), default=0)
+
+    def close(self) -> None:
+        """Release the file."""
+        self._file.close()
+
+
+def _is_message(row: _Row) -> bool:
+    """Whether it is a whole one: before a cut there may be half a row."""
+    return isinstance(row[0], int) and isinstance(row[1], int) and isinstance(row[2], bytes)
