@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import touchline as tl
+from touchline import _render
 from touchline.report.event_pictures import EventPoses, event_pictures, event_scene
 from touchline.report.facts import event_doubt, event_where
 from touchline.report.figure import labels, svg_picture
 from touchline.report.picture import Camera, Scene, png_bytes
-from touchline.report.render.raster import rasterize
 from touchline.report.views import sees, views_of_contact
 from touchline.result.contact import Candidate
 from touchline.result.event import Event
@@ -79,7 +79,7 @@ def test_framing_shows_all_points_and_touches_the_margin(seed, aspect):
 def test_raster_agrees_with_a_test_of_every_pixel():
     rng = np.random.default_rng(2)
     corners, nearness = rng.uniform(-10, 40, (60, 3, 2)), rng.uniform(0.2, 1, (60, 3))
-    hit = rasterize(corners, nearness, (32, 24))
+    pixel, shown, near = _render.rasterize(corners, nearness, (32, 24))
     y, x = np.mgrid[:24, :32] + 0.5
     points = np.column_stack([x.ravel(), y.ravel()])
     best = np.zeros(len(points))
@@ -90,9 +90,9 @@ def test_raster_agrees_with_a_test_of_every_pixel():
         depth = np.where((share > 0).all(axis=1), share @ value, 0)
         number[depth > best] = i
         best = np.maximum(best, depth)
-    np.testing.assert_array_equal(hit.pixel, np.flatnonzero(number >= 0))
-    np.testing.assert_array_equal(hit.triangle, number[number >= 0])
-    np.testing.assert_allclose(hit.nearness, best[number >= 0], rtol=1e-5)
+    np.testing.assert_array_equal(pixel, np.flatnonzero(number >= 0))
+    np.testing.assert_array_equal(shown, number[number >= 0])
+    np.testing.assert_allclose(near, best[number >= 0], rtol=1e-5)
 
 
 def test_a_fan_of_triangles_has_no_crack_and_no_overlap():
@@ -100,8 +100,8 @@ def test_a_fan_of_triangles_has_no_crack_and_no_overlap():
     rim = 50 + 45 * np.column_stack([np.cos(angle), np.sin(angle)])
     middle = np.full_like(rim, 50.3)
     corners = np.stack([middle, rim, np.roll(rim, 1, axis=0)], axis=1)
-    each = [rasterize(c[None], np.ones((1, 3)), (100, 100)).pixel for c in corners]
-    together = rasterize(corners, np.ones((37, 3)), (100, 100)).pixel
+    each = [_render.rasterize(c[None], np.ones((1, 3)), (100, 100))[0] for c in corners]
+    together = _render.rasterize(corners, np.ones((37, 3)), (100, 100))[0]
     assert sum(map(len, each)) == len(together)
     inside = np.hypot(*(np.divmod(together, 100) - np.array([[49.5], [49.5]]))) < 44
     assert inside.sum() == (np.hypot(*(np.mgrid[:100, :100] - 49.5)) < 44).sum()
@@ -164,6 +164,25 @@ def test_highlight_tints_its_link_alone(robot):
     assert len(row) > 200
     assert column.min() >= pixels[:, 0].min() - 1 and column.max() <= pixels[:, 0].max() + 1
     assert row.min() >= pixels[:, 1].min() - 1 and row.max() <= pixels[:, 1].max() + 1
+
+
+def test_triangles_that_are_no_triangles_are_left_out():
+    corners = np.array([[[1.0, 1.0], [5.0, 5.0], [9.0, 9.0]], [[0.0, 0.0], [9.0, 0.0], [0.0, 9.0]]])
+    odd = np.vstack([corners, np.full((1, 3, 2), np.nan), corners[1:] * 1e300])
+    pixel, triangle, _ = _render.rasterize(odd, np.ones((len(odd), 3)), (10, 10))
+    assert len(pixel) and set(triangle) <= {1, 3}
+    with pytest.raises(ValueError, match="pixels"):
+        scene_pixels((0, 5))
+
+
+def scene_pixels(size):
+    skin = _render.Skin([])
+    return _render.Canvas(skin.posed(np.zeros((0, 4, 4))), np.zeros(3), np.eye(3), 1.0, size)
+
+
+def test_a_robot_without_meshes_leaves_the_ground_alone():
+    image = scene_pixels((8, 6)).image(np.zeros((0, 3)), 64, np.ones(3), None, [])
+    assert image.shape == (6, 8, 3) and (image == 255).all()
 
 
 def test_the_same_scene_gives_the_same_bytes(robot):

@@ -37,7 +37,7 @@ def touched(tmp_path_factory):
     links = {"truth.links": list(truth.links)}
     log = folder / "log.parquet"
     write_table(log, simulated.samples, robot.description, links, truth.columns())
-    analysis = analyze(folder / "log.parquet", "sara", folder / "results", report=False)
+    analysis = analyze(folder / "log.parquet", "sara", folder / "results", report="none")
     return SimpleNamespace(
         samples=simulated.samples,
         truth=simulated.truth,

@@ -14,6 +14,7 @@ def analyze(
     out: Annotated[Path, arg(metavar="DIR")],
     bandwidth: Annotated[float | None, arg(metavar="K")] = None,
     method: Literal["segment", "paper"] = "segment",
+    report: Literal["full", "summary", "none"] = "full",
 ) -> int:
     """Estimates external torques and wrenches in a recording and finds the contacts in it.
 
@@ -36,10 +37,11 @@ def analyze(
         bandwidth: Of the observer [rad/s]: higher is faster and noisier. Default: as described.
         method: segment: each segment's own momentum, no ghost contacts in motion; paper: each
             residual in its sensor's frame, as published.
+        report: full; summary: without pictures and curves of each event; none: no report.html.
     """
     from touchline.report.analysis import analyze as run
     from touchline.report.summary import summary_text
 
-    analysis = run(log, robot, out, bandwidth, method)
+    analysis = run(log, robot, out, bandwidth, method, report)
     print(summary_text(analysis))
     return 0

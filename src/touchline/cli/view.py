@@ -58,7 +58,7 @@ def _analyzed(log: Path, robot: str, out: Path):
     from touchline.report.analysis import analyze
     from touchline.view.replay import Replay
 
-    analyze(log, robot, out, report=False)
+    analyze(log, robot, out, report="none")
     return Replay(out)
 
 

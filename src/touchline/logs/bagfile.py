@@ -209,7 +209,8 @@ class _Packed:
     def __init__(self, path: Path) -> None:
         from rosbags.rosbag2 import Reader
 
-        self.path, self.damage, self.done = path, None, 0.0
+        self.path, self.done = path, 0.0
+        self.damage: str | None = None
         self._reader = Reader(path)
         try:
             self._reader.open()

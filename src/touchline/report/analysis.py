@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -34,6 +34,8 @@ from touchline.report.outputs import (
 )
 from touchline.report.statistics import Statistics
 from touchline.result.event import Event
+
+Report = Literal["full", "summary", "none"]
 
 CHUNK = 1 << 15  # samples; bounds the memory
 EPOCH = 1e6  # s; stamps beyond it are dates
@@ -88,7 +90,7 @@ def analyze(
     out: Path | str,
     bandwidth: float | None = None,
     method: str = "segment",
-    report: bool = True,
+    report: Report = "full",
 ) -> Analysis:
     """Analyze a recording; writes estimates, contacts, events and the report into a directory.
 
@@ -98,7 +100,7 @@ def analyze(
         out: directory for the results.
         bandwidth: K [rad/s] of all rows; default: the description's.
         method: of the observer, "segment" or "paper".
-        report: whether the report is made; its pictures take a while.
+        report: "full"; "summary" without a figure for each event; or "none".
 
     Raises:
         InputError: an input cannot be used, or another process writes into the directory.
@@ -124,10 +126,10 @@ def analyze(
             warnings += [*recording.warnings, *model.warnings, *run.pipeline.skin.lost]
             analysis = run.finish(log, out, method, bandwidth, warnings)
             write_origin(folder.draft / ANALYSIS, log, robot, _origin(analysis))
-            if report:
+            if report != "none":
                 from touchline.report.page import page_text
 
-                write_text(folder.draft / REPORT, page_text(analysis))
+                write_text(folder.draft / REPORT, page_text(analysis, report == "full"))
             folder.commit()
     return analysis
 

@@ -2,7 +2,9 @@
 """A figure per event: the arm from two sides, and the curves around it, within a page's budget."""
 
 import json
+import os
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from html import escape
 
 import numpy as np
@@ -14,10 +16,10 @@ from touchline.report.facts import event_doubt
 from touchline.report.html import note, section
 from touchline.report.picture import SIGMAS
 from touchline.report.plots import joined, plot
-from touchline.report.render.skin import robot_skin
+from touchline.report.render.skin import native_skin, robot_skin
 from touchline.result.event import Event
 
-MOST_PICTURED = 400  # events; two pictures take a quarter of a second
+MOST_PICTURED = 400  # events; two pictures take some 40 ms
 # Up to so many events, the pictures are so wide [pixels].
 FRAME = 400  # bytes around the pictures and plots of an event
 PICTURES = ((16, 520), (80, 400), (MOST_PICTURED, 300))
@@ -73,12 +75,18 @@ def _pictures(analysis: Analysis, events: Sequence[Event]) -> dict[int, str]:
     if not posed or not robot_skin(robot):
         return {}
     width = next(width for most, width in PICTURES if len(posed) <= most)
-    made = {}
-    for event, q in tqdm(posed, desc="pictures", unit="event", disable=None, leave=False):
+
+    def drawn(one: tuple[Event, np.ndarray]) -> tuple[int, str]:
+        event, q = one
         scene = event_scene(robot, event, q, truth_of(event, analysis.comparisons))
-        drawn = event_pictures(scene, event, (width, 3 * width // 4))
-        made[event.id] = f'<div class="views" style="--picture:{width}px">{drawn}</div>'
-    return made
+        pair = event_pictures(scene, event, (width, 3 * width // 4))
+        return event.id, f'<div class="views" style="--picture:{width}px">{pair}</div>'
+
+    native_skin(robot)  # once, not in every thread
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:  # both cores: nothing native is locked
+        made = pool.map(drawn, posed)
+        bar = tqdm(made, "pictures", len(posed), unit="event", disable=None, leave=False)
+        return dict(bar)
 
 
 def _plots(analysis: Analysis, events: Sequence[Event], room: int) -> tuple[dict[int, str], int]:

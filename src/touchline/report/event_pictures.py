@@ -100,13 +100,9 @@ def _disc(scene: Scene, event: Event, position: Array) -> Array | None:
     """A covariance (3, 3) [m2] along the surface with the trace that the event tells."""
     if event.position_std is None or event.link is None:
         return None
-    own = np.array([piece.link == event.link for piece in scene.pieces])[scene.surface.part]
-    corners = scene.surface.corners[own]
-    if not len(corners):
+    normal = scene.normal_at(event.link, position)
+    if normal is None:
         return None
-    nearest = np.linalg.norm(corners.mean(axis=1) - position, axis=1).argmin()
-    normal = scene.surface.normals[own][nearest].mean(axis=0)
-    normal = normal / np.linalg.norm(normal)
     return event.position_std**2 / 2 * (np.eye(3) - np.outer(normal, normal))
 
 

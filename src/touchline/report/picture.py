@@ -8,22 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline import _render
 from touchline.model.robot import Robot
 from touchline.report.render import solids
 from touchline.report.render.camera import Camera, Size
-from touchline.report.render.canvas import Canvas
-from touchline.report.render.light import (
-    MAP,
-    SMALL_MAP,
-    FloorContact,
-    Lights,
-    ShadowMap,
-    doubled,
-    shaded,
-)
 from touchline.report.render.png import png_bytes
-from touchline.report.render.raster import box
-from touchline.report.render.skin import Piece, Triangles, posed_skin
+from touchline.report.render.skin import Piece, Triangles, native_skin, robot_skin
 
 __all__ = ["Camera", "Mark", "Scene", "png_bytes"]
 
@@ -36,6 +26,7 @@ FORCE_SCALE, SHORTEST, LONGEST = 0.010, 0.09, 0.42  # m/N, m, m, for an arm of 1
 COLOURS = {"truth": "#0072b2", "estimate": "#d55e00", "candidate": "#e69f00"}
 SHELL, TRIM, TINT = "#f1f2f4", "#5d646d", "#ffd39e"
 SMALL = 420  # pixels; a picture up to this wide is small
+MAP, SMALL_MAP = 512, 256  # pixels across the shadow map, and across that of a small picture
 SKY, FLOOR = "#f8f9fb", "#e4e8ed"
 
 
@@ -79,38 +70,44 @@ class Scene:
         self.q = np.array(q, float)
         self.marks: list[Mark] = []
         self._tints: dict[str, float] = {}
-        self._skin = posed_skin(robot, self.q)
-        self._surface = Triangles.joined([triangles for _, triangles in self._skin])
+        self.pieces: tuple[Piece, ...] = robot_skin(robot)
+        links = robot.T_world_links(self.q)
+        self._poses = np.array([links[piece.link] for piece in self.pieces]).reshape(-1, 4, 4)
+        self.posed = native_skin(robot).posed(np.ascontiguousarray(self._poses))
 
-    @property
-    def pieces(self) -> list[Piece]:
-        """The drawn shapes; `part` of `surface` counts them."""
-        return [piece for piece, _ in self._skin]
-
-    @property
+    @cached_property
     def surface(self) -> Triangles:
-        """All triangles of the robot in world."""
-        return self._surface
+        """All triangles of the robot in world; `part` counts the pieces."""
+        own = [p.triangles.moved(T) for p, T in zip(self.pieces, self._poses, strict=True)]
+        return Triangles.joined(own)
 
     @cached_property
     def extent(self) -> float:
         """Length [m] of the diagonal of the box around the robot."""
-        if not len(self._surface.corners):
-            return 1.0
-        low, high = self._box
-        return float(np.linalg.norm(high - low))
+        low, high = self.posed.box
+        return float(np.linalg.norm(high - low)) if self.pieces else 1.0
 
     @cached_property
-    def _box(self) -> tuple[Array, Array]:
-        return box(self._surface.corners)
+    def outline(self) -> Array:
+        """Points (N, 3) [m] of the robot that lie farthest out, in world."""
+        parts = [
+            piece.outline @ T[:3, :3].T + T[:3, 3]
+            for piece, T in zip(self.pieces, self._poses, strict=True)
+        ]
+        return np.vstack(parts) if parts else np.zeros((0, 3))
 
-    @cached_property
-    def balls(self) -> tuple[Array, Array]:
-        """Middles (T, 3) and radii (T,) [m] of balls around the triangles."""
-        corners = self._surface.corners.astype(np.float32)
-        middle = corners.mean(axis=1)
-        apart = ((corners - middle[:, None]) ** 2).sum(axis=2)
-        return middle, np.sqrt(apart.max(axis=1)) * np.float32(1.001)
+    def normal_at(self, link: str, point: Array) -> Array | None:
+        """Unit normal (3,) of a link's surface nearest to a point (3,) [m], both in world."""
+        best, normal = np.inf, None
+        for piece, T in zip(self.pieces, self._poses, strict=True):
+            if piece.link != link or not len(piece.middles):
+                continue
+            away = np.linalg.norm(piece.middles - (point - T[:3, 3]) @ T[:3, :3], axis=1)
+            nearest = int(away.argmin())
+            if away[nearest] < best:
+                best = away[nearest]
+                normal = T[:3, :3] @ piece.triangles.normals[nearest].mean(axis=0)
+        return None if normal is None else normal / np.linalg.norm(normal)
 
     @property
     def _unit(self) -> float:
@@ -163,31 +160,17 @@ class Scene:
     def points(self) -> Array:
         """Points (N, 3) [m] that a picture should show: the robot and the arrows."""
         ends = [end for mark in self.marks for end in self.arrow(mark)]
-        return np.vstack([self._surface.corners.reshape(-1, 3), *ends])
+        return np.vstack([self.outline, *ends])
 
     def render(self, camera: Camera, size: Size = (640, 640)) -> NDArray[np.uint8]:
         """The picture, (H, W, 3) in sRGB, of `size` (width, height) [pixels]."""
-        lights = Lights.of(camera)
-        floor = float(self._box[0][2])
-        canvas = Canvas(camera, size)
+        canvas = _render.Canvas(self.posed, camera.eye, camera.axes, camera.focal, size)
         fine = MAP if max(size) > SMALL else SMALL_MAP
-        shadow = ShadowMap(self._surface.corners, lights.key, fine)
-        ground = self._ground(camera, size, shadow, lights.key, floor)
-        body = canvas.see(self._surface, self._closed())
-        albedo = self._albedo()[body.part]
-        lit = shadow.lit(body.position, body.normal)
-        colour = shaded(lights, body.normal, albedo, lit)
-        canvas.put(ground, body, colour)
-        canvas.hides(body)
-        for triangles, tint, opacity in self._overlays():
-            seen = canvas.see(triangles)
-            colour = 0.5 * shaded(lights, seen.normal, linear(tint)[None], 0.6)
-            canvas.put_over(seen, colour + 0.6 * linear(tint).astype(np.float32), opacity)
-        return canvas.image
-
-    def _closed(self) -> NDArray[np.bool_]:
-        closed = np.array([piece.closed for piece in self.pieces], bool)
-        return closed[self._surface.part]
+        layers = [
+            (np.ascontiguousarray(t.corners, np.float64), t.normals, linear(tint), opacity)
+            for t, tint, opacity in self._overlays()
+        ]
+        return canvas.image(self._albedo(), fine, linear(SKY), linear(FLOOR), layers)
 
     def _albedo(self) -> Array:
         colours = []
@@ -195,26 +178,7 @@ class Scene:
             base = linear(TRIM if piece.trim else SHELL)
             strength = self._tints.get(piece.link, 0.0) * (0.55 if piece.trim else 1.0)
             colours.append(base + strength * (linear(TINT) - base))
-        return np.array(colours)
-
-    def _ground(
-        self, camera: Camera, size: Size, shadow: ShadowMap, key: Array, floor: float
-    ) -> Array:
-        """The background (H, W, 3): a calm gradient with the robot's shadow on the floor."""
-        width, height = size
-        fade = np.linspace(0, 1, height)[:, None] ** 1.2
-        ground = linear(SKY) * (1 - fade) + linear(FLOOR) * fade
-        coarse = ((width + 1) // 2, (height + 1) // 2)  # shadows are soft
-        rays = camera.rays(coarse)
-        below = np.flatnonzero(rays[:, 2] < -1e-3)
-        points = camera.eye + rays[below] * ((floor - camera.eye[2]) / rays[below, 2])[:, None]
-        foot = FloorContact(self._surface.corners, floor)
-        dark = np.zeros(len(rays), np.float32)
-        dark[below] = 1 - (1 - 0.34 * shadow.shade_on_floor(points)) * (1 - 0.45 * foot.at(points))
-        dark = doubled(dark.reshape(coarse[::-1]))[:height, :width, None]
-        return ground[:, None].astype(np.float32) * (
-            1 - dark * np.array([1.0, 0.97, 0.92], np.float32)
-        )
+        return np.array(colours).reshape(-1, 3)
 
     def _overlays(self) -> list[tuple[Triangles, str, float]]:
         """What is drawn over the robot: (triangles, colour, opacity), in order."""

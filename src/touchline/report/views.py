@@ -45,35 +45,12 @@ def sees(scene: Scene, point: Array, directions: Array) -> NDArray[np.bool_]:
         point: (3,) [m] in world.
         directions: (D, 3) unit vectors from the point to the eyes.
     """
-    corners = scene.surface.corners
-    middle, radius = scene.balls
-    away, rays = middle - np.float32(point), np.float32(directions)
-    along = away @ rays.T
-    # Only triangles whose ball a ray meets: a few hundred pairs out of millions.
-    room = np.einsum("ij,ij->i", away, away) - radius**2
-    near = (along**2 >= room[:, None]) & (along > -radius[:, None])
-    triangle, ray = np.nonzero(near)
-    hits = _met(corners[triangle], point + _off(scene) * directions[ray], directions[ray])
-    seen = np.ones(len(directions), bool)
-    seen[ray[hits]] = False
-    return seen
+    rays = np.ascontiguousarray(directions, np.float64)
+    return np.array(scene.posed.sees(np.asarray(point, np.float64), rays, _off(scene)), bool)
 
 
 def _off(scene: Scene) -> float:
     return OFF * scene.extent / 1.5
-
-
-def _met(corners: Array, start: Array, direction: Array) -> NDArray[np.bool_]:
-    """Whether rays meet their triangles (N,), after Moeller and Trumbore (1997)."""
-    a, b, c = corners.transpose(1, 0, 2)
-    p = np.cross(direction, c - a)
-    scale = np.einsum("ij,ij->i", b - a, p)
-    scale = np.where(np.abs(scale) < 1e-15, np.inf, scale)
-    u = np.einsum("ij,ij->i", start - a, p) / scale
-    q = np.cross(start - a, b - a)
-    v = np.einsum("ij,ij->i", direction, q) / scale
-    t = np.einsum("ij,ij->i", c - a, q) / scale
-    return (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)
 
 
 def _directions() -> Array:
@@ -87,7 +64,7 @@ def _scores(scene: Scene, directions: Array) -> Array:
     """How good the views from directions (D, 3) are."""
     scores = -0.8 * np.abs(np.arcsin(directions[:, 2]) - PREFERRED)
     # The arm from its side: spread out rather than foreshortened.
-    points = scene.surface.corners[::97, 0]
+    points = scene.outline
     middle = points - points.mean(axis=0)
     shortened = ((middle @ directions.T) ** 2).sum(axis=0) / (middle**2).sum()
     scores += 0.8 * np.sqrt((1 - shortened).clip(0))

@@ -6,15 +6,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline import _render
 from touchline.localizer.skin import Skin
 from touchline.report.render.camera import Camera, Size
-from touchline.report.render.canvas import Canvas
-from touchline.report.render.light import Lights, ShadowMap, shaded
-from touchline.report.render.skin import Triangles, smooth
+from touchline.report.render.skin import smooth
 
 Array = NDArray[np.float64]
 
 NEIGHBOURS = 12  # points whose values make up the colour of a place
+MAP = 512  # pixels across the shadow map
 UNKNOWN = (0.6, 0.6, 0.62)
 
 
@@ -57,21 +57,19 @@ class SurfaceMap:
         """
         poses = self._skin.robot.T_world_links(q)
         patches = self._skin.patches
-        world = [smooth(patch.surface).moved(poses[patch.link]) for patch in patches]
-        surface = Triangles.joined(world)
-        canvas, lights = Canvas(camera, size), Lights.of(camera)
-        seen = canvas.see(surface, np.zeros(len(surface.corners), bool))
-        albedo = np.empty((len(seen.part), 3))
+        smoothed = [smooth(patch.surface) for patch in patches]
+        native = _render.Skin(
+            [(np.ascontiguousarray(t.corners, np.float64), t.normals, False) for t in smoothed]
+        )
+        posed = native.posed(np.array([poses[patch.link] for patch in patches]))
+        canvas = _render.Canvas(posed, camera.eye, camera.axes, camera.focal, size)
+        part, position = canvas.part, canvas.position
+        albedo = np.empty((len(part), 3))
         for i, patch in enumerate(patches):
-            mine = seen.part == i
+            mine = part == i
             T = poses[patch.link]
-            albedo[mine] = self._colours(
-                patch.link, (seen.position[mine] - T[:3, 3]) @ T[:3, :3], ends
-            )
-        lit = ShadowMap(surface.corners, lights.key).lit(seen.position, seen.normal)
-        paper = np.ones((size[1], size[0], 3), np.float32)
-        canvas.put(paper, seen, shaded(lights, seen.normal, albedo, lit))
-        return canvas.image
+            albedo[mine] = self._colours(patch.link, (position[mine] - T[:3, 3]) @ T[:3, :3], ends)
+        return canvas.image(albedo, MAP, np.ones(3), None, [])
 
     def _colours(self, link: str, places: Array, ends: tuple[float, float]) -> Array:
         if not len(places):

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A small software renderer in NumPy: no OpenGL, no window, no display needed."""
+"""What the native renderer draws with: cameras, skins, solids, image files."""

@@ -2,12 +2,13 @@
 """What is drawn of a robot: the triangles of all its links with smooth normals."""
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline import _render
 from touchline.model.mechanism import Geometry, Link
 from touchline.model.robot import Robot
 from touchline.model.surface import Surface, link_surface
@@ -64,6 +65,33 @@ class Piece:
     trim: bool
     closed: bool
 
+    @cached_property
+    def middles(self) -> Array:
+        """Middles (T, 3) [m] of the triangles."""
+        return self.triangles.corners.mean(axis=1)
+
+    @cached_property
+    def outline(self) -> Array:
+        """The points (N, 3) [m] that lie farthest out in some direction."""
+        from scipy.spatial import ConvexHull, QhullError
+
+        points = np.unique(self.triangles.corners.reshape(-1, 3), axis=0)
+        try:
+            return points[ConvexHull(points).vertices]
+        except (QhullError, ValueError):  # flat, or a few points
+            return points
+
+
+@lru_cache(maxsize=8)
+def native_skin(robot: Robot) -> _render.Skin:
+    """The drawn shapes of all links for the renderer."""
+    pieces = [
+        (np.ascontiguousarray(t.corners, np.float64), np.ascontiguousarray(t.normals), p.closed)
+        for p in robot_skin(robot)
+        for t in [p.triangles]
+    ]
+    return _render.Skin(pieces)
+
 
 @lru_cache(maxsize=8)
 def robot_skin(robot: Robot) -> tuple[Piece, ...]:
@@ -78,12 +106,6 @@ def robot_skin(robot: Robot) -> tuple[Piece, ...]:
                 trim = bool(solid) and not _carries(link, shape)
                 pieces.append(Piece(link.name, smooth(surface), trim, surface.closed))
     return tuple(pieces)
-
-
-def posed_skin(robot: Robot, q: Array) -> list[tuple[Piece, Triangles]]:
-    """The drawn shapes with their triangles in world at joint positions `q` (n,) [rad]."""
-    poses = robot.T_world_links(np.asarray(q, np.float64))
-    return [(piece, piece.triangles.moved(poses[piece.link])) for piece in robot_skin(robot)]
 
 
 def _carries(link: Link, shape: Geometry) -> bool:
