@@ -12,7 +12,7 @@ import numpy as np
 
 from touchline.errors import InputError
 from touchline.live.sample import Sample, whole_nanoseconds
-from touchline.logs.cdr import JOINT_STATE, WRENCH_STAMPED, learn_layout
+from touchline.logs.cdr import JOINT_STATE, WRENCH_STAMPED, field_places
 from touchline.logs.mcap_writer import McapWriter
 from touchline.logs.period import PERIOD_KEY, RECORDER, RECORDER_KEY
 from touchline.logs.tables import table_columns
@@ -159,9 +159,7 @@ class _Message:
         self.kind, self.channel = kind, 0
         self.definition = store.generate_msgdef(kind)[0]
         blank = bytes(store.serialize_cdr(_blank(store.types, kind, joints), kind))
-        layout = learn_layout(blank, kind)
-        assert layout is not None, "rosbags writes the usual encoding"
-        self._blank, self._fields = bytearray(blank), layout.fields
+        self._blank, self._fields = bytearray(blank), field_places(blank, kind)
 
     def announce(self, file: McapWriter, topic: str) -> "_Message":
         self.channel = file.add_channel(topic, self.kind, self.definition)

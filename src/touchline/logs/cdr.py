@@ -11,6 +11,7 @@ from touchline.logs.messages import Messages
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 WRENCH_STAMPED = "geometry_msgs/msg/WrenchStamped"
+_HEADER = 4  # bytes of the encapsulation; alignment counts from behind it
 
 
 @dataclass(frozen=True)
@@ -61,3 +62,32 @@ class Decoder:
             fields, complete = {"wrench": wrench}, np.isfinite(stamps)
         self.undecodable += damaged
         return Decoded(stamps, fields, complete)
+
+
+def field_places(data: bytes, kind: str) -> dict[str, tuple[int, int]]:
+    """Where the numbers stand in a whole little-endian message, for a writer that fills them in.
+
+    Returns:
+        Field -> offset of its first number, and their count.
+    """
+    at = _HEADER + 8  # behind the stamp
+
+    def word() -> int:
+        nonlocal at
+        at += -at % 4 + 4
+        return int.from_bytes(data[at - 4 : at], "little")
+
+    def doubles(count: int) -> tuple[int, int]:
+        nonlocal at
+        at += -(at - _HEADER) % 8 if count else 0
+        at += 8 * count
+        return at - 8 * count, count
+
+    size = word()  # of the frame
+    at += size
+    if kind == WRENCH_STAMPED:
+        return {"wrench": doubles(6)}
+    for _ in range(word()):
+        size = word()
+        at += size
+    return {name: doubles(word()) for name in ("position", "velocity", "effort")}
