@@ -128,6 +128,8 @@ nb::dict row_slices(const Observer& o) {
   add("segment_innovation", l.segment_innovation(), 6 * l.segments);
   add("joint_settled", l.joint_settled(), l.joints);
   add("segment_settled", l.segment_settled(), l.segments);
+  add("joint_gap_std", l.joint_gap_std(), l.joints);
+  add("segment_gap_std", l.segment_gap_std(), 2 * l.segments);
   add("health", l.health(), 1);
   return d;
 }

@@ -7,8 +7,8 @@ from enum import IntFlag
 class Health(IntFlag):
     """Why the estimates of a sample may be worse than usual; 0 when all is well."""
 
-    SETTLING = 1  # less than 5 / bandwidth since the start, a gap or a reset
-    GAP = 2  # the step in time is too long to integrate over: filters restart
+    SETTLING = 1  # less than 5 / bandwidth since the start, a long gap or a reset
+    GAP = 2  # samples are lost: the first one after them; beyond 2 / bandwidth filters restart
     BAD_TIME = 4  # the time stamp repeats or goes back: the sample is ignored
     MISSING = 8  # a signal that should be there is NaN
     NON_FINITE = 16  # a signal is infinite or absurdly large

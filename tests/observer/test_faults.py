@@ -139,7 +139,7 @@ def test_a_missing_tip_sensor_takes_the_base_segment_with_it_but_not_the_sum():
 
 
 @pytest.mark.parametrize("method", ["segment", "paper"])
-@pytest.mark.parametrize("length", [1, 2, 3, 4, 50])
+@pytest.mark.parametrize("length", [1, 2, 4, 20, 38, 43, 80])
 def test_every_output_recovers_from_a_dropout_of_everything(method, length):
     feed = Feed(1000)
     clean = feed.run(method=method)
@@ -148,7 +148,8 @@ def test_every_output_recovers_from_a_dropout_of_everything(method, length):
     estimate = feed.run(method=method)
     late = slice(300 + length + 3 * SETTLING, None)
     np.testing.assert_allclose(estimate.rows[late], clean.rows[late], atol=2e-4)
-    assert bool((estimate.health[300 + length] & Health.SETTLING) != 0) == (length > 2)
+    # A gap is bridged up to K dt = 2: 40 ms.
+    assert bool((estimate.health[300 + length] & Health.SETTLING) != 0) == (length > 40)
 
 
 def test_innovations_over_different_intervals_are_not_compared():
@@ -239,8 +240,8 @@ def test_a_clock_set_back_a_little_is_followed_after_some_samples():
     assert health[-1] == 0
 
 
-@pytest.mark.parametrize("jump", [0.0041, 1.0, 1e6, 1e300])
-def test_a_gap_restarts_the_filters(jump):
+@pytest.mark.parametrize("jump", [0.0441, 1.0, 1e6, 1e300])
+def test_a_long_gap_restarts_the_filters(jump):
     feed = Feed()
     feed.time[300:] += jump
     estimate = feed.run()

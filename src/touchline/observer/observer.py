@@ -88,6 +88,21 @@ class Estimate:
         return self._part("segment_settled") > 0.0
 
     @property
+    def joint_gap_std(self) -> Array:
+        """One sigma (n,) [Nm] of what lost samples may have left in each joint's torques; else 0.
+
+        Over a gap the input is known at both ends only. The larger counts of half its change and
+        of what the gap has changed in the estimate; both fade as the filter forgets.
+        """
+        return self._part("joint_gap_std")
+
+    @property
+    def segment_gap_std(self) -> Array:
+        """The same (m, 2) [N, Nm] of each segment's force, and moment about its own sensor."""
+        part = self._part("segment_gap_std")
+        return part.reshape(*part.shape[:-1], part.shape[-1] // 2, 2)
+
+    @property
     def health(self) -> Any:
         """Health bits (see `touchline.Health`): an int, or (N,) integers for a recording."""
         value = self._part("health")[..., 0].astype(np.uint32)

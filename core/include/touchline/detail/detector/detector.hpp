@@ -51,6 +51,7 @@ class Detector {
   // To be called after each step of the observer, with the row it wrote and the sample it took.
   void step(const double* output, const double* q, const double* qd) {
     row_ = output;
+    gap_ = (static_cast<Health>(output[observer_.row_layout().health()]) & kGap) != 0;
     const double now = observer_.time();
     const double dt = timed_ ? std::max(0.0, now - time_) : 0.0;
     timed_ = true;
@@ -128,11 +129,13 @@ class Detector {
         s.known = row_[layout.joint_settled() + row.joint] > 0.0;
         s.residual = row_[layout.segment_torque() + row.joint];
         s.innovation = observer_.own_innovation(row.joint);
+        s.gap_std = row_[layout.joint_gap_std() + row.joint];
       } else {
         if (i == first_[g]) known = read_wrench(g, wrench, load);
         s.known = known;
         s.residual = wrench[row.component];
         s.innovation = load[row.component];
+        s.gap_std = row_[layout.segment_gap_std() + 2 * g + (row.component < 3 ? 0 : 1)];
       }
       s.known = s.known && std::isfinite(s.residual);
       if (!std::isfinite(s.innovation)) s.innovation = s.residual;  // samples were lost
@@ -168,7 +171,9 @@ class Detector {
     sample.offset = s.baseline;
     sample.reference = s.reference;
     sample.referred = s.referred;
-    const double x = (sample.residual - s.baseline) / row.contact;
+    double limit = row.contact;
+    if (sample.gap_std > 0.0) limit = std::hypot(limit, kGapSigmas * sample.gap_std);
+    const double x = (sample.residual - s.baseline) / limit;
     normalized_[i] = x;
     Segment& segment = segments_[row.segment];
     segment.peak = std::max(segment.peak, std::fabs(x));
@@ -189,7 +194,7 @@ class Detector {
       for (const TestSetting& setting : settings_.tests) {
         if (setting.test == Test::cusum) most = kMost * setting.limits[g];
       }
-      tests_[g].step(samples_.data() + first_[g], dt, adapts(g), activity_.activity(), most);
+      tests_[g].step(samples_.data() + first_[g], dt, gap_, adapts(g), activity_.activity(), most);
     }
     s.score = 0.0;
     for (std::size_t t = 0; t < settings_.tests.size(); ++t) {
@@ -265,7 +270,7 @@ class Detector {
   std::vector<int> levels_;
   std::vector<double> quiet_, statistics_;
   double time_ = 0.0, since_ = 0.0;
-  bool timed_ = false, placed_ = false, joint_tests_ = false, sound_ = false;
+  bool timed_ = false, placed_ = false, gap_ = false, joint_tests_ = false, sound_ = false;
 };
 
 }  // namespace touchline

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <limits>
 #include <vector>
 
 #include "touchline/detail/detector/detection_row.hpp"
@@ -53,6 +54,7 @@ class InnovationTest {
     for (auto* v : {&gap_, &up_, &down_}) std::fill(v->begin(), v->end(), 0.0);
     std::copy_n(w, size, load_.begin());
     count_ = 0.0;
+    since_gap_ = kNoGap;
     age_ = 0.0;
     turned_before_ = false;
   }
@@ -92,12 +94,21 @@ class InnovationTest {
     }
   }
 
-  // The mean loads e of an interval dt; `adapt`: may the load be followed? `most`: sums stay below.
-  void add(const double* e, double dt, bool adapt, double most) {
+  // The mean loads e of an interval dt, with samples lost in it if it is a `gap`; `adapt`: may the
+  // load be followed? `most`: sums stay below.
+  void add(const double* e, double dt, bool gap, bool adapt, double most) {
     if (!usable_) return;
     const std::size_t n = size_;
     count_ += 1.0;
     age_ += dt;
+    since_gap_ += 1.0;
+    if (gap) {  // of P nothing is known but this measurement
+      std::fill_n(gap_.begin(), n, 0.0);
+      since_gap_ = 0.0;
+      return;
+    }
+    // Then it is the mean of all since; the innovation has 1 + 1/k of its variance.
+    const double mean = 1.0 / (since_gap_ + 1.0), wider = std::sqrt(1.0 + 1.0 / since_gap_);
     // At first the gains of a straight line through all samples so far, if they are larger.
     const double level_first = 2.0 * (2.0 * count_ - 1.0) / (count_ * (count_ + 1.0));
     const double slope_first = 6.0 / (count_ * (count_ + 1.0));
@@ -107,7 +118,7 @@ class InnovationTest {
       for (std::size_t k = 0; k < n; ++k) nu += to_white_[i * n + k] * gap_[k];
       white_[i] = nu;
       if (age_ < kWarm) continue;
-      const double z = nu / gains_[i].sigma;
+      const double z = nu / (gains_[i].sigma * (mean > gains_[i].level ? wider : 1.0));
       up_[i] = std::clamp(up_[i] + z - 0.5 * kShift, 0.0, most);
       down_[i] = std::clamp(down_[i] - z - 0.5 * kShift, 0.0, most);
     }
@@ -115,7 +126,7 @@ class InnovationTest {
       double level = 0.0, slope = 0.0;
       for (std::size_t k = 0; k < n; ++k) {
         const double part = from_white_[i * n + k] * white_[k];
-        level += std::max(gains_[k].level, level_first) * part;
+        level += std::max({gains_[k].level, level_first, mean}) * part;
         slope += std::max(gains_[k].slope, slope_first) * part;
       }
       gap_[i] -= level;
@@ -165,8 +176,10 @@ class InnovationTest {
 
   std::size_t size_ = 0;
   static constexpr double kWarm = 0.1;  // nothing is summed up before [s]
+  static constexpr double kNoGap = std::numeric_limits<double>::infinity();  // samples since one
 
   double period_, count_ = 0.0, age_ = 0.0;  // samples and time since the beginning
+  double since_gap_ = kNoGap;
   bool usable_ = false, turned_before_ = false;
   std::vector<double> to_white_, from_white_, factor_, turned_, scratch_, vectors_;
   std::vector<double> load_, gap_, white_, up_, down_;  // gap: measured less estimated momentum

@@ -25,6 +25,7 @@ struct RowSample {
   double offset = 0.0;      // of the residual: the slow baseline
   double reference = 0.0;   // and the quick one
   double referred = 0.0;    // time over which the quick one has been averaged [s]
+  double gap_std = 0.0;     // one sigma of what lost samples may have left in the residual
   bool known = false;
 };
 
@@ -46,7 +47,7 @@ class SegmentTests {
     for (const DetectionRow& row : rows_) add_gains(observer, row, settings.noise.period);
     for (auto* m : {&momentum_, &reading_, &factor_, &whitener_}) m->assign(n * n, 0.0);
     for (auto* v : {&slow_, &quick_, &load_, &offset_, &difference_}) v->assign(n, 0.0);
-    expected_.assign(n, 0.0);
+    for (auto* v : {&expected_, &doubt_}) v->assign(n, 0.0);
     for (auto* v : {&smooth_slow_, &smooth_quick_}) v->assign(n, 0.0);
     active_.reserve(n);
   }
@@ -68,8 +69,9 @@ class SegmentTests {
     compact(activity);
   }
 
-  // `samples`: one per row; `dt`: since the sample before; `adapt`: nothing is felt now.
-  void step(const RowSample* samples, double dt, bool adapt, const Activity& activity,
+  // `samples`: one per row; `dt`: since the sample before, with some lost between if it is a `gap`;
+  // `adapt`: nothing is felt now.
+  void step(const RowSample* samples, double dt, bool gap, bool adapt, const Activity& activity,
             double most) {
     if (dt > 0.0) smoothen(samples);
     if (take(samples)) {
@@ -79,9 +81,10 @@ class SegmentTests {
       return;
     }
     if (dt <= 0.0 || active_.empty()) return;
+    if (follow_doubts(samples)) find_whitener();
     for (std::size_t k = 0; k < active_.size(); ++k) load_[k] = samples[active_[k]].innovation;
-    if (uses_glrt_) windows_.add(load_.data(), dt);
-    if (uses_cusum_) innovations_.add(load_.data(), dt, adapt, most);
+    if (uses_glrt_) windows_.add(load_.data(), dt, gap);
+    if (uses_cusum_) innovations_.add(load_.data(), dt, gap, adapt, most);
   }
 
   double statistic(Test test) {
@@ -115,6 +118,16 @@ class SegmentTests {
       smooth_slow_[i] += smoothing_[i] * (s.residual - s.offset - smooth_slow_[i]);
       smooth_quick_[i] += smoothing_[i] * (s.residual - s.reference - smooth_quick_[i]);
     }
+  }
+
+  // Returns whether a gap has left doubts, or they have just gone.
+  bool follow_doubts(const RowSample* samples) {
+    bool any = false;
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      any |= doubt_[i] > 0.0 || samples[i].gap_std > 0.0;
+      doubt_[i] = kGapSigmas * samples[i].gap_std * kGapSigmas * samples[i].gap_std;
+    }
+    return any;
   }
 
   double filtered(std::size_t i, std::size_t j) const {
@@ -158,19 +171,30 @@ class SegmentTests {
         const std::size_t at = a * n + active_[j];
         momentum_[i * size + j] = covariance_.momentum()[at];
         reading_[i * size + j] = covariance_.reading()[at];
-        factor_[i * size + j] = filtered(a, active_[j]) + (i == j ? slow_[i] : 0.0);
+      }
+    }
+    find_whitener();
+    if (uses_glrt_) windows_.weigh(momentum_.data(), reading_.data(), quick_.data());
+    if (uses_cusum_) innovations_.weigh(momentum_.data(), reading_.data(), quick_.data());
+  }
+
+  void find_whitener() {
+    const std::size_t size = active_.size();
+    for (std::size_t i = 0; i < size; ++i) {
+      for (std::size_t j = 0; j < size; ++j) {
+        const double own = i == j ? slow_[i] + doubt_[active_[i]] : 0.0;
+        factor_[i * size + j] = filtered(active_[i], active_[j]) + own;
       }
     }
     chi2_usable_ = uses_chi2_ && cholesky(factor_.data(), static_cast<int>(size), 1e-15);
     if (chi2_usable_) invert_lower(factor_.data(), static_cast<int>(size), whitener_.data());
-    if (uses_glrt_) windows_.weigh(momentum_.data(), reading_.data(), quick_.data());
-    if (uses_cusum_) innovations_.weigh(momentum_.data(), reading_.data(), quick_.data());
   }
 
   double scaled() const {
     double most = 0.0;
     for (std::size_t k = 0; k < active_.size(); ++k)
-      most = std::max(most, difference_[k] * difference_[k] / expected_[active_[k]]);
+      most = std::max(most, difference_[k] * difference_[k] /
+                                (expected_[active_[k]] + doubt_[active_[k]]));
     return std::sqrt(most);
   }
 
@@ -191,6 +215,7 @@ class SegmentTests {
   std::vector<double> smooth_slow_, smooth_quick_;  // by row
   std::vector<std::size_t> active_;  // rows that are known
   std::vector<double> expected_;     // variance of each row
+  std::vector<double> doubt_;        // what a gap adds to it
   std::vector<double> momentum_, reading_, factor_, whitener_, slow_, quick_;
   std::vector<double> load_, offset_, difference_;
 };

@@ -3,7 +3,8 @@
 // external load over an interval, S_N = sum e dt = p_k - p_k-N - sum u dt: velocity noise enters at
 // both ends only, so that its covariance is 2 A + N dt^2 B + T^2 C for the covariances A of the
 // momentum, B of the readings and C of the model's errors; of several N the largest ratio counts.
-// No allocation in `add` and `statistic`.
+// Over lost samples S_N spans more than N periods: its covariance is taken to grow with the square
+// of the time, as that of C does. No allocation in `add` and `statistic`.
 #pragma once
 
 #include <algorithm>
@@ -25,7 +26,7 @@ class WindowTest {
     }
     room_ = *std::max_element(counts_.begin(), counts_.end()) + 1;
     impulses_.assign(room_ * rows, 0.0);
-    times_.assign(room_, 0.0);
+    for (auto* times : {&times_, &lost_}) times->assign(room_, 0.0);
     factors_.assign(counts_.size() * rows * rows, 0.0);
     usable_.assign(counts_.size(), 0);
   }
@@ -36,7 +37,7 @@ class WindowTest {
     filled_ = 1;
     at_ = 0;
     std::fill(impulses_.begin(), impulses_.end(), 0.0);
-    times_[0] = 0.0;
+    times_[0] = lost_[0] = 0.0;
   }
 
   // Covariances (size, size) of one sample; `model` (size): variances.
@@ -52,14 +53,15 @@ class WindowTest {
     }
   }
 
-  // The mean loads e of an interval dt.
-  void add(const double* e, double dt) {
+  // The mean loads e of an interval dt, with samples lost in it if it is a `gap`.
+  void add(const double* e, double dt, bool gap) {
     const double* last = impulses_.data() + at_ * rows_;
-    const double time = times_[at_] + dt;
+    const double time = times_[at_] + dt, lost = lost_[at_] + (gap ? dt - period_ : 0.0);
     at_ = at_ + 1 == room_ ? 0 : at_ + 1;
     double* next = impulses_.data() + at_ * rows_;
     for (std::size_t i = 0; i < size_; ++i) next[i] = last[i] + e[i] * dt;
     times_[at_] = time;
+    lost_[at_] = lost;
     filled_ = std::min(filled_ + 1, room_);
   }
 
@@ -72,7 +74,9 @@ class WindowTest {
       const std::size_t from = (at_ + room_ - counts_[w]) % room_;
       const double* then = impulses_.data() + from * rows_;
       const double T = times_[at_] - times_[from];
-      for (std::size_t i = 0; i < size_; ++i) scratch_[i] = now[i] - then[i] - T * offset[i];
+      const double shorter = 1.0 - (lost_[at_] - lost_[from]) / T;
+      for (std::size_t i = 0; i < size_; ++i)
+        scratch_[i] = shorter * (now[i] - then[i] - T * offset[i]);
       most = std::max(most, squared_norm(factors_.data() + w * rows_ * rows_, scratch_.data(),
                                          static_cast<int>(size_)));
     }
@@ -83,7 +87,7 @@ class WindowTest {
   std::size_t rows_, size_ = 0, room_ = 0, at_ = 0, filled_ = 0;
   double period_;
   std::vector<std::size_t> counts_;  // samples of each window
-  std::vector<double> impulses_, times_, scratch_;
+  std::vector<double> impulses_, times_, lost_, scratch_;
   std::vector<double> factors_;  // inverse, by window
   std::vector<char> usable_;
 };

@@ -20,14 +20,23 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 // written so that it then fails.
 struct Instant {
   double time = kNaN;
-  double before = kNaN;  // of the accepted sample before
-  double max_gap = 0.0;  // an interval longer than this is not integrated over
+  double before = kNaN;     // of the accepted sample before
+  double period = 0.0;      // typical [s]
+  double usual_step = 0.0;  // a step longer than this is a gap [s]
 
-  bool in_reach(double earlier) const { return time - earlier <= max_gap; }
+  bool usual(double earlier) const { return time - earlier <= usual_step; }
+  // Can a gap since then be integrated over? `bridge`: the most time that may be lost [s]. The step
+  // spans what is lost, the period that it ends with, and half of one for jitter.
+  bool reaches(double earlier, double bridge) const {
+    return time - earlier <= std::max(usual_step, bridge + 1.5 * period);
+  }
 };
 
 class Balances {
  public:
+  // `bridge`: e is known over gaps up to this [s].
+  explicit Balances(double bridge) : bridge_(bridge) {}
+
   struct Group {
     std::size_t first, count;
     bool used;             // it has values at all
@@ -56,7 +65,11 @@ class Balances {
   double* p(std::size_t g) { return p_.data() + groups_[g].first; }
   double* u(std::size_t g) { return u_.data() + groups_[g].first; }
 
+  // Does any e of this instant span a gap?
+  bool bridged() const { return bridged_; }
+
   void begin(const Instant& now) {
+    bridged_ = false;
     p_.swap(p_before_);
     u_.swap(u_before_);
     std::fill(rate_.begin(), rate_.end(), 1.0 / (now.time - now.before));
@@ -74,7 +87,8 @@ class Balances {
   bool book(std::size_t g, bool present, const Instant& now) {
     Group& group = groups_[g];
     group.present = present;
-    group.fresh = present && now.in_reach(group.time);
+    group.fresh = present && now.reaches(group.time, bridge_);
+    bridged_ = bridged_ || (group.fresh && !now.usual(group.time));
     group.regular = group.fresh && group.time == now.before;
     if (present) {
       group.dt = now.time - group.time;
@@ -90,6 +104,11 @@ class Balances {
   void balance() {
     difference(p_.data(), p_before_.data(), u_.data(), u_before_.data(), rate_.data(), e_.data(),
                e_.size());
+  }
+
+  // Instead of `balance`: by how much the known loads have changed over the interval.
+  void compare_loads() {
+    for (std::size_t i = 0; i < e_.size(); ++i) e_[i] = u_[i] - u_before_[i];
   }
 
   // After `book`: e is NaN where it is not fresh.
@@ -111,6 +130,8 @@ class Balances {
       e[i] = rate[i] * (p[i] - p_before[i]) - 0.5 * (u_before[i] + u[i]);
   }
 
+  double bridge_;
+  bool bridged_ = false;
   std::vector<Group> groups_;
   std::vector<double> p_, u_, p_before_, u_before_, rate_, e_;
 };

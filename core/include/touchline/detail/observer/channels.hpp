@@ -23,8 +23,10 @@ class Channels {
   enum class SensorFilter { none, world, local };
 
   Channels(const Layout& layout, const std::vector<JointRow>& joints,
-           const std::vector<SensorRow>& sensors, Method method, Discretization rule)
-      : filters(rule),
+           const std::vector<SensorRow>& sensors, Method method, Discretization rule,
+           const ObserverTuning& tuning)
+      : balances(tuning.longest_bridge),
+        filters(rule, tuning),
         layout_(layout),
         joints_(joints),
         segments_(layout.segments.size()),
@@ -46,6 +48,7 @@ class Channels {
       if (kinds_[s] != SensorFilter::none)
         sensor_filters_[s] = filters.add(6, sensors[s].bandwidth);
     }
+    over_gap_.reserve(filters.groups());
   }
 
   // Numbers of groups of balances.
@@ -86,12 +89,15 @@ class Channels {
 
   // After `book` and the balance: what each filter does with this sample.
   void decide(const Instant& now) {
+    over_gap_.clear();
     for (std::size_t j = 0; j < joints_.size(); ++j) decide_joint(j, now);
     for (std::size_t g = 0; g < segments_; ++g) follow(segment_filter(g), segment(g), now);
     for (std::size_t s = 0; s < kinds_.size(); ++s) {
       if (kinds_[s] == SensorFilter::world) follow(sensor_filter(s), sensor(s), now);
       if (kinds_[s] == SensorFilter::local) follow(sensor_filter(s), local(s), now);
     }
+    filters.fade_doubts(now);
+    for (const std::size_t filter : over_gap_) filters.doubt(filter, now);
   }
 
   Balances balances;
@@ -125,10 +131,12 @@ class Channels {
   // A filter of one balance begins anew where the balance did.
   void follow(std::size_t filter, std::size_t balance, const Instant& now) {
     const Balances::Group& group = balances.group(balance);
+    const bool fresh = group.fresh && filters.reaches(filter, now.time - group.dt, now);
     const Action action = !group.present ? Action::absent
-                          : group.fresh  ? Action::filter
+                          : fresh        ? Action::filter
                                          : Action::restart;
     filters.act(filter, action, now, group.regular ? kNaN : group.dt);
+    if (action == Action::filter && group.dt > now.usual_step) over_gap_.push_back(filter);
   }
 
   // Innovations of several balances are compared only where all of them span the interval from
@@ -143,12 +151,13 @@ class Channels {
       present = present && group.present;
       regular = regular && group.regular;
     }
-    fresh = fresh && now.in_reach(filters.group(filter).time);
+    fresh = fresh && filters.reaches(filter, filters.group(filter).time, now);
     const Action action = !present  ? Action::absent
                           : !fresh  ? Action::restart
                           : regular ? Action::filter
                                     : Action::hold;
     filters.act(filter, action, now);
+    if (action == Action::filter && !now.usual(now.before)) over_gap_.push_back(filter);
     return action;
   }
 
@@ -157,6 +166,7 @@ class Channels {
   std::size_t segments_;
   std::vector<std::size_t> local_balances_, sensor_filters_;
   std::vector<SensorFilter> kinds_;
+  std::vector<std::size_t> over_gap_;  // filters whose inputs span a gap
 };
 
 }  // namespace touchline

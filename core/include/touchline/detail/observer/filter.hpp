@@ -1,6 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // First-order residual filters,  r+ = a r + (1 - a) e,  fed with mean loads over intervals that
 // may vary. Rows and groups are as for the balances.
+//
+// Over a gap the momentum is known at both ends, the load u only there: its mean, taken for the
+// mean of the ends, is in doubt. By how much is not measured, but two things tell its size: half of
+// the load's change, which is the most that a load can be off that went from one end to the other
+// without turning, and e - r, which is what the gap would change in the estimate. Each is followed
+// as a load of its own, which the filter forgets as it forgets the error.
 #pragma once
 
 #include <algorithm>
@@ -9,6 +15,7 @@
 #include <vector>
 
 #include "touchline/detail/observer/balance.hpp"
+#include "touchline/detail/observer/tuning.hpp"
 
 namespace touchline {
 
@@ -16,10 +23,11 @@ enum class Discretization { automatic, tustin, exponential };
 
 // The discrete pole a of bandwidth K over dt. Tustin has the smaller error but rings for large
 // K dt, so `automatic` leaves it at K dt = 0.5.
-inline double pole(double bandwidth, double dt, Discretization rule) {
+inline double pole(double bandwidth, double dt, Discretization rule,
+                   double tustin_steps = ObserverTuning{}.tustin_steps) {
   const double x = bandwidth * dt;
   const bool tustin = rule == Discretization::tustin ||
-                      (rule == Discretization::automatic && x <= 0.5);
+                      (rule == Discretization::automatic && x <= tustin_steps);
   return tustin ? (1.0 - 0.5 * x) / (1.0 + 0.5 * x) : std::exp(-x);
 }
 
@@ -37,32 +45,46 @@ class Filters {
     bool present = false;   // there is a value at this instant
   };
 
-  explicit Filters(Discretization rule) : rule_(rule) {}
+  Filters(Discretization rule, const ObserverTuning& tuning) : rule_(rule), tuning_(tuning) {}
 
   // Returns the number of the group.
   std::size_t add(std::size_t count, double bandwidth) {
     groups_.push_back({value_.size(), count, handle_of(bandwidth)});
     const std::size_t size = value_.size() + count;
     for (auto* rows : {&value_, &input_, &keep_}) rows->resize(size, kNaN);
+    for (auto* rows : {&load_change_, &half_change_, &surprise_}) rows->resize(size, 0.0);
     handles_.resize(size, groups_.back().bandwidth);
     return groups_.size() - 1;
   }
 
   const Group& group(std::size_t g) const { return groups_[g]; }
+  std::size_t groups() const { return groups_.size(); }
   const double* value(std::size_t g) const { return value_.data() + groups_[g].first; }
   const double* input(std::size_t g) const { return input_.data() + groups_[g].first; }
   double* input(std::size_t g) { return input_.data() + groups_[g].first; }
 
   bool settled(std::size_t g, const Instant& now) const {
     return groups_[g].present &&
-           now.time - groups_[g].since >= 5.0 / bandwidths_[groups_[g].bandwidth];
+           now.time - groups_[g].since >= tuning_.settled_steps / bandwidth(g);
   }
+
+  // Does group g go on after a gap since `earlier`?
+  bool reaches(std::size_t g, double earlier, const Instant& now) const {
+    return now.reaches(earlier,
+                       std::min(tuning_.bridged_steps / bandwidth(g), tuning_.longest_bridge));
+  }
+
+  // Is any value in doubt because of a gap?
+  bool doubtful() const { return doubtful_; }
+  // What a gap may have left in the values of group g: two loads, one sigma each.
+  const double* half_change(std::size_t g) const { return half_change_.data() + groups_[g].first; }
+  const double* surprise(std::size_t g) const { return surprise_.data() + groups_[g].first; }
 
   // Poles of all rows for the interval from the sample before: without more ado, all filter.
   void begin(const Instant& now) {
     const double dt = now.time - now.before;
     if (dt == dt_) return;
-    for (std::size_t h = 0; h < poles_.size(); ++h) poles_[h] = pole(bandwidths_[h], dt, rule_);
+    for (std::size_t h = 0; h < poles_.size(); ++h) poles_[h] = pole_of(h, dt);
     if (poles_.size() == 1) {
       std::fill(keep_.begin(), keep_.end(), poles_[0]);
     } else {
@@ -85,23 +107,72 @@ class Filters {
     group.present = action != Action::absent;
     if (action == Action::filter) {
       group.time = now.time;
-      if (interval == interval) keep(group, pole(bandwidths_[group.bandwidth], interval, rule_));
+      if (interval == interval) keep(group, pole_of(group.bandwidth, interval));
       return;
     }
     keep(group, 1.0);
     std::fill_n(input_.begin() + group.first, group.count, 0.0);
     if (action != Action::restart) return;
     std::fill_n(value_.begin() + group.first, group.count, 0.0);
+    std::fill_n(half_change_.begin() + group.first, group.count, 0.0);
+    std::fill_n(surprise_.begin() + group.first, group.count, 0.0);
     group.time = group.since = now.time;
+  }
+
+  // Takes the inputs for the change of the known loads over a gap.
+  void take_load_changes() { load_change_ = input_; }
+
+  // What is left of older doubts; to be called after all `act`.
+  void fade_doubts(const Instant& now) {
+    if (!doubtful_) return;
+    doubtful_ = !(now.time > doubtful_until_);
+    for (auto* doubt : {&half_change_, &surprise_}) {
+      for (std::size_t i = 0; i < keep_.size(); ++i)
+        (*doubt)[i] = doubtful_ ? std::fabs(keep_[i]) * (*doubt)[i] : 0.0;
+    }
+  }
+
+  // Group g filters over a gap; to be called after `fade_doubts`, before `run`.
+  void doubt(std::size_t g, const Instant& now) {
+    const Group& group = groups_[g];
+    double half[kMostRows], off[kMostRows];
+    for (std::size_t i = 0; i < group.count; ++i) {
+      const std::size_t at = group.first + i;
+      const double gain = 1.0 - keep_[at];
+      half[i] = 0.5 * gain * load_change_[at];
+      off[i] = gain * (input_[at] - value_[at]);
+    }
+    enter(half, half_change_.data() + group.first, group.count);
+    enter(off, surprise_.data() + group.first, group.count);
+    const double slowest = *std::min_element(bandwidths_.begin(), bandwidths_.end());
+    doubtful_until_ = now.time + tuning_.settled_steps / slowest;
+    doubtful_ = true;
   }
 
   void run() { step(keep_.data(), input_.data(), value_.data(), value_.size()); }
 
   void forget() {
     for (Group& group : groups_) group.time = kNaN;
+    doubtful_ = false;
+    for (auto* doubt : {&half_change_, &surprise_}) std::fill(doubt->begin(), doubt->end(), 0.0);
   }
 
  private:
+  static constexpr std::size_t kMostRows = 6;  // of a group
+
+  double bandwidth(std::size_t g) const { return bandwidths_[groups_[g].bandwidth]; }
+  double pole_of(std::size_t handle, double dt) const {
+    return pole(bandwidths_[handle], dt, rule_, tuning_.tustin_steps);
+  }
+
+  // Adds a load to an older one of unknown sign: the larger sum counts.
+  static void enter(const double* load, double* sum, std::size_t count) {
+    double product = 0.0;
+    for (std::size_t i = 0; i < count; ++i) product += load[i] * sum[i];
+    const double sign = product < 0.0 ? -1.0 : 1.0;
+    for (std::size_t i = 0; i < count; ++i) sum[i] = sign * sum[i] + load[i];
+  }
+
   std::size_t handle_of(double bandwidth) {
     const auto found = std::find(bandwidths_.begin(), bandwidths_.end(), bandwidth);
     const auto handle = static_cast<std::size_t>(found - bandwidths_.begin());
@@ -124,10 +195,14 @@ class Filters {
   }
 
   Discretization rule_;
+  ObserverTuning tuning_;
   std::vector<Group> groups_;
   std::vector<double> bandwidths_, poles_;  // by handle
   std::vector<std::size_t> handles_;        // by row
   std::vector<double> value_, input_, keep_;
+  std::vector<double> load_change_, half_change_, surprise_;
+  double doubtful_until_ = 0.0;
+  bool doubtful_ = false;
   double dt_ = kNaN;  // that the poles stand for
 };
 

@@ -11,8 +11,8 @@ namespace touchline {
 
 using Health = std::uint32_t;
 
-constexpr Health kSettling = 1;         // less than 5/K since the start, a gap or a reset
-constexpr Health kGap = 2;              // the step in time is too long to integrate over
+constexpr Health kSettling = 1;         // less than 5/K since the start, a long gap or a reset
+constexpr Health kGap = 2;              // samples are lost: the first one after them
 constexpr Health kBadTime = 4;          // the time stamp repeats, goes back or is no number
 constexpr Health kMissing = 8;          // a signal that should be there is NaN
 constexpr Health kNonFinite = 16;       // a signal is infinite or beyond all bounds

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <utility>
 #include <vector>
@@ -21,6 +22,7 @@
 #include "touchline/detail/observer/row.hpp"
 #include "touchline/detail/observer/signals.hpp"
 #include "touchline/detail/observer/terms.hpp"
+#include "touchline/detail/observer/tuning.hpp"
 #include "touchline/sample.hpp"
 
 namespace touchline {
@@ -29,12 +31,13 @@ class Observer {
  public:
   Observer(Tree tree, std::vector<JointRow> joints, std::vector<SensorRow> sensors,
            Method method = Method::segment,
-           Discretization discretization = Discretization::automatic)
+           Discretization discretization = Discretization::automatic,
+           const ObserverTuning& tuning = {})
       : tree_(std::move(tree)),
         joints_(std::move(joints)),
         sensors_(std::move(sensors)),
         layout_(tree_, joints_, sensors_),
-        channels_(layout_, joints_, sensors_, method, discretization),
+        channels_(layout_, joints_, sensors_, method, discretization, tuning),
         terms_(tree_, layout_, joints_, sensors_, local_rows()),
         packed_(tree_, layout_, joints_, sensors_, local_rows()),
         projections_(layout_, terms_.at()),
@@ -45,10 +48,11 @@ class Observer {
         frames_((kLanes + 1) * terms_.at().width(), 0.0),
         packed_q_(2 * joints_.size()),
         sensor_present_(sensors_.size(), 0),
-        output_(row_.width(), kNaN) {
+        output_(row_.width(), kNaN),
+        clock_(tuning) {
     for (int i = 0; i < kLanes; ++i) ahead_[i] = frames_.data() + i * terms_.at().width();
     before_ = frames_.data() + kLanes * terms_.at().width();
-    constexpr double tolerance = 0.01;  // rad or m: encoders and hard stops differ by less
+    const double tolerance = tuning.limit_tolerance;
     for (std::size_t j = 0; j < joints_.size(); ++j) {
       lower_.push_back(joints_[j].lower - tolerance);
       upper_.push_back(joints_[j].upper + tolerance);
@@ -94,7 +98,7 @@ class Observer {
 
   // Forgets everything: the next sample starts anew.
   void reset() {
-    clock_ = Clock{};
+    clock_.forget();
     forget();
   }
 
@@ -178,8 +182,13 @@ class Observer {
     channels_.filters.begin(now_);
     const bool complete = read(sample, now, health);
     // As long as all signals are there at all samples, nothing needs to be kept by channel.
-    const bool steady = steady_ && complete && now_.in_reach(now_.before);
-    if (!steady) book(health);
+    const bool usual = now_.usual(now_.before);
+    const bool steady = steady_ && complete && usual && !channels_.filters.doubtful();
+    if (!steady) {
+      if (!usual && now_.before == now_.before) health |= kGap;
+      book(health);
+      if (channels_.balances.bridged()) compare_loads(earlier, now);
+    }
     channels_.balances.balance();
     if (!steady) channels_.balances.blank();
     projections_.project(earlier, now, channels_.balances.e(sensor));
@@ -205,7 +214,7 @@ class Observer {
       return false;
     }
     started_ = true;
-    now_ = {sample.time, now_.time, clock_.max_gap()};
+    now_ = {sample.time, now_.time, clock_.period(), clock_.usual_step()};
     return true;
   }
 
@@ -273,10 +282,18 @@ class Observer {
       channels_.filters.catch_up(now_);
     }
     for (std::size_t s = 0; s < sensors_.size(); ++s) {
-      const bool lost = !now_.in_reach(channels_.balances.group(channels_.sensor(s)).time);
+      const bool lost = !now_.usual(channels_.balances.group(channels_.sensor(s)).time);
       if (!sensor_present_[s] && lost) health |= kSensorExcluded;
     }
     steady_ = channels_.book(torques_.present(), sensor_present_, now_);
+  }
+
+  // How much the known loads of all filters have changed over a gap.
+  void compare_loads(const double* earlier, const double* now) {
+    channels_.balances.compare_loads();
+    projections_.project(earlier, now, channels_.balances.e(channels_.sensor(0)));
+    compare(channels_.balances.e(channels_.joint(0)));
+    channels_.filters.take_load_changes();
   }
 
   // The inputs of all filters, from the innovations of all balances.

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -26,7 +27,9 @@ struct RowLayout {
   int segment_innovation() const { return segment_wrench() + 6 * segments; }
   int joint_settled() const { return segment_innovation() + 6 * segments; }
   int segment_settled() const { return joint_settled() + joints; }
-  int health() const { return segment_settled() + segments; }
+  int joint_gap_std() const { return segment_settled() + segments; }
+  int segment_gap_std() const { return joint_gap_std() + joints; }  // two each: force, moment
+  int health() const { return segment_gap_std() + 2 * segments; }
   int width() const { return health() + 1; }
 };
 
@@ -39,7 +42,7 @@ class RowWriter {
         layout_(layout),
         sensors_(sensors),
         method_(method),
-        settled_(row.joints + row.segments, 0.0) {}
+        quality_(2 * row.joints + 3 * row.segments, 0.0) {}
 
   // `terms`: those of this instant. In a `steady` step what is not known is NaN already.
   void write(const Channels& channels, const Instant& now, bool steady, const double* terms,
@@ -55,7 +58,8 @@ class RowWriter {
     if (method_ == Method::paper) write_paper(channels, terms, out);
     for (int s = 0; s < row_.sensors; ++s) write_sensor(s, channels, terms, steady, out);
     if (!steady || !all_settled_) settle(filters, now);
-    std::copy(settled_.begin(), settled_.end(), out + row_.joint_settled());
+    if (!steady) doubt(filters, terms);
+    std::copy(quality_.begin(), quality_.end(), out + row_.joint_settled());
     write_health(health | (all_settled_ ? 0 : kSettling), out);
   }
 
@@ -63,6 +67,7 @@ class RowWriter {
   void write_nothing(Health health, double* out) const {
     std::fill_n(out, row_.joint_settled(), kNaN);
     std::fill_n(out + row_.joint_settled(), row_.joints + row_.segments, 0.0);
+    std::fill_n(out + row_.joint_gap_std(), row_.joints + 2 * row_.segments, kNaN);
     write_health(health, out);
   }
 
@@ -87,9 +92,37 @@ class RowWriter {
       settled = filters.settled(group, now) ? 1.0 : 0.0;
       all_settled_ = all_settled_ && (settled > 0.0 || !filters.group(group).present);
     };
-    for (int j = 0; j < row_.joints; ++j) enter(j, settled_[j]);
+    for (int j = 0; j < row_.joints; ++j) enter(j, quality_[j]);
     for (int g = 0; g < row_.segments; ++g)
-      enter(3 * row_.joints + g, settled_[row_.joints + g]);
+      enter(3 * row_.joints + g, quality_[row_.joints + g]);
+  }
+
+  // One sigma of what gaps may have left in the torques of each joint (the largest of all three),
+  // and in the force and the moment about its own sensor's origin of each segment: there no lever
+  // arm is in it.
+  void doubt(const Filters& filters, const double* terms) {
+    const int first = row_.joint_settled();
+    for (int j = 0; j < row_.joints; ++j) {
+      double& std = quality_[row_.joint_gap_std() - first + j];
+      std = filters.group(j).present ? 0.0 : kNaN;
+      if (!filters.doubtful()) continue;
+      for (int filter = j; filter < 3 * row_.joints; filter += row_.joints) {
+        if (!filters.group(filter).present) continue;
+        std = std::fmax(std, std::fabs(*filters.half_change(filter)));
+        std = std::fmax(std, std::fabs(*filters.surprise(filter)));
+      }
+    }
+    for (int g = 0; g < row_.segments; ++g) {
+      const std::size_t filter = 3 * row_.joints + g;
+      double* std = quality_.data() + row_.segment_gap_std() - first + 2 * g;
+      std[0] = std[1] = filters.group(filter).present ? 0.0 : kNaN;
+      if (!filters.doubtful() || !filters.group(filter).present) continue;
+      for (const double* wrench : {filters.half_change(filter), filters.surprise(filter)}) {
+        const Spatial w = wrench_to_child(pose(terms, layout_.segments[g].sensor), load(wrench));
+        std[0] = std::max(std[0], norm(w.linear));
+        std[1] = std::max(std[1], norm(w.angular));
+      }
+    }
   }
 
   Pose pose(const double* terms, int s) const {
@@ -144,7 +177,7 @@ class RowWriter {
   const Layout& layout_;
   const std::vector<SensorRow>& sensors_;
   Method method_;
-  std::vector<double> settled_;  // joints, then segments
+  std::vector<double> quality_;  // the columns from `joint_settled` to `segment_gap_std`
   bool all_settled_ = false;
 };
 
