@@ -68,8 +68,10 @@ struct DetectionSettings {
 };
 
 constexpr double kReference = 0.2;  // time constant of what GLRT takes for offset [s]
-// A residual must also exceed so many sigma of what a gap may have left in it: those are no noise
-// but sizes of a single error, and three of them leave an event that lasts alone.
+// What a gap may have left counts this many times, for thresholds and for weights: it is no noise
+// that scatters about zero but the size of one error, which lasts for some 1/K. With one, 3 of 250
+// gaps in three held pushes begin a false contact beside them; with three, one; with five, none,
+// but new contacts are felt later.
 constexpr double kGapSigmas = 3.0;
 constexpr double kShift = 1.0;      // of the mean, that CUSUM is made for [sigma per sample]
 constexpr double kRefresh = 0.01;   // covariances follow the posture this often [s]

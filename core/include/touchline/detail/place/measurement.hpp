@@ -325,15 +325,17 @@ class Measurement {
   void add_gaps() {
     const int first = has_wrench_ ? 6 : 0;
     for (int i = 0; i < count_; ++i) {
-      const double std = used_[i]->joint >= 0 ? row_[layout_.joint_gap_std() + used_[i]->joint] : 0.0;
+      if (used_[i]->joint < 0) continue;
+      const double std = kGapSigmas * row_[layout_.joint_gap_std() + used_[i]->joint];
       if (std > 0.0) covariance_[(first + i) * (size_ + 1)] += std * std;
     }
     const double* std = row_ + layout_.segment_gap_std() + 2 * segment_;
     if (!has_wrench_ || !(std[0] > 0.0 || std[1] > 0.0)) return;
-    const Pose& X = posture_.pose(observer_.sensors()[observer_.layout().segments[segment_].sensor].node);
+    const int sensor = observer_.layout().segments[segment_].sensor;
+    const Pose& X = posture_.pose(observer_.sensors()[sensor].node);
     for (int a = 0; a < 6; ++a) {
       double unit[6] = {}, v[6];
-      unit[a] = std[a / 3];
+      unit[a] = kGapSigmas * std[a / 3];
       store(wrench_to_parent({identity<double>(), X.p}, touchline::load(unit)), v);
       for (int i = 0; i < 6; ++i) {
         for (int j = 0; j <= i; ++j) covariance_[i * size_ + j] += v[i] * v[j];
