@@ -25,7 +25,9 @@ from touchline.observer.readings import read_torque
 Array = NDArray[np.float64]
 
 TUSTIN_LIMIT = 0.5  # K dt up to which `automatic` takes Tustin's rule
-GAP_PERIODS = 3.5  # an interval longer than this many median ones is not integrated over
+# As the extended observer (`tuning.hpp`): steps of up to so many median ones are no gap; a gap is
+# integrated over up to so many time constants, but not beyond so much time [s].
+GAP_PERIODS, BRIDGED_STEPS, LONGEST_BRIDGE = 3.5, 2.0, 0.1
 BLOCK = 4096  # samples whose matrices are held at a time
 
 
@@ -118,7 +120,7 @@ class JointMomentumObserver:
         return p, u
 
     def _filter(self, time: Array, p: Array, u: Array) -> Array:
-        """Low-passes the mean external load over each interval; starts anew after a gap."""
+        """Low-passes the mean external load over each interval; starts anew after a long gap."""
         r = np.zeros_like(p)
         r[0] = np.where(np.isnan(u[0]), np.nan, 0.0)  # NaN: no torque signal
         dt = np.diff(time)
@@ -126,9 +128,11 @@ class JointMomentumObserver:
             return r
         a = np.array([self._poles(step) for step in dt])
         e = np.diff(p, axis=0) / dt[:, None] - 0.5 * (u[:-1] + u[1:])
-        whole = dt <= GAP_PERIODS * np.median(dt)
+        period = np.median(dt)
+        bridge = np.minimum(BRIDGED_STEPS / self.bandwidth, LONGEST_BRIDGE) + 1.5 * period
+        whole = dt[:, None] <= np.maximum(GAP_PERIODS * period, bridge)
         for i in range(len(dt)):
-            r[i + 1] = a[i] * r[i] + (1.0 - a[i]) * e[i] if whole[i] else r[0]
+            r[i + 1] = np.where(whole[i], a[i] * r[i] + (1.0 - a[i]) * e[i], r[0])
         return r
 
     def _poles(self, dt: float) -> Array:
