@@ -110,7 +110,7 @@ class Observer {
   const std::vector<double>& output() const { return output_; }
   double time() const { return now_.time; }  // of the last accepted sample
   // Steps in time beyond this [s] are gaps.
-  double max_gap() const { return clock_.max_gap(); }
+  double max_gap() const { return clock_.usual_step(); }
   // Of sensor s in world, at the last accepted sample.
   Pose sensor_pose(int s) const {
     return load_pose(before_ + terms_.at().sensor(s) + TermsLayout::kPose);
