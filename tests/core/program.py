@@ -18,5 +18,7 @@ def compile_program(source, target, *flags):
     ).stderr
 
 
-def run_program(program):
-    return subprocess.run([str(program)], capture_output=True, text=True, check=True)
+def run_program(program, *arguments):
+    return subprocess.run(
+        [str(program), *map(str, arguments)], capture_output=True, text=True, check=True
+    )

@@ -12,6 +12,7 @@ from touchline.cli.bench import BENCHMARKS, bench
 from touchline.cli.calibrate import calibrate
 from touchline.cli.check import check
 from touchline.cli.demo import demo
+from touchline.cli.export import export
 from touchline.cli.live import live
 from touchline.cli.reproduce import reproduce
 from touchline.cli.simulate import simulate
@@ -38,6 +39,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "live": live,
     "check": check,
     "calibrate": calibrate,
+    "export": export,
     "reproduce": reproduce,
     "bench": bench,
 }

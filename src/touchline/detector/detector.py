@@ -12,6 +12,7 @@ from touchline.detector.thresholds import Thresholds, make_thresholds
 from touchline.model.robot import Robot
 from touchline.native import core
 from touchline.observer.observer import Estimate, Observer
+from touchline.value import Value
 
 Array = NDArray[np.float64]
 
@@ -24,8 +25,8 @@ class Level(IntEnum):
     COLLISION = 2
 
 
-@dataclass(frozen=True)
-class Detection:
+@dataclass(frozen=True, eq=False, repr=False)
+class Detection(Value):
     """The detector's view of one sample, or of N samples (N in front).
 
     Attributes:

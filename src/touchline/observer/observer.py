@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from touchline.model.robot import Robot
+from touchline.value import Value, told_shortly
 
 Array = NDArray[np.float64]
 
@@ -14,7 +15,7 @@ METHODS = ("segment", "paper")
 DISCRETIZATIONS = ("automatic", "tustin", "exponential")
 
 
-class Estimate:
+class Estimate(Value):
     """What the observer knows after one sample, or after each of N samples of a recording.
 
     Shapes are those of one sample; a recording's have N in front. n joints, k sensors, m segments.
@@ -26,6 +27,16 @@ class Estimate:
     def __init__(self, rows: Array, slices: dict[str, slice]) -> None:
         self.rows = rows
         self._slices = slices
+
+    def _known(self) -> dict[str, Any]:
+        return {"rows": self.rows, "slices": self._slices}
+
+    def __repr__(self) -> str:
+        if self.rows.ndim > 1:
+            return f"Estimate of {len(self.rows)} samples"
+        told = {name: told_shortly(getattr(self, name)) for name in ("tau_ext", "segment_wrench")}
+        words = ", ".join(f"{name}={text}" for name, text in told.items())
+        return f"Estimate({words}, health={self.health})"
 
     def like(self, rows: Array) -> "Estimate":
         """Other rows of the same observer."""
@@ -163,8 +174,7 @@ class Observer:
         try:
             row = self._update(time, q, qd, tau, wrench)
         except TypeError:  # not arrays of float64 yet
-            stamp = float(_numbers(time, "time", ()))
-            row = self._update(stamp, *self.arrays((), q, qd, tau, wrench))
+            row = self._update(*self.sample(time, q, qd, tau, wrench))
         return Estimate(row, self._slices)
 
     def run(
@@ -201,6 +211,14 @@ class Observer:
         if stamps.ndim != 1:
             raise ValueError(f"time has shape {stamps.shape}, expected (N,)")
         return stamps, self.arrays(stamps.shape, *signals)
+
+    def sample(self, time: Any, *signals: ArrayLike | None) -> tuple[float, *tuple[Array, ...]]:
+        """Stamp and signals of one sample as the kernel wants them.
+
+        Raises:
+            ValueError: for a wrong shape.
+        """
+        return float(_numbers(time, "time", ())), *self.arrays((), *signals)
 
     def arrays(self, lead: tuple[int, ...], *signals: ArrayLike | None) -> list[Array]:
         """Signals q, qd, tau, wrench as the kernel wants them, `lead` being () or (N,).

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Observer, detection, localization, classification and the record of events in one object."""
 
+from functools import partial
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -17,7 +20,7 @@ from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
 from touchline.native import core
 from touchline.observer.observer import Estimate, Observer
-from touchline.pipeline.native_robot import native_robot
+from touchline.pipeline.native_robot import native_robot, write_robot
 from touchline.pipeline.result import Layout, Result
 from touchline.pipeline.table import ContactTable
 from touchline.result.event import Event
@@ -83,10 +86,17 @@ class Pipeline:
         tuning = core.Tuning()
         tuning.method = getattr(core.Method, method)
         tuning.localizer = localizer_settings(rule, friction)
-        native = native_robot(
-            robot, thresholds, self.skin, period, bandwidth, wrench_error, torque_error
+        self._native = partial(
+            native_robot,
+            robot,
+            thresholds,
+            self.skin,
+            period,
+            bandwidth,
+            wrench_error,
+            torque_error,
         )
-        self._core = core.Pipeline(native, tuning)
+        self._core = core.Pipeline(self._native(), tuning)
         self._update = self._core.update
         names = Names.of(
             robot.segment_names,
@@ -124,7 +134,7 @@ class Pipeline:
         try:
             row = self._update(time, q, qd, tau, wrench)
         except TypeError:  # not arrays of float64 yet
-            row = self._update(float(time), *self._observer.arrays((), q, qd, tau, wrench))
+            row = self._update(*self._observer.sample(time, q, qd, tau, wrench))
         return Result.of(row, self._layout)
 
     def run(
@@ -149,6 +159,16 @@ class Pipeline:
         self.contacts = ContactTable(sample, contacts[:, 1:], self._layout.names)
         detection = Detection(levels, normalized, drift, quiet)
         return Estimate(rows, self._layout.estimate), detection
+
+    def export(self, path: Path | str) -> None:
+        """Writes the robot as this pipeline knows it, for `touchline::read_robot` in C++.
+
+        Method, rule and friction are no part of a robot: in C++ they stand in a `Tuning`.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        write_robot(Path(path), self._native())
 
     def region(self) -> Region:
         """The posterior over links and surfaces of the only contact of the last sample.

@@ -13,7 +13,7 @@ from touchline.result.contact import Contact
 from touchline.result.event import Event, EventChange
 from touchline.result.kinds import Happened
 from touchline.result.native import Names
-from touchline.result.value import Value, lazily
+from touchline.value import Value, lazily
 
 Array = NDArray[np.float64]
 

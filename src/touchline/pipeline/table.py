@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from touchline.result.contact import Contact
 from touchline.result.native import CONTACT, Names, names_of
-from touchline.result.value import Field
+from touchline.value import Field
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from touchline.result.kinds import ContactLevel, Status
 from touchline.result.line import line_point
 from touchline.result.native import CONTACT, decoders
-from touchline.result.value import Value, lazily
+from touchline.value import Value, lazily
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from touchline.result.contact import Candidate, least_contacts
 from touchline.result.kinds import ContactLevel, Happened, Status
 from touchline.result.native import EVENT, decoders
-from touchline.result.value import Value, lazily
+from touchline.value import Value, lazily
 
 Array = NDArray[np.float64]
 

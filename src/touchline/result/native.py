@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from touchline.native import core
 from touchline.result.kinds import ContactLevel, Status, Zone
-from touchline.result.value import Decode, Field
+from touchline.value import Decode, Field
 
 Array = NDArray[np.float64]
 

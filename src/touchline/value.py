@@ -65,6 +65,8 @@ class Lazy:
 class Value:
     """Base of dataclasses that are values; arrays in them are compared element by element."""
 
+    __slots__ = ()
+
     @classmethod
     def of(cls, *source: Any) -> Self:
         """An instance whose fields are worked out from `source` when they are asked for."""
@@ -91,7 +93,7 @@ class Value:
         return _restored, (type(self), self._known())
 
     def __repr__(self) -> str:
-        told = [f"{name}={_told(x)}" for name, x in self._known().items() if _says(x)]
+        told = [f"{name}={told_shortly(x)}" for name, x in self._known().items() if _says(x)]
         return f"{type(self).__name__}({', '.join(told)})"
 
 
@@ -126,7 +128,8 @@ def _says(value: Any) -> bool:
     return not (value is None or (isinstance(value, list | tuple) and not value))
 
 
-def _told(value: Any) -> str:
+def told_shortly(value: Any) -> str:
+    """A value in a few words, arrays to four digits."""
     if isinstance(value, np.ndarray):
         return np.array2string(value, precision=4, suppress_small=True, separator=", ").replace(
             "\n", ""
@@ -136,5 +139,5 @@ def _told(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, list | tuple):
-        return f"[{', '.join(_told(x) for x in value)}]"
+        return f"[{', '.join(told_shortly(x) for x in value)}]"
     return repr(value)

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A C++ program replays a log on an exported robot and says what Python says, to the last bit."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from program import COMPILER, compile_program, run_program
+
+import touchline as tl
+from touchline.simulation.noise import SensorNoise
+from touchline.simulation.scenario import Run, three_touches
+
+ROOT = Path(__file__).parents[2]
+SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+
+pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C++ compiler on this machine")
+
+
+@pytest.fixture(scope="module")
+def replayed(tmp_path_factory):
+    """Folder with an exported robot and a log with faults; the robot; samples."""
+    folder = tmp_path_factory.mktemp("replay")
+    robot = tl.load_robot("sara")
+    s = three_touches(robot, speed=1.0, seconds=0.6, settings=Run(noise=SensorNoise())).samples
+    s.tau[300, 2] = np.nan
+    s.wrench[320:330, 0] = np.inf
+    s.q[340, 1] = np.nan
+    s.time[400:] += 0.1
+    s.time[450] = s.time[449]
+    tl.Pipeline(robot).export(folder / "sara.touchline")
+    names = ",".join(f"c{i}" for i in range(1 + 3 * 7 + 6 * len(robot.sensor_names)))
+    columns = np.column_stack([s.time, s.q, s.qd, s.tau, s.wrench.reshape(len(s), -1)])
+    lines = [",".join(repr(x) for x in row) for row in columns.tolist()]
+    (folder / "log.csv").write_text("\n".join([names, *lines]) + "\n")
+    return folder, robot, s
+
+
+def program_lines(source, folder, *flags):
+    complaint = compile_program(source, folder / "program", *flags)
+    if flags and ("lasan" in complaint or "lubsan" in complaint):
+        pytest.skip("the compiler has no sanitizers")
+    assert complaint == ""
+    output = run_program(folder / "program", folder / "sara.touchline", folder / "log.csv").stdout
+    return [line.split() for line in output.splitlines()]
+
+
+@pytest.mark.parametrize("flags", [("-O2",), ("-O1", *SANITIZERS)], ids=["plain", "sanitized"])
+def test_a_program_says_the_same_to_the_last_bit(replayed, flags):
+    folder, robot, s = replayed
+    pipeline = tl.Pipeline(robot)
+    lines = program_lines(ROOT / "core" / "example" / "replay.cpp", folder, *flags)
+    contacts = np.array([line[1:] for line in lines if line[0] == "contact"], dtype=float)
+    events = np.array([line[2:] for line in lines if line[0] == "event"], dtype=float)
+    pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+    table = pipeline.contacts
+    assert len(table) > 500
+    np.testing.assert_array_equal(contacts[:, 0], s.time[table.sample])
+    np.testing.assert_array_equal(contacts[:, 1:], table.numbers)
+    theirs = [tl.Event.of(row, table.names) for row in events]
+    assert len(theirs) >= 3
+    assert sorted(theirs, key=lambda event: event.id) == pipeline.events
+
+
+@pytest.mark.parametrize("flags", [("-O1",), ("-O1", *SANITIZERS)], ids=["plain", "sanitized"])
+def test_no_allocation_per_sample_and_the_same_bits_in_any_parts(replayed, flags):
+    folder, _, _ = replayed
+    source = Path(__file__).parent / "pipeline_no_allocation.cpp"
+    lines = program_lines(source, folder, *flags)
+    assert len(lines) == 4
+    for allocations, contacts, ended, _ in lines:
+        assert allocations == "0"
+        assert int(contacts) > 500 and int(ended) >= 1
+    assert len({checksum for *_, checksum in lines}) == 1
+
+
+def test_the_example_is_short():
+    assert len((ROOT / "core" / "example" / "replay.cpp").read_text().splitlines()) <= 60

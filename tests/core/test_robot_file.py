@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Exported robots: read back as they were, and refused with a clear line where they are damaged."""
+
+from pathlib import Path
+
+import pytest
+from program import COMPILER, compile_program, run_program
+
+import touchline as tl
+from touchline.cli import main
+from touchline.native import core
+
+
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory):
+    path = tmp_path_factory.mktemp("exported") / "sara.touchline"
+    assert main(["export", "sara", "--out", str(path)]) == 0
+    return path
+
+
+def test_what_is_read_is_what_was_written(exported):
+    robot = core.read_robot(str(exported))
+    assert robot.to_bytes() == exported.read_bytes()
+    assert tuple(robot.joint_names) == tl.load_robot("sara").joint_names
+    assert len(robot.surfaces) == len(robot.links) > 5
+
+
+def refused(path, content):
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match="bad.touchline: ") as told:
+        core.read_robot(str(path))
+    return str(told.value)
+
+
+def test_files_that_are_none_are_refused(exported, tmp_path):
+    good, path = exported.read_bytes(), tmp_path / "bad.touchline"
+    assert "no exported robot" in refused(path, b"")
+    assert "no exported robot" in refused(path, b"PK\x03\x04" + good[4:])
+    assert "ends too soon" in refused(path, good[:20])
+    assert "truncated: " in refused(path, good[:-1])
+    assert "goes on after its end" in refused(path, good + b"\0")
+    later = good[:8] + (99).to_bytes(4, "little") + good[12:]
+    assert "it has format 99" in refused(path, later)
+    flipped = bytearray(good)
+    flipped[len(good) // 2] ^= 1
+    assert "checksum differs" in refused(path, bytes(flipped))
+    with pytest.raises(ValueError, match="cannot be read"):
+        core.read_robot(str(tmp_path / "none.touchline"))
+
+
+def test_export_tells_what_it_cannot_do(tmp_path, capsys):
+    assert main(["export", "sara", "--out", str(tmp_path / "no" / "sara.touchline")]) == 2
+    assert main(["export", "sara", "--out", str(tmp_path / "a"), "--period", "0"]) == 2
+    assert main(["export", "nobody", "--out", str(tmp_path / "a")]) == 2
+    for line in capsys.readouterr().err.splitlines():
+        assert line.startswith("touchline: ")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no C++ compiler on this machine")
+def test_no_damage_goes_unnoticed_or_breaks_the_reader(exported, tmp_path):
+    source, program = Path(__file__).parent / "robot_file.cpp", tmp_path / "program"
+    flags = ("-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+    complaint = compile_program(source, program, *flags)
+    if "lasan" in complaint or "lubsan" in complaint:
+        pytest.skip("the compiler has no sanitizers")
+    assert complaint == ""
+    outcomes = dict(
+        reversed(line.split(maxsplit=1))
+        for line in run_program(program, exported).stdout.splitlines()
+    )
+    counts = {what: int(count) for what, count in outcomes.items()}
+    assert sum(counts.values()) > 1500
+    assert counts["it is damaged: its check"] > 200
+    assert sum(n for what, n in counts.items() if what.startswith("it is truncated")) > 200
+    assert sum(n for what, n in counts.items() if what.startswith("robot: ")) > 50
