@@ -25,6 +25,12 @@ from touchline.result.kinds import ContactLevel, Happened, Status, Zone
 
 if TYPE_CHECKING:
     from touchline import live as live
+    from touchline.localizer.region import Region as Region
+    from touchline.localizer.skin import Skin as Skin
+    from touchline.logs import read_log as read_log
+    from touchline.reaction.reactor import Command as Command
+    from touchline.reaction.reactor import Reactor as Reactor
+    from touchline.reaction.state import State as State
 
 __version__: str = core.VERSION
 
@@ -50,8 +56,24 @@ __all__ = [
 ]
 
 
+LATER = {  # loaded when they are asked for: from which module
+    "live": "touchline.live",
+    "Command": "touchline.reaction.reactor",
+    "Reactor": "touchline.reaction.reactor",
+    "Region": "touchline.localizer.region",
+    "Skin": "touchline.localizer.skin",
+    "State": "touchline.reaction.state",
+    "read_log": "touchline.logs",
+}
+
+
 def __getattr__(name: str) -> Any:
-    """Running robots are loaded when they are asked for."""
-    if name == "live":
-        return import_module("touchline.live")
-    raise AttributeError(f"module 'touchline' has no attribute '{name}'")
+    """Recordings, running robots and reactions are loaded when they are asked for."""
+    if name not in LATER:
+        raise AttributeError(f"module 'touchline' has no attribute '{name}'")
+    module = import_module(LATER[name])
+    return module if LATER[name].endswith(f".{name}") else getattr(module, name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *LATER})

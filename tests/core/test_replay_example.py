@@ -74,5 +74,16 @@ def test_no_allocation_per_sample_and_the_same_bits_in_any_parts(replayed, flags
     assert len({checksum for *_, checksum in lines}) == 1
 
 
+def test_one_pipeline_per_thread_is_enough(replayed):
+    folder, _, _ = replayed
+    source = Path(__file__).parent / "pipeline_threads.cpp"
+    complaint = compile_program(source, folder / "threads", "-O1", "-fsanitize=thread")
+    if "ltsan" in complaint:
+        pytest.skip("the compiler has no thread sanitizer")
+    assert complaint == ""
+    lines = run_program(folder / "threads", folder / "sara.touchline").stdout.split()
+    assert len(lines) == 4 and len(set(lines)) == 1 and float(lines[0]) > 100.0
+
+
 def test_the_example_is_short():
     assert len((ROOT / "core" / "example" / "replay.cpp").read_text().splitlines()) <= 60

@@ -80,6 +80,14 @@ def test_words_are_of_a_fixed_choice(said):
     assert set(ZONES) == {*tl.Zone, None}
 
 
+def test_what_a_user_can_reach_is_in_the_package():
+    for name in (*tl.__all__, *tl.LATER):
+        assert getattr(tl, name).__name__.rpartition(".")[2] == name
+        assert name in dir(tl)
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        tl.nothing  # noqa: B018
+
+
 def test_the_core_tells_every_field():
     told, derived = {field.name for field in CONTACT}, {"position_std"}
     assert {field.name for field in fields(tl.Contact)} == told - derived
