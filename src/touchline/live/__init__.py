@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Running robots: sources of samples, what is checked of them, and what is made of them."""
 
+from touchline.live.adapters import from_franka, from_ur_rtde
 from touchline.live.connection import Connection, Notice
 from touchline.live.sample import Sample, Validity, make_sample
 from touchline.live.source import EndOfSource, LinkLost, Source
@@ -18,5 +19,7 @@ __all__ = [
     "StreamState",
     "Validity",
     "connect",
+    "from_franka",
+    "from_ur_rtde",
     "make_sample",
 ]

@@ -126,6 +126,7 @@ class Session:
         """
         assert self.pipeline is not None, "start() makes it"
         waiting, self._first = self._first, []
+        end = time.monotonic() + (duration or np.inf)
         while True:
             for sample in waiting:
                 if duration is not None and sample.time - self._origin > duration:
@@ -133,6 +134,8 @@ class Session:
                 self._take(sample)
             if not self.connection.usable:
                 self.result = None
+                if time.monotonic() > end:  # the sensors' clock stands
+                    return
             yield self._news()
             if self.connection.ended:
                 return

@@ -20,9 +20,30 @@ def _replayed(address: Address, robot: Robot) -> Source:
     return ReplayedLog(address, robot)
 
 
+def _ur(address: Address, robot: Robot) -> Source:
+    from touchline.live.ur import UrArm
+
+    return UrArm(address, robot)
+
+
+def _ros(address: Address, robot: Robot) -> Source:
+    from touchline.live.ros import RosTopics
+
+    return RosTopics(address, robot)
+
+
+def _franka(address: Address, robot: Robot) -> Source:
+    from touchline.live.franka import FrankaArm
+
+    return FrankaArm(address, robot)
+
+
 SCHEMES: dict[str, tuple[str, Callable[[Address, Robot], Source]]] = {
     "sim": ("sim://", _simulated),
     "replay": ("replay://LOG?speed=1", _replayed),
+    "ros2": ("ros2://", _ros),
+    "ur": ("ur://HOST[:PORT]", _ur),
+    "franka": ("franka://HOST", _franka),
 }
 
 

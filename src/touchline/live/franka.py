@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`franka://HOST`: a Franka arm, read at 1 kHz with franky-control; nothing is commanded."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from touchline.errors import InputError
+from touchline.live.adapters import from_franka
+from touchline.live.sample import Sample
+from touchline.live.source import Address, LinkLost
+from touchline.live.streams import Stream
+from touchline.model.robot import Robot
+
+PERIOD = 1e-3  # s
+JOINTS = 7
+PAUSE = 0.05  # s; behind a longer one the first states are old
+PROMPT = 3e-3  # s from one state to the next that is no longer from a queue
+MOST = 20  # states that are looked at in one read
+
+
+class FrankaArm:
+    """A Franka arm as a source.
+
+    Args:
+        address: `franka://HOST`.
+        robot: with seven joints, in the arm's order, and no force-torque sensor.
+        connect: makes a robot object of a host; default: franky's.
+
+    Raises:
+        InputError: the robot cannot be a Franka arm, or the library is missing.
+    """
+
+    def __init__(
+        self, address: Address, robot: Robot, connect: Callable[[str], Any] | None = None
+    ) -> None:
+        address.only()
+        self.name, self._robot = address.text, robot
+        self._host, _ = address.host(1)
+        if len(robot.joint_names) != JOINTS:
+            raise InputError(
+                f"{address.text}: a Franka arm has {JOINTS} joints, but robot {robot.name} has "
+                f"{len(robot.joint_names)}"
+            )
+        if robot.sensor_names:
+            raise InputError(
+                f"{address.text}: reads the arm alone, but robot {robot.name} has force-torque "
+                f"sensors ({', '.join(robot.sensor_names)}); use ros2:// for both together"
+            )
+        self._connect = connect or _franky(address)
+        self.period: float | None = PERIOD
+        self.streams = (Stream("franka", PERIOD),)
+        self._arm: Any = None
+        self._number = 0  # of the last state that was handed on
+
+    def open(self) -> list[str]:
+        """Connects; after a fault of the network only a new robot object helps."""
+        try:
+            self._arm = self._connect(self._host)
+        except Exception as error:  # the library raises many kinds
+            raise _judged(error, self._host) from None
+        self._last, self._heard, self._fresh = -1.0, 0.0, False
+        return []
+
+    def read(self, timeout: float) -> list[Sample]:
+        """The states that have come; old ones behind a pause are left out."""
+        found: list[Sample] = []
+        end = time.monotonic() + timeout
+        while len(found) < MOST:
+            try:
+                state = self._arm.state  # waits for the next one
+            except Exception as error:  # the library raises many kinds
+                raise LinkLost(f"{self._host}: {_first_line(error)}") from None
+            now = time.monotonic()
+            sample = from_franka(self._robot, state, arrival=now)
+            if sample.time != self._last and self._is_fresh(sample, now):
+                self._note(sample)
+                found.append(sample)
+            self._last = sample.time
+            if found or now >= end:
+                break
+        return found
+
+    def _note(self, sample: Sample) -> None:
+        stream, number = self.streams[0], sample.sequence
+        lost = max(number - self._number - 1, 0) if stream.received else 0
+        stream.receive(sample.time, sample.arrival, bool(sample.valid.q.all()), lost)
+        self._number = number
+
+    def _is_fresh(self, sample: Sample, now: float) -> bool:
+        """Two in a row that are 1 ms apart, and come so, end the old ones behind a pause."""
+        pause, self._heard = now - self._heard, now
+        if pause > PAUSE:
+            self._fresh = False
+        step = sample.time - self._last
+        if not self._fresh and 0.0 < step < 1.5 * PERIOD and PERIOD / 3 < pause < PROMPT:
+            self._fresh = True
+        return self._fresh
+
+    def close(self) -> None:
+        """Lets go of the robot."""
+        self._arm = None
+
+
+def _franky(address: Address) -> Callable[[str], Any]:
+    try:
+        import franky
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"{address.text}: {error.name} is not installed: pip install 'touchline[franka]'"
+        ) from None
+    return franky.Robot
+
+
+def _judged(error: Exception, host: str) -> Exception:
+    """A fault of the network may pass; anything else will not."""
+    told = f"{host}: {_first_line(error)}"
+    passing = type(error).__name__ in ("NetworkException", "TimeoutError", "ConnectionError")
+    return LinkLost(told) if passing else InputError(told)
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]
