@@ -63,7 +63,7 @@ def test_states_become_samples_and_lost_ticks_are_counted_by_the_arms_clock(arm)
     link = Connection(source(arm, lambda host: Panda()))
     link.open()
     found = read_some(link, 0.3)
-    assert len(found) > 30
+    assert len(found) > 5
     numbers = [s.sequence for s in found]
     assert numbers == [round(1e3 * s.time) for s in found] and sorted(set(numbers)) == numbers
     assert found[-1].tau[3] == numbers[-1]
@@ -75,15 +75,20 @@ def link_count(link):
 
 
 def test_old_states_behind_a_pause_are_left_out(arm):
-    panda = Panda()
-    link = Connection(source(arm, lambda host: panda))
-    link.open()
-    read_some(link, 0.1)
-    time.sleep(0.1)  # this program has other things to do
-    old = panda.tick + 1
-    panda.queue = list(range(old, old + 30))
-    found = read_some(link, 0.2)
-    assert found and min(s.sequence for s in found) > old + 30
+    panda = source(arm, lambda host: Panda())
+    panda.open()
+
+    def fresh(tick, now):
+        sample = from_franka(arm, make_state(tick))
+        found = panda._is_fresh(sample, now)
+        panda._last = sample.time
+        return found
+
+    assert [fresh(i, i / 1e3) for i in range(1000, 1005)] == [False, False, True, True, True]
+    queued = [fresh(1005 + i, 1.160 + 2e-5 * i) for i in range(150)]  # 156 ms later, all at once
+    assert not any(queued)
+    assert [fresh(1160 + i, 1.1635 + i / 1e3) for i in range(3)] == [False, False, True]
+    assert fresh(1200, 1.2045)  # a gap that is no longer than that of its clock
 
 
 def test_after_a_fault_of_the_network_a_new_robot_object_is_made(arm):
@@ -96,7 +101,7 @@ def test_after_a_fault_of_the_network_a_new_robot_object_is_made(arm):
     link = Connection(source(arm, make))
     link.open()
     made[0].fails = True
-    found = read_some(link, 0.3)
+    found = read_some(link, 0.5)
     assert len(made) == 2 and found and link.usable
     notices = list(link.notices)
     assert any("UDP receive: Timeout; trying again" in n.text for n in notices)

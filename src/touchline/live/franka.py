@@ -15,7 +15,8 @@ from touchline.model.robot import Robot
 PERIOD = 1e-3  # s
 JOINTS = 7
 PAUSE = 0.05  # s; behind a longer one the first states are old
-PROMPT = 3e-3  # s from one state to the next that is no longer from a queue
+QUEUED = 1.0 / 3.0  # of its clock's step: a state that comes sooner waited in a queue
+ENOUGH = 2  # states in a row that did not
 MOST = 20  # states that are looked at in one read
 
 
@@ -59,7 +60,7 @@ class FrankaArm:
             self._arm = self._connect(self._host)
         except Exception as error:  # the library raises many kinds
             raise _judged(error, self._host) from None
-        self._last, self._heard, self._fresh = -1.0, 0.0, False
+        self._last, self._heard, self._in_time = -1.0, 0.0, 0
         return []
 
     def read(self, timeout: float) -> list[Sample]:
@@ -88,14 +89,14 @@ class FrankaArm:
         self._number = number
 
     def _is_fresh(self, sample: Sample, now: float) -> bool:
-        """Two in a row that are 1 ms apart, and come so, end the old ones behind a pause."""
+        """Old states behind a pause come all at once; some that come in their time end that."""
         pause, self._heard = now - self._heard, now
-        if pause > PAUSE:
-            self._fresh = False
         step = sample.time - self._last
-        if not self._fresh and 0.0 < step < 1.5 * PERIOD and PERIOD / 3 < pause < PROMPT:
-            self._fresh = True
-        return self._fresh
+        if pause > PAUSE:
+            self._in_time = 0
+        elif step > 0.0 and self._in_time < ENOUGH:
+            self._in_time = self._in_time + 1 if pause > QUEUED * step else 0
+        return self._in_time >= ENOUGH
 
     def close(self) -> None:
         """Lets go of the robot."""

@@ -92,7 +92,8 @@ class Session:
                 raise InputError([*lines, f"{name}: --force goes live all the same"])
             period = self.connection.source.period
             period = period or typical_period(_times(self._first))
-            self.pipeline = Pipeline(self.robot, period=period, skin=self._skin)
+            self._period = period
+            self.pipeline = self._made()
             if self._record is not None:
                 recorder = make_recorder(
                     self._record, self.robot, period, self.connection.source.name
@@ -103,6 +104,21 @@ class Session:
             raise
         self.connection.notices.clear()  # of the start, which has gone well
         return self.reasons
+
+    def _made(self) -> Pipeline:
+        return Pipeline(self.robot, period=self._period, skin=self._skin)
+
+    def reset(self) -> bool:
+        """Forgets the past: the pipeline starts anew, and events begin at 0 again.
+
+        A recording goes on; what it is replayed to differs from here.
+        """
+        if self.pipeline is None:
+            return False
+        self.pipeline = self._made()
+        self._open_events.clear()
+        self._told, self.result = 0, None
+        return True
 
     @property
     def origin(self) -> float:

@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is felt as ROS 2 messages.
+
+Contacts travel as JSON in a `std_msgs/String`, with the keys of `contacts.parquet`: no standard
+message holds a link, its probability, a point with covariance and a force together, and a message
+of our own would have to be built on every machine that listens. Markers and wrenches are standard.
+"""
+
+import json
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.live.sample import Sample, whole_nanoseconds
+from touchline.live.session import Session
+from touchline.live.streams import StreamState
+from touchline.model.robot import Robot
+from touchline.pipeline.pipeline import Result
+from touchline.result.contact import Contact
+
+Array = NDArray[np.float64]
+
+METRES_PER_NEWTON = 0.01  # length of arrows
+SHAFT, HEAD, POINT = 0.008, 0.02, 0.02  # m
+SIGMAS = 2.0  # of the region that is drawn
+FELT, BLOW = (0.84, 0.37, 0.0, 0.9), (0.8, 0.1, 0.1, 0.9)  # colours: red, green, blue, opacity
+REGION = (0.84, 0.37, 0.0, 0.25)
+SHOWN = 0.5  # s for which a marker is shown that is not renewed
+
+
+class Messages:
+    """Makes messages.
+
+    Args:
+        robot: whose names they carry.
+        frame: name of the world frame.
+    """
+
+    def __init__(self, robot: Robot, frame: str) -> None:
+        from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+        from geometry_msgs.msg import Point, WrenchStamped
+        from sensor_msgs.msg import JointState
+        from std_msgs.msg import Bool, String
+        from visualization_msgs.msg import Marker, MarkerArray
+
+        self._robot, self._frame = robot, frame
+        self._state, self._wrench, self._text, self._flag = JointState, WrenchStamped, String, Bool
+        self._marker, self._markers, self._point = Marker, MarkerArray, Point
+        self._array, self._status, self._pair = DiagnosticArray, DiagnosticStatus, KeyValue
+        self._forces = [name for name in robot.segment_names if name != "root"]
+        self._drawn = 0
+
+    def kinds(self) -> dict[str, Any]:
+        """Topic -> type of message."""
+        return {
+            "~/external_joint_torques": self._state,
+            **{wrench_topic(name): self._wrench for name in self._forces},
+            "~/contacts": self._text,
+            "~/collision": self._flag,
+            "~/markers": self._markers,
+            "/diagnostics": self._array,
+        }
+
+    def of(self, sample: Sample, result: Result) -> dict[str, Any]:
+        """What is published of a sample, by topic."""
+        messages: dict[str, Any] = {"~/external_joint_torques": self._torques(sample, result)}
+        for segment, name in enumerate(self._robot.segment_names):
+            if name in self._forces:
+                wrench = result.estimate.segment_wrench[segment]
+                messages[wrench_topic(name)] = self._segment(sample, wrench)
+        messages["~/contacts"] = self._text(data=contacts_json(sample.time, result))
+        if result.contacts or self._drawn:
+            messages["~/markers"] = self._draw(sample, result.contacts)
+        return messages
+
+    def collision(self, collision: bool) -> Any:
+        """Whether there was one since the last reset."""
+        return self._flag(data=collision)
+
+    def _head(self, header: Any, sample: Sample, frame: str) -> None:
+        seconds, rest = divmod(whole_nanoseconds(sample.time), 10**9)
+        header.stamp.sec, header.stamp.nanosec, header.frame_id = seconds, rest, frame
+
+    def _torques(self, sample: Sample, result: Result) -> Any:
+        message = self._state(name=list(self._robot.joint_names))
+        self._head(message.header, sample, "")
+        message.effort = [float(x) for x in result.estimate.tau_ext]
+        return message
+
+    def _segment(self, sample: Sample, wrench: Array) -> Any:
+        message = self._wrench()
+        self._head(message.header, sample, self._frame)
+        force, torque = message.wrench.force, message.wrench.torque
+        force.x, force.y, force.z, torque.x, torque.y, torque.z = (float(x) for x in wrench)
+        return message
+
+    def _draw(self, sample: Sample, contacts: list[Contact]) -> Any:
+        """An arrow to each contact that is located, its region, and points that may be touched."""
+        found: list[Any] = []
+        for number, contact in enumerate(contacts):
+            colour = BLOW if contact.level == "collision" else FELT
+            if contact.position is not None and contact.force is not None:
+                start = contact.position - METRES_PER_NEWTON * contact.force
+                arrow = self._new(sample, "force", number, self._marker.ARROW, colour)
+                arrow.points = [self._at(start), self._at(contact.position)]
+                arrow.scale.x, arrow.scale.y = SHAFT, HEAD
+                found.append(arrow)
+            if contact.position is not None and contact.covariance is not None:
+                found.append(self._region(sample, number, contact))
+            if contact.position is None and contact.candidates:
+                points = self._new(sample, "candidates", number, self._marker.POINTS, colour)
+                points.points = [self._at(c.position) for c in contact.candidates]
+                points.scale.x = points.scale.y = POINT
+                found.append(points)
+        if not found:
+            found = [self._marker(action=self._marker.DELETEALL)]
+        self._drawn = len(contacts)
+        return self._markers(markers=found)
+
+    def _region(self, sample: Sample, number: int, contact: Contact) -> Any:
+        """A sphere as large as the uncertainty is in its worst direction."""
+        ball = self._new(sample, "region", number, self._marker.SPHERE, REGION)
+        assert contact.position is not None and contact.covariance is not None
+        ball.pose.position = self._at(contact.position)
+        spread = float(np.sqrt(max(np.linalg.eigvalsh(contact.covariance)[-1], 0.0)))
+        ball.scale.x = ball.scale.y = ball.scale.z = max(2 * SIGMAS * spread, POINT)
+        return ball
+
+    def _new(self, sample: Sample, name: str, number: int, kind: int, colour: Any) -> Any:
+        marker = self._marker(ns=name, id=number, type=kind, action=self._marker.ADD)
+        self._head(marker.header, sample, self._frame)
+        marker.pose.orientation.w = 1.0
+        marker.color.r, marker.color.g, marker.color.b, marker.color.a = colour
+        marker.lifetime.nanosec = int(SHOWN * 1e9)
+        return marker
+
+    def _at(self, position: Array) -> Any:
+        x, y, z = (float(value) for value in position)
+        return self._point(x=x, y=y, z=z)
+
+    def diagnostics(self, session: Session, stamp: Any, node: str) -> Any:
+        """Each stream's state, rate, age and losses."""
+        message = self._array()
+        message.header.stamp = stamp
+        now = time.monotonic()
+        for stream in session.connection.streams:
+            state = stream.state(now)
+            lost = stream.lost / max(stream.received + stream.lost, 1)
+            age = stream.age(now)
+            facts = {
+                "rate_hz": f"{stream.rate:.1f}",
+                "age_ms": f"{1e3 * age:.1f}" if np.isfinite(age) else "",
+                "received": str(stream.received),
+                "lost": str(stream.lost),
+                "lost_share": f"{lost:.6f}",
+                "refused": str(stream.refused),
+            }
+            message.status.append(
+                self._status(
+                    level=self._level(state),
+                    name=f"{node}: {stream.name}",
+                    message=str(state),
+                    hardware_id=session.connection.source.name,
+                    values=[self._pair(key=key, value=value) for key, value in facts.items()],
+                )
+            )
+        return message
+
+    def _level(self, state: StreamState) -> bytes:
+        if state is StreamState.OK:
+            return self._status.OK
+        if state is StreamState.SLOW:
+            return self._status.WARN
+        return self._status.STALE if state is StreamState.STALE else self._status.ERROR
+
+
+def wrench_topic(segment: str) -> str:
+    """The topic of a segment's wrench; a name of ROS has letters, digits and underscores."""
+    plain = "".join(c if c.isalnum() and c.isascii() else "_" for c in segment)
+    return f"~/{plain if not plain[:1].isdigit() else '_' + plain}/wrench"
+
+
+def contacts_json(at: float, result: Result) -> str:
+    """Contacts of one instant as text."""
+    rows = [
+        {
+            "event": contact.event,
+            "segment": contact.segment,
+            "level": contact.level,
+            "status": contact.status,
+            "link": contact.link,
+            "body": contact.body,
+            "body_probability": contact.body_probability,
+            "position": _plain(contact.position),
+            "position_std": contact.position_std,
+            "covariance": _plain(contact.covariance),
+            "force": _plain(contact.force),
+            "candidates": [
+                {"link": c.link, "probability": c.probability, "position": _plain(c.position)}
+                for c in contact.candidates
+            ],
+        }
+        for contact in result.contacts
+    ]
+    return json.dumps({"time": at, "health": int(result.health), "contacts": rows})
+
+
+def _plain(values: Array | None) -> list[Any] | None:
+    return None if values is None else values.tolist()

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The ROS 2 node, with a listener in a process of its own; skipped where ROS 2 is not there."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+from test_live_ros import HERE, environment, needs_ros
+
+from touchline.live.messages import wrench_topic
+
+
+@needs_ros
+def test_what_is_felt_is_published_and_services_answer():
+    env = environment(76)
+    listener = [sys.executable, str(HERE / "ros_listener.py"), "14"]
+    parameters = ["-p", "robot:=sara", "-p", "source:=sim://?motion=0", "-p", "publish_rate:=100.0"]
+    command = [sys.executable, "-m", "touchline.live.node", "--ros-args", *parameters]
+    with (
+        subprocess.Popen(listener, env=env, stdout=subprocess.PIPE, text=True) as ear,
+        subprocess.Popen(command, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as node,
+    ):
+        try:
+            out, _ = ear.communicate(timeout=90)
+        finally:
+            node.terminate()
+            node.communicate(timeout=30)
+            ear.kill()
+    told = json.loads(out.splitlines()[-1])
+    assert all(count > 0 for count in told["heard"].values()), told
+    assert told["names"] == [f"joint{i}" for i in range(1, 8)] and told["efforts"] == 7
+    assert told["links"] and "force" in told["shapes"]
+    assert told["status"][0] == "touchline: simulation" and float(told["facts"]["rate_hz"]) > 0
+    assert told["collision"] in (True, False)
+    assert set(told["answers"]) == {"reset", "tare"}
+    assert all(isinstance(success, bool) and text for success, text in told["answers"].values())
+
+
+@needs_ros
+def test_a_node_with_a_bad_parameter_says_so_and_ends():
+    command = [sys.executable, "-m", "touchline.live.node", "--ros-args", "-p"]
+    for parameter, words in (
+        ("robot:=no_such_robot", "no_such_robot"),
+        ("source:=nowhere://", "parameter robot"),
+    ):
+        done = subprocess.run(
+            [*command, parameter],
+            check=False,
+            env=environment(77),
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
+        assert done.returncode == 2 and words in done.stderr and "Traceback" not in done.stderr
+
+
+def test_topics_of_segments_are_names_that_ros_allows():
+    assert wrench_topic("base") == "~/base/wrench"
+    assert wrench_topic("3-axis sensor") == "~/_3_axis_sensor/wrench"
+
+
+def test_without_ros_the_node_says_what_to_install(monkeypatch, capsys):
+    from touchline.live.node import main
+
+    monkeypatch.setitem(sys.modules, "rclpy", None)
+    assert main([]) == 2
+    assert "touchline[ros2]" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["touchline.launch.py"])
+def test_the_launch_file_is_python(name):
+    path = HERE.parents[1] / "ros" / "touchline" / "launch" / name
+    compile(path.read_text(), str(path), "exec")
