@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from touchline.live.sample import Sample, whole_nanoseconds
 from touchline.live.session import Session
-from touchline.live.streams import StreamState
+from touchline.live.streams import Stream, StreamState
 from touchline.model.robot import Robot
 from touchline.pipeline.pipeline import Result
 from touchline.result.contact import Contact
@@ -144,28 +144,17 @@ class Messages:
         """Each stream's state, rate, age and losses."""
         message = self._array()
         message.header.stamp = stamp
-        now = time.monotonic()
-        for stream in session.connection.streams:
-            state = stream.state(now)
-            lost = stream.lost / max(stream.received + stream.lost, 1)
-            age = stream.age(now)
-            facts = {
-                "rate_hz": f"{stream.rate:.1f}",
-                "age_ms": f"{1e3 * age:.1f}" if np.isfinite(age) else "",
-                "received": str(stream.received),
-                "lost": str(stream.lost),
-                "lost_share": f"{lost:.6f}",
-                "refused": str(stream.refused),
-            }
-            message.status.append(
-                self._status(
-                    level=self._level(state),
-                    name=f"{node}: {stream.name}",
-                    message=str(state),
-                    hardware_id=session.connection.source.name,
-                    values=[self._pair(key=key, value=value) for key, value in facts.items()],
-                )
+        now, source = time.monotonic(), session.connection.source.name
+        message.status = [
+            self._status(
+                level=self._level(stream.state(now)),
+                name=f"{node}: {stream.name}",
+                message=str(stream.state(now)),
+                hardware_id=source,
+                values=[self._pair(key=key, value=value) for key, value in _facts(stream, now)],
             )
+            for stream in session.connection.streams
+        ]
         return message
 
     def _level(self, state: StreamState) -> bytes:
@@ -174,6 +163,19 @@ class Messages:
         if state is StreamState.SLOW:
             return self._status.WARN
         return self._status.STALE if state is StreamState.STALE else self._status.ERROR
+
+
+def _facts(stream: Stream, now: float) -> list[tuple[str, str]]:
+    age = stream.age(now)
+    lost = stream.lost / max(stream.received + stream.lost, 1)
+    return [
+        ("rate_hz", f"{stream.rate:.1f}"),
+        ("age_ms", f"{1e3 * age:.1f}" if np.isfinite(age) else ""),
+        ("received", str(stream.received)),
+        ("lost", str(stream.lost)),
+        ("lost_share", f"{lost:.6f}"),
+        ("refused", str(stream.refused)),
+    ]
 
 
 def wrench_topic(segment: str) -> str:
