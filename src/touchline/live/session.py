@@ -21,6 +21,7 @@ from touchline.pipeline.pipeline import Pipeline, Result
 from touchline.result.event import Event
 
 CHECK_EVERY = 0.1  # s between two looks whether an event has ended
+SILENT = 1.0  # s without a sample, after which `duration` is over on this machine's clock too
 LONGEST_START = 3.0  # s in which the first second has to come
 
 
@@ -150,8 +151,8 @@ class Session:
                 self._take(sample)
             if not self.connection.usable:
                 self.result = None
-                if time.monotonic() > end:  # the sensors' clock stands
-                    return
+                if (now := time.monotonic()) > end and self.connection.streams[0].age(now) > SILENT:
+                    return  # the sensors' clock stands
             yield self._news()
             if self.connection.ended:
                 return
