@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.calibrate.run import Calibration
+from touchline.calibrate.run import Calibration, Thresholds
 from touchline.detector.calibration import Statistics
 from touchline.detector.tail import Tail, alarm_levels
 from touchline.errors import InputError
@@ -47,17 +47,20 @@ def draw_calibration(result: Calibration, path: Path) -> None:
     from matplotlib.figure import Figure
 
     matplotlib.rcParams["svg.hashsalt"] = "touchline"
-    names = [name for name in result.robot.segment_names if name in result.tails]
+    thresholds = result.thresholds
+    if thresholds is None:
+        raise InputError(f"--figure {path}: there are no thresholds to draw")
+    names = [name for name in result.robot.segment_names if name in thresholds.tails]
     figure = Figure(figsize=(2.9 * len(METHODS), 2.6 * len(names)), layout="constrained")
     grid = figure.subplots(len(names), len(METHODS), squeeze=False)
     for line, name in zip(grid, names, strict=True):
         for t, (axes, method) in enumerate(zip(line, METHODS, strict=True)):
-            tail = result.tails[name].get(method)
+            tail = thresholds.tails[name].get(method)
             if tail is None:
                 axes.axis("off")
                 continue
             g = result.robot.segment_names.index(name)
-            _panel(axes, result, tail, (g, t))
+            _panel(axes, result.share, thresholds, tail, (g, t))
             used = method in result.robot.description.detection.method
             axes.set_title(f"{name}: {method}{' (in use)' if used else ''}", fontsize=9)
     drawn = [axes for axes in grid.flat if axes.lines]
@@ -73,13 +76,14 @@ def draw_calibration(result: Calibration, path: Path) -> None:
         raise InputError(f"--figure {path}: cannot be written: {error.strerror}") from None
 
 
-def _panel(axes: Any, result: Calibration, tail: Tail, at: tuple[int, int]) -> None:
-    share = result.share
+def _panel(
+    axes: Any, share: float, thresholds: Thresholds, tail: Tail, at: tuple[int, int]
+) -> None:
     limit, (low, high) = tail.threshold(share), tail.interval(share)
     most = 1.15 * max(limit, tail.level)
     for part, colour, label in (
-        (result.train, "#1f77b4", "the others"),
-        (result.test, "#ff7f0e", "held out"),
+        (thresholds.train, "#1f77b4", "the others"),
+        (thresholds.test, "#ff7f0e", "held out"),
     ):
         levels, rates = _seen(part, at)
         axes.step(levels, rates, where="pre", color=colour, lw=1.2, label=label)

@@ -14,7 +14,8 @@ from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
 
 CHUNK = 1 << 15  # samples
-LEAST_SECONDS = 20.0  # shorter ones have no tail
+LEAST_SECONDS = 5.0  # shorter ones tell an offset at best
+BESIDE = 0.3  # s on either side of a stretch that is left out
 
 
 class Recordings:
@@ -22,6 +23,8 @@ class Recordings:
 
     def __init__(self, robot: Robot, logs: list[Path]) -> None:
         self._robot, self._logs = robot, logs
+        self._left_out: list[tuple[int, float, float]] = []
+        self.seconds = 0.0
         self.period = float("nan")
         seconds = 0.0
         for log in logs:
@@ -34,10 +37,11 @@ class Recordings:
                     f"{1 / self.period:g}: thresholds hold for one rate"
                 )
             seconds += length
+        self.seconds = seconds
         if seconds < LEAST_SECONDS:
             raise InputError(
                 f"{', '.join(map(str, logs))}: {seconds:.3g} s of samples; at least "
-                f"{LEAST_SECONDS:g} s are needed, an hour is better"
+                f"{LEAST_SECONDS:g} s are needed, half an hour is better"
             )
 
     def _look_at(self, log: Path) -> tuple[float, float]:
@@ -55,13 +59,27 @@ class Recordings:
         """Every recording, in parts."""
         from tqdm import tqdm
 
-        for log in tqdm(self._logs, desc=what, disable=None, leave=False):
-            yield self._parts(log)
+        for i in tqdm(range(len(self._logs)), desc=what, disable=None, leave=False):
+            yield self._parts(i)
 
     def of(self, number: int) -> Iterator[Samples]:
         """One recording, in parts."""
-        return self._parts(self._logs[number])
+        return self._parts(number)
 
-    def _parts(self, log: Path) -> Iterator[Samples]:
-        with open_log(log, self._robot.description) as recording:
-            yield from recording.chunks(CHUNK)
+    def leave_out(self, stretches: list[tuple[int, float, float]]) -> None:
+        """Reads on as if nothing had been recorded in some stretches.
+
+        Args:
+            stretches: number of the recording, begin and end [s].
+        """
+        self._left_out += stretches
+        self.seconds -= sum(end - start + 2.0 * BESIDE for _, start, end in stretches)
+
+    def _parts(self, number: int) -> Iterator[Samples]:
+        stretches = [(a - BESIDE, b + BESIDE) for i, a, b in self._left_out if i == number]
+        with open_log(self._logs[number], self._robot.description) as recording:
+            for part in recording.chunks(CHUNK):
+                keep = np.ones(len(part), dtype=bool)
+                for start, end in stretches:
+                    keep &= (part.time < start) | (part.time > end)
+                yield part if keep.all() else part.where(keep)

@@ -16,7 +16,10 @@ from touchline.model.yaml_file import read_yaml
 KEY = re.compile(r"^(?:([A-Za-z_][\w-]*)|\"([^\"]+)\"|'([^']+)')\s*:")
 
 
-def write_description(source: Path, out: Path, changes: dict[str, dict[str, Any]]) -> None:
+NAMED = "joints", "force_torque_sensors"  # lists whose entries have names
+
+
+def write_description(source: Path, out: Path, changes: dict[str, Any]) -> None:
     """Writes a description with new values, and checks that it says what was meant.
 
     Comments and order of all other keys stay. Paths relative to the file are made to hold from
@@ -25,7 +28,9 @@ def write_description(source: Path, out: Path, changes: dict[str, dict[str, Any]
     Args:
         source: the description.
         out: where the new one will stand; may be the same.
-        changes: top-level key -> keys within it -> new value.
+        changes: top-level key -> keys within it -> new value; of `joints` and
+            `force_torque_sensors` name -> keys of that entry -> new value; a list replaces what
+            stands there.
 
     Raises:
         InputError: the file cannot be written.
@@ -37,6 +42,12 @@ def write_description(source: Path, out: Path, changes: dict[str, dict[str, Any]
     for key, value in moved.items():
         lines = _replaced(lines, key, _dumped(key, value))
     for key, values in changes.items():
+        if key in NAMED:
+            values = _named(data.get(key) or [], values)
+        if isinstance(values, list):
+            lines = _listed(lines, key, data.get(key) or [], values)
+            expected[key] = values
+            continue
         expected[key] = (data.get(key) or {}) | values
         lines = _merged(lines, key, values, expected[key])
     check_file(out)
@@ -44,6 +55,51 @@ def write_description(source: Path, out: Path, changes: dict[str, dict[str, Any]
         part.write_text("\n".join(lines) + "\n", encoding="utf-8")
         if not _says(part, expected):  # an unusual layout: written anew, without comments
             part.write_text(_dumped_all(expected), encoding="utf-8")
+
+
+def _named(entries: list[dict[str, Any]], changes: dict[str, Any]) -> list[dict[str, Any]]:
+    """Entries with new values in those that are named; new entries where there are none."""
+    if not entries:
+        return [{"name": name} | values for name, values in changes.items()]
+    return [entry | changes.get(entry.get("name"), {}) for entry in entries]
+
+
+def _listed(lines: list[str], key: str, old: list[Any], new: list[Any]) -> list[str]:
+    """The lines with a list's entries replaced where they changed, comments beside them kept."""
+    found = _block(lines, key)
+    whole = [f"{key}:", *(f"  - {_flow(entry)}" for entry in new)]
+    if found is None:
+        return [*lines, *whole]
+    start, end = found
+    inner = lines[start + 1 : end]
+    places = [i for i, line in enumerate(inner) if re.match(r"^\s*- ", line)]
+    one_line = all(
+        not line.strip() or line.lstrip().startswith(("#", "- {")) and "}" in line + "#}"
+        for line in inner
+    )
+    if not one_line or len(places) != len(old) or len(new) < len(old):
+        return [*lines[:start], *whole, *lines[end:]]
+    indent = inner[places[0]][: len(inner[places[0]]) - len(inner[places[0]].lstrip())]
+    for place, before, after in zip(places, old, new, strict=False):
+        if before != after:
+            _, mark, comment = inner[place].rpartition("}")[2].partition("#")
+            tail = f"  #{comment}" if mark else ""
+            inner[place] = f"{indent}- {_flow(after)}{tail}"
+    inner += [f"{indent}- {_flow(entry)}" for entry in new[len(old) :]]
+    return [*lines[: start + 1], *inner, *lines[end:]]
+
+
+def _flow(entry: Any) -> str:
+    """An entry in one line."""
+    text = yaml.dump(
+        entry,
+        Dumper=_Dumper,
+        default_flow_style=True,
+        sort_keys=False,
+        allow_unicode=True,
+        width=10**6,
+    )
+    return text.strip()
 
 
 def _says(path: Path, expected: dict[str, Any]) -> bool:
@@ -142,9 +198,13 @@ def _list(dumper: yaml.SafeDumper, value: list[Any]) -> yaml.SequenceNode:
 
 
 def _dict(dumper: yaml.SafeDumper, value: dict[Any, Any]) -> yaml.MappingNode:
-    flat = bool(value) and all(
-        not isinstance(item, dict) and not (isinstance(item, list) and len(item) > 3)
-        for item in value.values()
+    flat = (
+        dumper.default_flow_style is True
+        or bool(value)
+        and all(
+            not isinstance(item, dict) and not (isinstance(item, list) and len(item) > 3)
+            for item in value.values()
+        )
     )
     return dumper.represent_mapping("tag:yaml.org,2002:map", value, flow_style=flat)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`calibrate`: from recordings without contact to noise figures and thresholds."""
+"""`calibrate`: from recordings to parameters of the robot, noise figures and thresholds."""
 
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -26,6 +26,9 @@ from touchline.detector.calibration import (
 from touchline.detector.tail import Tail
 from touchline.errors import InputError
 from touchline.folder import check_file
+from touchline.identify.described import description_changes, identified_robot
+from touchline.identify.evidence import gather
+from touchline.identify.identification import Identification, identify
 from touchline.model.description import CalibrationDescription, Noise, RowCalibration
 from touchline.model.robot import Robot, load_robot
 from touchline.model.values import METHODS
@@ -33,40 +36,66 @@ from touchline.model.yaml_file import read_yaml
 
 Array = NDArray[np.float64]
 
+LEAST_SECONDS = 20.0  # shorter recordings have no tail
+MOST_LEFT_OUT = 0.3  # of the time; where more seems touched nobody can tell what is usual
+ROUNDS = 4  # of leaving out what seems to be touched
+
 
 @dataclass(frozen=True)
-class Calibration:
-    """What came out.
+class Thresholds:
+    """Thresholds of detection, and what they are worth.
 
     Attributes:
-        robot: as it was described, with the new noise figures.
-        out: the new description.
-        logs: the recordings.
-        noise: the new noise figures.
         description: what stands under `detection.calibration`.
         tails: by segment and method.
         held_out: judgements on data that the thresholds had not seen.
         train, test: the parts of the data for that, as statistics of all methods.
         parted: how the data were parted.
-        rate: false alarms per hour that are asked for.
     """
 
-    robot: Robot
-    out: Path
-    logs: list[Path]
-    noise: Noise
     description: CalibrationDescription
     tails: dict[str, dict[str, Tail]]
     held_out: list[HeldOut]
     train: Statistics
     test: Statistics
     parted: str
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What came out.
+
+    Attributes:
+        robot: as it is now described, thresholds apart.
+        out: the new description.
+        logs: the recordings.
+        seconds: of the recordings, without what was left out.
+        period: of the samples [s].
+        noise: the new noise figures.
+        rate: false alarms per hour that are asked for.
+        identification: parameters of the robot; None if they were not asked for.
+        left_out: recording, begin and end [s] of what seemed to be touched.
+        thresholds: None where the data are too short for them.
+        lacking: why there are none.
+    """
+
+    robot: Robot
+    out: Path
+    logs: list[Path]
+    seconds: float
+    period: float
+    noise: Noise
     rate: float
+    identification: Identification | None
+    left_out: list[tuple[int, float, float]]
+    thresholds: Thresholds | None
+    lacking: str = ""
 
     @property
     def share(self) -> float:
         """Of the rate, for each method in use on each segment [1/h]."""
-        return self.rate / (len(self.robot.description.detection.method) * len(self.tails))
+        tails = self.thresholds.tails if self.thresholds else {}
+        return self.rate / max(len(self.robot.description.detection.method) * len(tails), 1)
 
 
 def calibrate(
@@ -76,19 +105,21 @@ def calibrate(
     methods: tuple[str, ...] = (),
     false_alarms: float | None = None,
     trust: bool = False,
+    identification: bool = True,
 ) -> Calibration:
     """Calibrates a robot and writes its new description.
 
     Args:
-        logs: recordings of motion without contact.
+        logs: recordings of motion without contact; stretches with contact are left out.
         robot: path of its `robot.yaml`, or the name of a robot that ships with Touchline.
         out: the new description.
         methods: of detection, to be written; default: the description's.
         false_alarms: per hour of the whole robot, to be written; default: the description's.
         trust: what stands out is the robot's own doing, not a contact.
+        identification: of biases, friction and inertias; False takes them as described.
 
     Raises:
-        InputError: something cannot be read or written, is too short, or shows contacts.
+        InputError: something cannot be read or written, is too short, or shows contacts throughout.
     """
     model = load_robot(robot)
     _check(logs, out, false_alarms)
@@ -99,27 +130,90 @@ def calibrate(
     chosen = methods or model.description.detection.method
     given = read_yaml(source).get("detection") or {}
     hold = model.description.detection.min_duration if "min_duration" in given else 0.0
-    model = with_methods(model, *chosen, min_duration=hold, calibration=None, false_alarms=rate)
     recordings = Recordings(model, logs)
+    changes: dict[str, Any] = {}
+    found: Identification | None = None
+    left_out: list[tuple[int, float, float]] = []
+    if identification:
+        found = identify(gather(model, recordings.all("equations")), trust)
+        left_out = found.touches()
+        recordings.leave_out(left_out)
+        described = model
+        model = identified_robot(found)
+        changes = description_changes(described, model)
+    model = with_methods(model, *chosen, min_duration=hold, calibration=None, false_alarms=rate)
     noise = measure_noise(model, recordings.all("noise"))
+    changes["noise"] = {key: _plain(value) for key, value in noise_keys(model, noise).items()}
     quiet = Robot(replace(model.description, noise=noise), model.mechanism)
-    found, rows = _watch(quiet, recordings, trust)
-    suspicions = [] if trust else find_contacts(found, METHODS)
-    if suspicions:
-        raise InputError(_told(quiet, recordings, rows, logs, suspicions))
-    train, test, parted = split(found, len(logs))
-    held_out = judge(quiet, train, test, rate)
-    tails = fit_tails(quiet, found)
-    _check_tails(quiet, tails, chosen, found.hours)
-    description = describe(found.hours, recordings.period, rows, tails)
-    detection: dict[str, Any] = {"method": list(chosen), "false_alarms": rate, "min_duration": hold}
-    detection["calibration"] = _plain(description)
-    figures = {key: _plain(value) for key, value in noise_keys(model, noise).items()}
-    write_description(source, out, {"noise": figures, "detection": detection})
-    model = Robot(replace(model.description, noise=noise), model.mechanism)
+    thresholds, lacking = None, ""
+    try:
+        thresholds, more = _find_thresholds(quiet, recordings, logs, chosen, rate, trust)
+        left_out += more
+    except NoThresholds as error:
+        if found is None or not found.problem.columns + found.problem.bodies:
+            raise
+        lacking = str(error)
+    if thresholds is not None:
+        detection: dict[str, Any] = {"method": list(chosen), "false_alarms": rate}
+        detection |= {"min_duration": hold, "calibration": _plain(thresholds.description)}
+        changes["detection"] = detection
+    write_description(source, out, changes)
     return Calibration(
-        model, out, logs, noise, description, tails, held_out, train, test, parted, rate
+        quiet,
+        out,
+        logs,
+        recordings.seconds,
+        recordings.period,
+        noise,
+        rate,
+        found,
+        sorted(left_out),
+        thresholds,
+        lacking,
     )
+
+
+class NoThresholds(InputError):
+    """The recordings are no good for thresholds."""
+
+
+def _find_thresholds(
+    robot: Robot,
+    recordings: Recordings,
+    logs: list[Path],
+    chosen: tuple[str, ...],
+    rate: float,
+    trust: bool,
+) -> tuple[Thresholds, list[tuple[int, float, float]]]:
+    """Thresholds, and what was left out for them because it seems to be touched."""
+    left_out: list[tuple[int, float, float]] = []
+    suspicions: list[Suspicion] = []
+    rows: dict[str, RowCalibration] = {}
+    for _ in range(ROUNDS):
+        if recordings.seconds < LEAST_SECONDS:
+            raise NoThresholds(
+                f"{recordings.seconds:.3g} s without contact: at least {LEAST_SECONDS:g} s are "
+                "needed for thresholds, half an hour is better"
+            )
+        found, rows = _watch(robot, recordings, trust)
+        suspicions = [] if trust else find_contacts(found, METHODS)
+        if not suspicions:
+            train, test, parted = split(found, len(logs))
+            held_out = judge(robot, train, test, rate)
+            tails = fit_tails(robot, found)
+            _check_tails(robot, tails, chosen, found.hours)
+            description = describe(found.hours, recordings.period, rows, tails)
+            return Thresholds(description, tails, held_out, train, test, parted), left_out
+        new = [(s.recording, s.start, s.end) for s in suspicions]
+        if _long(left_out + new) > MOST_LEFT_OUT * recordings.seconds:
+            break
+        left_out += new
+        recordings.leave_out(new)
+    raise NoThresholds(_told(robot, recordings, rows, logs, suspicions))
+
+
+def _long(stretches: list[tuple[int, float, float]]) -> float:
+    return sum(end - start for _, start, end in stretches)
 
 
 def _check(logs: list[Path], out: Path, false_alarms: float | None) -> None:
@@ -151,7 +245,7 @@ def _check_tails(
     ]
     if missing:
         able = [m for m in METHODS if all(m in of for of in tails.values())] if tails else []
-        raise InputError(
+        raise NoThresholds(
             f"{3600 * hours:.3g} s without contact show too few excursions of {', '.join(missing)} "
             "for a threshold: record several minutes in motion"
             + (f"; there are enough for --method {' '.join(able)}" if able else "")
@@ -166,10 +260,10 @@ def _watch(
     residuals = collect_residuals(robot, period, recordings.all("residuals"))
     rows = fit_rows(robot, period, residuals)
     if not rows:
-        raise InputError("no residual settles: is a signal missing? (touchline check)")
+        raise NoThresholds("no residual settles: is a signal missing? (touchline check)")
     often = [] if trust else often_off(robot, period, residuals)
     if often:
-        raise InputError(
+        raise NoThresholds(
             [
                 *often[:LISTED],
                 "as if something touched the robot again and again: record motion without contact, "

@@ -3,33 +3,48 @@
 
 from dataclasses import replace
 
-from touchline.calibrate.run import Calibration
+from touchline.calibrate.run import Calibration, Thresholds
 from touchline.detector.limits import threshold
 from touchline.detector.residual_noise import residual_noise
 from touchline.detector.thresholds import make_thresholds, row_name
+from touchline.identify.summary import identification_lines
 from touchline.model.robot import Robot
 from touchline.model.values import METHODS
 
+LISTED = 5
 ERRORS = 5.0  # times the noise; residuals above it come from the model, or from contacts
 
 
 def summary_text(result: Calibration) -> str:
     """The figures that were written, and what they did on held-out data."""
-    description = result.description
     head = (
         f"{len(result.logs)} recording{'s' * (len(result.logs) > 1)}, "
-        f"{60 * description.hours:.1f} min at {1 / description.period:.0f} Hz"
+        f"{result.seconds / 60:.1f} min at {1 / result.period:.0f} Hz"
     )
-    lines = [
-        head,
-        "",
-        *_noise_lines(result),
-        "",
-        *_row_lines(result),
-        "",
-        *_threshold_lines(result),
-    ]
-    return "\n".join([*lines, "", *_held_out_lines(result), "", f"written: {result.out}"])
+    parts = [[head], _left_out_lines(result)]
+    if result.identification is not None:
+        parts.append(identification_lines(result.identification))
+    parts.append(_noise_lines(result))
+    if result.thresholds is None:
+        lines = result.lacking.splitlines()
+        parts.append(["thresholds: left as they are", *(f"  {line}" for line in lines)])
+    else:
+        parts += [_row_lines(result), _threshold_lines(result), _held_out_lines(result)]
+    parts.append([f"written: {result.out}"])
+    return "\n\n".join("\n".join(lines) for lines in parts if lines)
+
+
+def _left_out_lines(result: Calibration) -> list[str]:
+    """What seemed to be touched, and was left out."""
+    if not result.left_out:
+        return []
+    total = sum(end - start for _, start, end in result.left_out)
+    lines = [f"left out, because something seems to touch the robot: {total:.1f} s"]
+    for number, start, end in result.left_out[:LISTED]:
+        lines.append(f"  {result.logs[number]}: from {start:.2f} to {end:.2f} s")
+    if len(result.left_out) > LISTED:
+        lines.append(f"  ... and {len(result.left_out) - LISTED} more")
+    return lines
 
 
 def _noise_lines(result: Calibration) -> list[str]:
@@ -51,12 +66,14 @@ def _range(values: tuple[float, ...]) -> str:
 
 def _row_lines(result: Calibration) -> list[str]:
     """What is usual in every row, beside noise, and what `rows` would take for a contact."""
-    robot, rows = result.robot, result.description.rows
+    robot, rows = result.robot, _of(result).description.rows
     used = robot.description.detection.method
     methods = used if "rows" in used else (*used[1:], "rows")  # as many as share the rate
-    detection = replace(robot.description.detection, method=methods, calibration=result.description)
+    detection = replace(
+        robot.description.detection, method=methods, calibration=_of(result).description
+    )
     calibrated = Robot(replace(robot.description, detection=detection), robot.mechanism)
-    period = result.description.period
+    period = _of(result).description.period
     joint_noise, segment_noise = residual_noise(robot, period)
     lines = ["residuals without contact, 1 sigma, and the thresholds of rows for that rate"]
     lines.append(f"  {'row':20} {'noise':>8} {'in all':>8} {'threshold':>10}")
@@ -96,7 +113,7 @@ def _threshold_lines(result: Calibration) -> list[str]:
         f"{'peaks':>5} {'shape':>6}",
     ]
     extrapolated = False
-    for segment, tails in result.tails.items():
+    for segment, tails in _of(result).tails.items():
         for method, tail in tails.items():
             low, high = tail.interval(share)
             beyond = tail.extrapolates(share)
@@ -110,7 +127,7 @@ def _threshold_lines(result: Calibration) -> list[str]:
         needed = 1.0 / share
         lines.append(
             f"  * extrapolated: one alarm in {needed:.3g} h of a segment, from "
-            f"{result.description.hours:.3g} h. Record {needed:.3g} h to see it."
+            f"{_of(result).description.hours:.3g} h. Record {needed:.3g} h to see it."
         )
     chosen = result.robot.description.detection.method
     lines.append(f"  in use: {', '.join(chosen)}; also allowed: {', '.join(METHODS)}")
@@ -118,14 +135,14 @@ def _threshold_lines(result: Calibration) -> list[str]:
 
 
 def _held_out_lines(result: Calibration) -> list[str]:
-    hours = result.test.hours
-    if not result.held_out:
+    hours = _of(result).test.hours
+    if not _of(result).held_out:
         return ["too short for a check on held-out data"]
     lines = [
-        f"on held-out data ({result.parted}, {60 * hours:.1f} min): alarms that came",
+        f"on held-out data ({_of(result).parted}, {60 * hours:.1f} min): alarms that came",
         f"  {'method':8} {'at 1/h':>7}  {'came':>5} {'expected':>9}  {'measured 1/h':>12}  95 %",
     ]
-    for h in result.held_out:
+    for h in _of(result).held_out:
         low, high = h.interval
         lines.append(
             f"  {h.method:8} {h.rate:7g}  {h.count:5d} {h.rate * hours:9.2f}  {h.measured:12.3g}  "
@@ -138,3 +155,9 @@ def _held_out_lines(result: Calibration) -> list[str]:
             f"{1.0 / result.rate:.3g} h of held-out data"
         )
     return lines
+
+
+def _of(result: Calibration) -> Thresholds:
+    """The thresholds of a calibration that has some."""
+    assert result.thresholds is not None
+    return result.thresholds

@@ -17,19 +17,22 @@ def calibrate(
     method: tuple[Method, ...] = (),
     false_alarms: Annotated[float | None, arg(metavar="PER_HOUR")] = None,
     trust: bool = False,
+    identify: bool = True,
     figure: Annotated[Path | None, arg(metavar="FILE")] = None,
 ) -> int:
-    """Finds noise figures and detection thresholds in recordings without contact.
+    """Identifies what a robot's model lacks, its noise figures and its detection thresholds.
 
     Example: touchline calibrate free1.parquet free2.parquet --robot robot.yaml --out robot.yaml
 
-    Move the robot as it will move at work, touch nothing, and record: half an hour is good, several
-    recordings are better than one. Writes ROBOT anew with the keys noise and detection; all other
-    keys and comments stay. The thresholds hold for the sample rate of the recordings. Prints the
-    rate of false alarms that is reached on data held out.
+    Move the robot as it will move at work, touch nothing, and record: a minute tells friction and
+    inertias, half an hour thresholds. Finds offsets of joints and sensors, friction, rotor inertias
+    (torque: motor) and inertias, each as far as the data can tell it, and prints the residuals
+    before and after on data that played no part. What is no better there is not written. Noise and
+    thresholds follow; these hold for the sample rate of the recordings. All other keys and comments
+    stay.
 
-    Recordings in which something seems to touch the robot are refused, with the times, the row that
-    stands out and what its joint did.
+    Stretches in which something seems to touch the robot are left out and listed. Where most of a
+    recording seems touched it is refused, with the row that stands out.
 
     Args:
         logs: Recordings of contact-free motion: tables (.parquet, .csv, .csv.gz) or rosbag2.
@@ -41,6 +44,7 @@ def calibrate(
             begins when one of them fires. Default: as described.
         false_alarms: Per hour of the whole robot. Default: as described, or 1.
         trust: Nothing touched the robot: what stands out is friction or the like, and counts.
+        identify: False takes biases, friction and inertias as they are described.
         figure: Draws how often which statistic was exceeded, with the thresholds (.svg, .png).
     """
     from touchline.calibrate.run import calibrate as run
@@ -50,7 +54,7 @@ def calibrate(
         from touchline.calibrate.figure import check_figure
 
         check_figure(figure)
-    result = run(list(logs), robot, out, method, false_alarms, trust)
+    result = run(list(logs), robot, out, method, false_alarms, trust, identify)
     print(summary_text(result))
     if figure is not None:
         from touchline.calibrate.figure import draw_calibration

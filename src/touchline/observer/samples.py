@@ -32,3 +32,8 @@ class Samples:
 
     def __len__(self) -> int:
         return len(self.time)
+
+    def where(self, keep: np.ndarray) -> "Samples":
+        """Some of the samples; `row` stays that of the first of all."""
+        signals = (self.time, self.q, self.qd, self.tau, self.wrench)
+        return Samples(*(signal[keep] for signal in signals), self.row)

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What was identified, in the words of `robot.yaml`."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.identify.fit import Solution, main_links
+from touchline.identify.identification import Identification
+from touchline.identify.regressor import body_of_vector
+from touchline.model.corrections import corrected_inertia, load_inertia
+from touchline.model.description import JointDescription, LinkCorrection, SensorDescription
+from touchline.model.mechanism import Link
+from touchline.model.robot import Robot
+from touchline.model.transforms import combine_inertias, move_inertia
+from touchline.model.tree import invert
+
+Array = NDArray[np.float64]
+
+DIGITS = 6  # of a written figure
+
+
+def identified_robot(found: Identification) -> Robot:
+    """The robot with all that was identified."""
+    robot, solution = found.evidence.robot, found.solution
+    description = robot.description
+    joints = tuple(_joint(joint, j, solution) for j, joint in enumerate(description.joints))
+    first = len(joints)
+    sensors = tuple(
+        _sensor(sensor, first + 6 * s, solution) for s, sensor in enumerate(description.sensors)
+    )
+    corrections = link_corrections(robot, solution)
+    links = dict(description.links) | corrections
+    changed = replace(description, joints=joints, sensors=sensors, links=links)
+    mechanism = robot.mechanism
+    bodies = {
+        name: _changed(mechanism.links[name], correction, robot)
+        for name, correction in corrections.items()
+    }
+    return Robot(changed, replace(mechanism, links=mechanism.links | bodies))
+
+
+def link_corrections(robot: Robot, solution: Solution) -> dict[str, LinkCorrection]:
+    """Mass, centre and inertia of the links that changed, in link axes."""
+    links = main_links(robot)
+    found = {}
+    for body, change in zip(solution.problem.bodies, solution.changes(), strict=True):
+        name = links[body.node][0]
+        T_link_node = invert(robot.places[name].T_node_link)
+        own = move_inertia(body_of_vector(body.model + change), T_link_node)
+        six = own.inertia[np.triu_indices(3)]
+        found[name] = LinkCorrection(_short(own.mass), _all(own.com), _all(six))
+    return found
+
+
+def description_changes(robot: Robot, new: Robot) -> dict[str, Any]:
+    """Top-level keys of `robot.yaml` whose values changed: joints, sensors and links.
+
+    `joints` and `force_torque_sensors` come as {name: {key: value}} with what is new of each; of
+    the joints all are named, because those that a file does not name are not observed.
+    """
+    changes: dict[str, Any] = {}
+    pairs = zip(robot.description.joints, new.description.joints, strict=True)
+    joints = {a.name: _joint_changes(a, b) for a, b in pairs}
+    if any(joints.values()):
+        changes["joints"] = joints
+    sensors = {
+        b.name: {"bias": [b.bias[i] for i in _axes(b)]}
+        for a, b in zip(robot.description.sensors, new.description.sensors, strict=True)
+        if a.bias != b.bias
+    }
+    if sensors:
+        changes["force_torque_sensors"] = sensors
+    links = {
+        name: {"mass": c.mass, "com": list(c.com or ()), "inertia": list(c.inertia or ())}
+        for name, c in new.description.links.items()
+        if robot.description.links.get(name) != c
+    }
+    if links:
+        changes["links"] = links
+    return changes
+
+
+def _axes(sensor: SensorDescription) -> list[int]:
+    from touchline.model.description import AXES
+
+    return [AXES.index(axis) for axis in sensor.axes]
+
+
+def _joint_changes(old: JointDescription, new: JointDescription) -> dict[str, Any]:
+    changed: dict[str, Any] = {
+        key: getattr(new, key)
+        for key in ("gain", "bias", "delay", "rotor_inertia")
+        if getattr(new, key) != getattr(old, key)
+    }
+    if new.friction != old.friction:
+        law = new.friction
+        changed["friction"] = {"coulomb": law.coulomb, "viscous": law.viscous}
+        changed["friction"]["coulomb_width"] = law.coulomb_width
+    return changed
+
+
+def _joint(joint: JointDescription, row: int, found: Solution) -> JointDescription:
+    law, width = joint.friction, joint.friction.coulomb_width
+    coulomb = law.coulomb
+    for column, value in zip(found.problem.columns, found.values, strict=True):
+        if (column.kind, column.row) == ("coulomb", row):
+            coulomb, width = law.coulomb + value, column.width
+    law = replace(
+        law,
+        coulomb=_short(coulomb),
+        viscous=_short(law.viscous + found.value("viscous", row)),
+        coulomb_width=width,
+    )
+    return replace(
+        joint,
+        friction=law,
+        bias=_short(joint.bias + found.value("bias", row)),
+        rotor_inertia=_short(joint.rotor_inertia + found.value("rotor", row)),
+        gain=_short(joint.gain * (1.0 + found.value("gain", row))),
+    )
+
+
+def _sensor(sensor: SensorDescription, first: int, found: Solution) -> SensorDescription:
+    bias = [b + found.value("bias", first + i) for i, b in enumerate(sensor.bias)]
+    return replace(sensor, bias=_all(np.array(bias)))
+
+
+def _changed(link: Link, correction: LinkCorrection, robot: Robot) -> Link:
+    """The link as corrected, and its loads."""
+    own = corrected_inertia(link.inertia, correction)
+    loads = [load_inertia(load) for load in robot.description.loads if load.link == link.name]
+    return replace(link, inertia=combine_inertias([own, *loads]))
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}")
+
+
+def _all(values: Array) -> tuple[float, ...]:
+    return tuple(_short(float(x)) for x in values)

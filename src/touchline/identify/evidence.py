@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings as filtered equations: the residual of every row, linear in what may be wrong.
+
+    residual = model @ inertias + rotor * I_r + speed * viscous + dry * coulomb + bias - reading
+
+Every column has gone through the observer's own filter, so no acceleration is needed anywhere.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.identify.regressor import Rows, body_vector, momentum_regressors, rows_of
+from touchline.identify.smoothing import Steps, derivative, make_steps, mean, settled, smooth
+from touchline.model.description import Friction
+from touchline.model.robot import Robot
+from touchline.observer.dynamics import posture
+from touchline.observer.readings import read_torque, read_wrench
+from touchline.observer.samples import Samples
+
+Array = NDArray[np.float64]
+
+BANDWIDTH = 20.0  # rad/s; faster says more of noise and delays than of the model
+PER_CONSTANT = 2.5  # equations that are kept in each time constant of the filter
+WIDTHS = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8)  # rad/s, of the Coulomb friction's tanh
+PIECE = 4096  # samples worked on at once
+MOST = 8000  # equations in time that are kept; longer recordings are thinned
+PRESENT = 0.5  # of the samples a row must have, or it counts as not measured
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Filtered equations of N instants, R rows, n joints and B nodes.
+
+    Attributes:
+        robot: whose rows they are.
+        rows: their names and nodes.
+        used: (R,) is there a reading of the row?
+        bandwidth: of the filter [rad/s].
+        time: (N,) [s].
+        recording: (N,) its number.
+        q, qd: (N, n) at these instants.
+        reading: (N, R) with sign, gain and frame applied, without bias or friction; 0 if not used.
+        model: (N, R, B, 10) per unit of the bodies' parameters.
+        rotor: (N, n) acceleration of the joint.
+        speed: (N, n) velocity.
+        dry: (N, n, W) tanh of velocity over each of `WIDTHS`, then over the described width.
+    """
+
+    robot: Robot
+    rows: Rows
+    used: NDArray[np.bool_]
+    bandwidth: float
+    time: Array
+    recording: NDArray[np.int64]
+    q: Array
+    qd: Array
+    reading: Array
+    model: Array
+    rotor: Array
+    speed: Array
+    dry: Array
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def part(self, use: NDArray) -> "Evidence":
+        """Some of the instants."""
+        fields = ("time", "recording", "q", "qd", "reading", "model", "rotor", "speed", "dry")
+        return replace(self, **{name: getattr(self, name)[use] for name in fields})
+
+    def joined(self, other: "Evidence") -> "Evidence":
+        """These instants and those of further recordings."""
+        fields = ("time", "q", "qd", "reading", "model", "rotor", "speed", "dry")
+        both = {n: np.concatenate([getattr(self, n), getattr(other, n)]) for n in fields}
+        number = other.recording + 1 + self.recording.max(initial=-1)
+        both["recording"] = np.concatenate([self.recording, number])
+        return replace(self, **both)
+
+    @property
+    def joints(self) -> int:
+        """How many of the rows are joints; they come first."""
+        return len(self.robot.joint_names)
+
+    def residual(self, robot: Robot | None = None) -> Array:
+        """The residual (N, R) [N or Nm] with the parameters that a robot's description has.
+
+        Args:
+            robot: of the same structure; default: the evidence's own. Its friction must have the
+                same width, or one of `WIDTHS`. Sign, gain, polarity and frames are taken as here.
+        """
+        robot = robot or self.robot
+        bodies = np.array([body_vector(node.inertia) for node in robot.nodes])
+        left = np.einsum("nrbk,bk->nr", self.model, bodies) - self.reading
+        for j, joint in enumerate(robot.description.joints):
+            law = joint.friction
+            left[:, j] += joint.bias + joint.rotor_inertia * self.rotor[:, j]
+            left[:, j] += law.viscous * self.speed[:, j]
+            if law.coulomb:
+                left[:, j] += law.coulomb * self.dry[:, j, self.width_index(j, law.coulomb_width)]
+            own = self.robot.description.joints[j]
+            left[:, j] -= (joint.gain / own.gain - 1.0) * self.reading[:, j]
+        for s, sensor in enumerate(robot.description.sensors):
+            first = self.joints + 6 * s
+            left[:, first : first + 6] += sensor.bias
+        return np.where(self.used, left, 0.0)
+
+    def width_index(self, joint: int, width: float) -> int:
+        """Where the column of a width stands in `dry`."""
+        own = self.robot.description.joints[joint].friction.coulomb_width
+        for i, known in enumerate((*WIDTHS, own)):
+            if abs(width - known) < 1e-9:
+                return i
+        raise ValueError(f"coulomb_width {width} is not among the evidence's")
+
+
+def gather(
+    robot: Robot, recordings: Iterable[Iterable[Samples]], bandwidth: float = BANDWIDTH
+) -> Evidence:
+    """Filters recordings of contact-free motion.
+
+    Raises:
+        ValueError: none of them has samples of which anything could be made.
+    """
+    found: Evidence | None = None
+    for recording in recordings:
+        one = _gather_one(robot, list(recording), bandwidth)
+        if one is not None:
+            found = one if found is None else found.joined(one)
+    if found is None:
+        raise ValueError("no recording is long enough: a second of motion at least")
+    every = -(-len(found) // MOST)
+    return found.part(np.arange(0, len(found), every))
+
+
+def _gather_one(robot: Robot, parts: list[Samples], bandwidth: float) -> Evidence | None:
+    if not parts:
+        return None
+    names = ("time", "q", "qd", "tau", "wrench")
+    time, q, qd, tau, wrench = (np.concatenate([getattr(p, n) for p in parts]) for n in names)
+    forward = _forward(time)
+    time, q, qd, tau, wrench = (x[forward] for x in (time, q, qd, tau, wrench))
+    if len(time) < 10:
+        return None
+    bare = bare_robot(robot)
+    rows = rows_of(bare)
+    usual = np.isfinite(q).all(axis=1) & np.isfinite(qd).all(axis=1)
+    q, qd = (np.where(usual[:, None], x, 0.0) for x in (q, qd))
+    reading = _read(bare, q, qd, tau, wrench)
+    used = np.isfinite(reading).mean(axis=0) > PRESENT
+    present = usual & np.isfinite(reading[:, used]).all(axis=1)
+    steps = make_steps(time, bandwidth, present)
+    ready = settled(steps, bandwidth)
+    period = float(np.median(steps.dt))
+    every = max(1, round(1.0 / (PER_CONSTANT * bandwidth * period)))
+    every = max(every, -(-len(time) // (4 * MOST)))
+    keep = np.arange(len(steps.dt)) % every == 0
+    keep &= ready
+    if not keep.any():
+        return None
+    columns = [p for p in _columns(bare, rows, q, qd, reading, steps, keep)]
+    joined = {name: np.concatenate([c[name] for c in columns]) for name in columns[0]}
+    joined["reading"] = np.where(used, joined["reading"], 0.0)
+    count = int(keep.sum())
+    at = np.flatnonzero(keep) + 1
+    return Evidence(
+        robot, rows, used, bandwidth, time[at], np.zeros(count, np.int64), q[at], qd[at], **joined
+    )
+
+
+def _columns(
+    robot: Robot,
+    rows: Rows,
+    q: Array,
+    qd: Array,
+    reading: Array,
+    steps: Steps,
+    keep: NDArray[np.bool_],
+) -> Iterator[dict[str, Array]]:
+    """The filtered columns, piece by piece of the recording: filters go on across pieces."""
+    own = np.array([joint.friction.coulomb_width for joint in robot.description.joints])
+    count = len(q)
+    filters: dict[str, Smoother] = {}
+    for start in range(0, count - 1, PIECE):
+        stop = min(start + PIECE, count - 1)
+        piece = slice(start, stop + 1)
+        inner = steps.part(start, stop)
+        P, B = momentum_regressors(robot, rows, q[piece], qd[piece])
+        dry = [np.tanh(qd[piece] / width) for width in (*WIDTHS, own)]
+        inputs = {
+            "reading": mean(np.nan_to_num(reading[piece])),
+            "model": derivative(P, inner) + mean(B),
+            "rotor": derivative(qd[piece], inner),
+            "speed": mean(qd[piece]),
+            "dry": mean(np.stack(dry, axis=-1)),
+        }
+        chosen = keep[start:stop]
+        out = {}
+        for name, values in inputs.items():
+            smoother = filters.setdefault(name, Smoother())
+            out[name] = smoother.run(values, inner)[chosen]
+        yield out
+
+
+class Smoother:
+    """`smooth`, going on from piece to piece."""
+
+    def __init__(self) -> None:
+        self._last: Array | None = None
+
+    def run(self, inputs: Array, steps: Steps) -> Array:
+        """The next inputs (M, ...)."""
+        out = smooth(inputs, steps, self._last)
+        self._last = out[-1].ravel()
+        return out
+
+
+def bare_robot(robot: Robot) -> Robot:
+    """The robot without biases and friction: what its log reads as."""
+    joints = tuple(
+        replace(j, bias=0.0, friction=replace(Friction(), coulomb_width=j.friction.coulomb_width))
+        for j in robot.description.joints
+    )
+    sensors = tuple(replace(s, bias=(0.0,) * 6) for s in robot.description.sensors)
+    description = replace(robot.description, joints=joints, sensors=sensors)
+    return Robot(description, robot.mechanism)
+
+
+def _read(robot: Robot, q: Array, qd: Array, tau: Array, wrench: Array) -> Array:
+    """Readings (N, R), NaN where there is none; a weight that was taken out stays out."""
+    sensors = tuple(replace(s, compensated="none") for s in robot.description.sensors)
+    plain = Robot(replace(robot.description, sensors=sensors), robot.mechanism)
+    torques = read_torque(plain, qd, tau)
+    if not sensors:
+        return torques
+    turned = any(s.frame != "sensor" for s in sensors)
+    wrenches = (
+        read_wrench(plain, posture(plain, q), q, wrench) if turned else _straight(plain, wrench)
+    )
+    return np.concatenate([torques, wrenches.reshape(len(q), -1)], axis=1)
+
+
+def _straight(robot: Robot, wrench: Array) -> Array:
+    read = wrench.copy()
+    for s, sensor in enumerate(robot.description.sensors):
+        if sensor.polarity == "inboard":
+            read[:, s] *= -1.0
+    return read
+
+
+def _forward(time: Array) -> NDArray[np.bool_]:
+    """Stamps that are later than all before."""
+    clean = np.where(np.isfinite(time), time, -np.inf)
+    before = np.maximum.accumulate(np.concatenate([[-np.inf], clean[:-1]]))
+    return clean > before

@@ -1,0 +1,294 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Least squares on the filtered equations: some parameters free, the rest as described."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.identify.evidence import Evidence
+from touchline.identify.physical import PhysicalBody
+from touchline.identify.regressor import PARAMETERS, body_vector
+from touchline.model.corrections import load_inertia
+from touchline.model.robot import Robot
+from touchline.model.transforms import move_inertia
+
+Array = NDArray[np.float64]
+
+BIAS, BIAS_SHARE = 1.0, 0.1  # 1 sigma of a bias: N or Nm, or this part of the largest reading
+STEPS = 30  # of Gauss and Newton at most
+ENOUGH = 1e-6  # a step this small changes nothing that can be measured
+
+
+@dataclass(frozen=True)
+class Column:
+    """One free number that enters the equations linearly.
+
+    Attributes:
+        kind: "bias", "viscous", "coulomb", "rotor" or "gain".
+        row: of the joint or of the sensor's axis.
+        width: of the Coulomb friction [rad/s].
+        positive: may the value not be below zero?
+    """
+
+    kind: str
+    row: int
+    width: float = 0.0
+
+    @property
+    def positive(self) -> bool:
+        """May the value not be below zero?"""
+        return self.kind in ("viscous", "coulomb", "rotor")
+
+
+@dataclass(frozen=True)
+class BodyChange:
+    """A node whose inertial parameters are free.
+
+    Attributes:
+        node: its number.
+        model: (10,) those of the link that is corrected, in the node's frame.
+        sigma: prior, 1 sigma of each of the ten numbers of `PhysicalBody`.
+    """
+
+    node: int
+    model: Array
+    sigma: float
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is free.
+
+    Attributes:
+        columns: linear ones.
+        bodies: with physical inertias.
+    """
+
+    columns: tuple[Column, ...] = ()
+    bodies: tuple[BodyChange, ...] = ()
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What was found.
+
+    Attributes:
+        problem: what was free.
+        values: of the columns, to be added to the described ones (of `coulomb`: the whole value).
+        steps: (bodies, 10) of `PhysicalBody`.
+        errors: 1 sigma of the columns.
+        body_errors: (bodies, 10) 1 sigma of the ten parameters.
+    """
+
+    problem: Problem
+    values: Array
+    steps: Array
+    errors: Array = field(default_factory=lambda: np.empty(0))
+    body_errors: Array = field(default_factory=lambda: np.empty((0, PARAMETERS)))
+
+    def changes(self) -> Array:
+        """(bodies, 10) what is added to the ten parameters."""
+        found = [
+            PhysicalBody(b.model).change(step)
+            for b, step in zip(self.problem.bodies, self.steps, strict=True)
+        ]
+        return np.array(found).reshape(-1, PARAMETERS)
+
+    def value(self, kind: str, row: int) -> float:
+        """What was found of a kind in a row; 0 if it was not free."""
+        for column, value in zip(self.problem.columns, self.values, strict=True):
+            if (column.kind, column.row) == (kind, row):
+                return float(value)
+        return 0.0
+
+
+class Equations:
+    """The equations of some instants for one problem, weighed.
+
+    Args:
+        evidence: the instants.
+        problem: what is free.
+        start: (N, R) the residual that the columns and bodies are added to.
+        weight: (N, R) one over variance; 0 leaves out.
+    """
+
+    def __init__(self, evidence: Evidence, problem: Problem, start: Array, weight: Array) -> None:
+        self.evidence, self.problem = evidence, problem
+        self.start, self.weight = start, weight
+        linear = len(problem.columns)
+        size = linear + PARAMETERS * len(problem.bodies)
+        self.normal, self.gradient = np.zeros((size, size)), np.zeros(size)
+        bodies = [b.node for b in problem.bodies]
+        for r in np.flatnonzero(evidence.used):
+            own = [i for i, c in enumerate(problem.columns) if c.row == r]
+            index = np.array(own + list(range(linear, size)), dtype=int)
+            if not len(index):
+                continue
+            A = self._row(r, own, bodies)
+            w = weight[:, r, None]
+            self.normal[np.ix_(index, index)] += A.T @ (w * A)
+            self.gradient[index] += A.T @ (w[:, 0] * start[:, r])
+
+    def _row(self, r: int, own: list[int], bodies: list[int]) -> Array:
+        e = self.evidence
+        columns = [column_of(e, self.problem.columns[i]) for i in own]
+        parts = [np.column_stack(columns)] if columns else []
+        if bodies:
+            parts.append(e.model[:, r, bodies].reshape(len(e), -1))
+        return np.concatenate(parts, axis=1)
+
+    def solve(self) -> Solution:
+        """The most likely parameters."""
+        physical = [PhysicalBody(b.model) for b in self.problem.bodies]
+        linear = len(self.problem.columns)
+        prior = np.concatenate(
+            [np.zeros(linear), *(np.full(PARAMETERS, b.sigma**-2.0) for b in self.problem.bodies)]
+        )
+        prior[:linear] = self._prior()
+        least = np.array([_least(self.evidence, c) for c in self.problem.columns])
+        held = np.zeros(linear, dtype=bool)
+        values, steps = np.zeros(linear), np.zeros((len(physical), PARAMETERS))
+        for _ in range(STEPS):
+            J = self._jacobian(physical, steps)
+            x = np.concatenate(
+                [values, *(b.change(s) for b, s in zip(physical, steps, strict=True))]
+            )
+            now = np.concatenate([values, steps.ravel()])
+            H = J.T @ self.normal @ J + np.diag(prior)
+            g = J.T @ (self.gradient + self.normal @ x) + prior * now
+            free = ~np.concatenate([held, np.zeros(steps.size, dtype=bool)])
+            change = np.zeros(len(now))
+            change[free] = -np.linalg.lstsq(H[np.ix_(free, free)], g[free], rcond=None)[0]
+            size = np.abs(change[linear:]).max(initial=0.0)
+            change *= min(1.0, 0.5 / max(size, 1e-12))
+            now = now + change
+            beyond = now[:linear] < least
+            now[:linear] = np.where(beyond, least, now[:linear])
+            newly = beyond & ~held
+            held |= beyond
+            values, steps = now[:linear], now[linear:].reshape(steps.shape)
+            if size < ENOUGH and not newly.any():
+                break
+        return Solution(self.problem, values, steps)
+
+    def _prior(self) -> Array:
+        """One over variance of the columns before any data: biases are small, the rest is free."""
+        prior = 1e-9 * np.maximum(np.diag(self.normal)[: len(self.problem.columns)], 1e-12)
+        for i, column in enumerate(self.problem.columns):
+            if column.kind == "bias":
+                largest = float(np.abs(self.evidence.reading[:, column.row]).max(initial=0.0))
+                prior[i] += max(BIAS, BIAS_SHARE * largest) ** -2.0
+        return prior
+
+    def _jacobian(self, physical: list[PhysicalBody], steps: Array) -> Array:
+        linear = len(self.problem.columns)
+        J = np.eye(linear + steps.size)
+        for i, (body, step) in enumerate(zip(physical, steps, strict=True)):
+            at = linear + PARAMETERS * i
+            J[at : at + PARAMETERS, at : at + PARAMETERS] = body.jacobian(step)
+        return J
+
+    def with_errors(self, found: Solution, blocks: Array) -> Solution:
+        """The solution with standard errors.
+
+        The residuals of one block of time may be correlated as they like; those of two are not
+        (a sandwich of the normal matrix and the blocks' gradients).
+        """
+        physical = [PhysicalBody(b.model) for b in self.problem.bodies]
+        linear = len(self.problem.columns)
+        J = self._jacobian(physical, found.steps)
+        prior = np.concatenate(
+            [
+                self._prior(),
+                *(np.full(PARAMETERS, b.sigma**-2.0) for b in self.problem.bodies),
+            ]
+        )
+        bread = np.linalg.pinv(J.T @ self.normal @ J + np.diag(prior))
+        rest = self.start + applied(self.evidence, found)
+        meat = np.zeros_like(bread)
+        bodies = [b.node for b in self.problem.bodies]
+        size = linear + PARAMETERS * len(bodies)
+        scores = {b: np.zeros(size) for b in np.unique(blocks)}
+        for r in np.flatnonzero(self.evidence.used):
+            own = [i for i, c in enumerate(self.problem.columns) if c.row == r]
+            index = np.array(own + list(range(linear, size)), dtype=int)
+            if not len(index):
+                continue
+            scored = self._row(r, own, bodies) * (self.weight[:, r] * rest[:, r])[:, None]
+            for b in scores:
+                scores[b][index] += scored[blocks == b].sum(axis=0)
+        for score in scores.values():
+            s = J.T @ score
+            meat += np.outer(s, s)
+        count = len(scores)
+        meat *= count / max(count - 1, 1)
+        C = bread @ (meat + np.diag(prior)) @ bread
+        full = J @ C @ J.T
+        sigma = np.sqrt(np.maximum(np.diag(full), 0.0))
+        return Solution(
+            self.problem,
+            found.values,
+            found.steps,
+            sigma[:linear],
+            sigma[linear:].reshape(-1, PARAMETERS),
+        )
+
+
+def column_of(e: Evidence, column: Column) -> Array:
+    """A column's filtered signal (N,)."""
+    r = column.row
+    if column.kind == "bias":
+        return np.ones(len(e))
+    if column.kind == "gain":
+        return -e.reading[:, r]
+    if column.kind == "viscous":
+        return e.speed[:, r]
+    if column.kind == "rotor":
+        return e.rotor[:, r]
+    return e.dry[:, r, e.width_index(r, column.width)]
+
+
+def applied(e: Evidence, found: Solution) -> Array:
+    """What a solution adds to the residual (N, R)."""
+    added = np.zeros(e.reading.shape)
+    for column, value in zip(found.problem.columns, found.values, strict=True):
+        added[:, column.row] += value * column_of(e, column)
+    changes = found.changes()
+    for body, change in zip(found.problem.bodies, changes, strict=True):
+        added += e.model[:, :, body.node] @ change
+    return np.where(e.used, added, 0.0)
+
+
+def _least(e: Evidence, column: Column) -> float:
+    """The least change of a column's value: the described value must not fall below zero."""
+    if not column.positive:
+        return -np.inf
+    if column.kind == "coulomb":
+        return 0.0
+    joint = e.robot.description.joints[column.row]
+    return -(joint.rotor_inertia if column.kind == "rotor" else joint.friction.viscous)
+
+
+def main_links(robot: Robot) -> dict[int, tuple[str, Array]]:
+    """Per node with mass, its heaviest link and that link's ten parameters in the node's frame.
+
+    Loads that the description adds to the link are not part of them.
+    """
+    found: dict[int, tuple[str, Array]] = {}
+    for i, node in enumerate(robot.nodes):
+        links = [link_vector(robot, name) for name in node.links]
+        if links and max(x[0] for x in links) > 0:
+            best = int(np.argmax([x[0] for x in links]))
+            found[i] = node.links[best], links[best]
+    return found
+
+
+def link_vector(robot: Robot, name: str) -> Array:
+    """Ten parameters of a link without its loads, in the frame of its node."""
+    T = robot.places[name].T_node_link
+    own = body_vector(move_inertia(robot.mechanism.links[name].inertia, T))
+    for load in robot.description.loads:
+        if load.link == name:
+            own = own - body_vector(move_inertia(load_inertia(load), T))
+    return own if own[0] > 1e-6 else np.zeros(PARAMETERS)

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From filtered equations to parameters that foretell data which played no part."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.errors import InputError
+from touchline.identify.choice import Chooser
+from touchline.identify.evidence import Evidence
+from touchline.identify.fit import Problem, Solution, applied
+from touchline.identify.touches import find_touches, stretches
+
+Array = NDArray[np.float64]
+
+LEAST_SECONDS = 4.0  # of settled, untouched data; less tells an offset at best
+HELD_OUT = 3  # every third recording, or the last third of each
+WORSE = 1.01  # a row that is left larger than this on data held out keeps what is described
+MOST_TOUCHED = 0.6  # of the time; beyond it nobody can say which state is the usual one
+ROUNDS = 3  # of fitting and finding touches
+
+
+@dataclass(frozen=True)
+class Identification:
+    """What was identified, and what it is worth on data that played no part.
+
+    Attributes:
+        evidence: all instants.
+        solution: from all untouched instants, with standard errors.
+        touched: (N,) instants that were left out.
+        before, after: (R,) RMS of the residuals on data held out, of the described model and of
+            one that was fitted to the other data alone.
+        parted: how the data were parted.
+    """
+
+    evidence: Evidence
+    solution: Solution
+    touched: NDArray[np.bool_]
+    before: Array
+    after: Array
+    parted: str
+
+    @property
+    def problem(self) -> Problem:
+        """What was free."""
+        return self.solution.problem
+
+    @property
+    def seconds(self) -> float:
+        """Of untouched, settled data."""
+        return duration(self.evidence, ~self.touched)
+
+    def touches(self) -> list[tuple[int, float, float]]:
+        """Recording, begin and end [s] of what was left out."""
+        return stretches(self.evidence, self.touched)
+
+    def left(self) -> Array:
+        """Residuals (N, R) of all instants after the fit to all of them."""
+        return self.evidence.residual() + applied(self.evidence, self.solution)
+
+
+def identify(evidence: Evidence, trust: bool = False) -> Identification:
+    """Identifies as much of a robot as the data support.
+
+    Args:
+        evidence: of contact-free motion, or with touches that stand out.
+        trust: nothing touched the robot: whatever stands out is its own doing.
+
+    Raises:
+        InputError: too short, or touched throughout.
+    """
+    if duration(evidence, np.ones(len(evidence), dtype=bool)) < LEAST_SECONDS:
+        raise InputError(
+            f"{LEAST_SECONDS:g} s of contact-free data are needed to identify anything, "
+            "a minute of motion of all joints is better"
+        )
+    touched = np.zeros(len(evidence), dtype=bool) if trust else touched_instants(evidence)
+    if touched.mean() > MOST_TOUCHED:
+        raise InputError(
+            f"something seems to touch the robot for {100 * touched.mean():.0f} % of the time: "
+            "record a minute in which nothing touches it"
+        )
+    train, test, parted = _part(evidence, ~touched)
+    chooser = Chooser(evidence, train)
+    problem = chooser.choose()
+    held = evidence.part(test)
+    start = held.residual()
+    before = rms(start)
+    after = rms(start + applied(held, chooser.fit(problem)))
+    while problem.columns or problem.bodies:
+        worse = (after > WORSE * before) & evidence.used
+        if not worse.any():
+            break
+        smaller = replace(problem, columns=tuple(c for c in problem.columns if not worse[c.row]))
+        if smaller == problem:
+            smaller = replace(problem, bodies=())
+        problem = smaller
+        after = rms(start + applied(held, chooser.fit(problem)))
+    if float(after.sum()) >= float(before.sum()):
+        problem, after = Problem(), before
+    whole = Chooser(evidence, ~touched)
+    whole.scale = chooser.scale
+    solution = whole.with_errors(whole.fit(problem))
+    return Identification(evidence, solution, touched, before, after, parted)
+
+
+def touched_instants(evidence: Evidence) -> NDArray[np.bool_]:
+    """Which instants (N,) a rich model cannot explain beside the others."""
+    touched = np.zeros(len(evidence), dtype=bool)
+    for _ in range(ROUNDS):
+        chooser = Chooser(evidence, ~touched)
+        found = chooser.fit(chooser.richest())
+        described = [joint.friction.coulomb for joint in evidence.robot.description.joints]
+        coulomb = np.array([c + found.value("coulomb", j) for j, c in enumerate(described)])
+        now = find_touches(evidence, evidence.residual() + applied(evidence, found), coulomb)
+        if (now == touched).all() or now.mean() > MOST_TOUCHED:
+            return now
+        touched = now
+    return touched
+
+
+def rms(left: Array) -> Array:
+    """Root mean square of each row."""
+    return np.sqrt(np.mean(left**2, axis=0)) if len(left) else np.zeros(left.shape[1])
+
+
+def duration(evidence: Evidence, use: NDArray[np.bool_]) -> float:
+    """Seconds that some of the instants stand for."""
+    steps = np.diff(evidence.time)
+    same = np.diff(evidence.recording) == 0
+    typical = float(np.median(steps[same])) if same.any() else 0.0
+    return typical * float(use.sum())
+
+
+def _part(evidence: Evidence, use: NDArray[np.bool_]) -> tuple[NDArray, NDArray, str]:
+    numbers = np.unique(evidence.recording)
+    if len(numbers) >= HELD_OUT:
+        out = evidence.recording % HELD_OUT == HELD_OUT - 1
+        return use & ~out, use & out, f"every {HELD_OUT}rd recording held out"
+    out = np.zeros(len(evidence), dtype=bool)
+    for number in numbers:
+        own = np.flatnonzero((evidence.recording == number) & use)
+        out[own[len(own) - len(own) // HELD_OUT :]] = True
+    how = "the last third held out" if len(numbers) == 1 else "the last third of each held out"
+    return use & ~out, use & out, how

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The observer's filter on any signals of a recording: first order, over intervals that vary.
+
+    r+ = a r + (1 - a) e,   e = (p_k+1 - p_k) / dt - (u_k + u_k+1) / 2
+
+The poles are those of the native core with `automatic`: Tustin's up to K dt = 0.5. Gaps of up to
+two lost samples are bridged, longer ones begin anew at zero.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+LONGEST = 3.5  # periods; an interval longer than this is not integrated over, as in the core
+SETTLING = 5.0  # time constants after a start
+
+
+@dataclass(frozen=True)
+class Steps:
+    """The intervals of a recording.
+
+    Attributes:
+        dt: (N - 1,) [s].
+        usable: (N - 1,) is the interval one to integrate over?
+        keep: (N - 1,) the filter's pole over it.
+    """
+
+    dt: Array
+    usable: NDArray[np.bool_]
+    keep: Array
+
+    def part(self, start: int, stop: int) -> "Steps":
+        """Some of the intervals."""
+        return Steps(self.dt[start:stop], self.usable[start:stop], self.keep[start:stop])
+
+
+def make_steps(time: Array, bandwidth: float, present: NDArray[np.bool_]) -> Steps:
+    """Intervals between samples that go forward in time.
+
+    Args:
+        time: (N,) stamps [s] in rising order.
+        bandwidth: K [rad/s].
+        present: (N,) are all signals there?
+    """
+    dt = np.diff(time)
+    period = float(np.median(dt)) if len(dt) else 1.0
+    usable = (dt > 0) & (dt <= LONGEST * period) & present[1:] & present[:-1]
+    x = bandwidth * np.maximum(dt, 1e-9)
+    keep = np.where(x <= 0.5, (1.0 - 0.5 * x) / (1.0 + 0.5 * x), np.exp(-x))
+    return Steps(dt, usable, keep)
+
+
+def derivative(values: Array, steps: Steps) -> Array:
+    """Mean rates (N - 1, ...) over the intervals."""
+    return np.diff(values, axis=0) / _beside(steps.dt, values)
+
+
+def mean(values: Array) -> Array:
+    """Means (N - 1, ...) over the intervals, by the trapezoid."""
+    return 0.5 * (values[1:] + values[:-1])
+
+
+def smooth(inputs: Array, steps: Steps, start: Array | None = None) -> Array:
+    """Filters inputs (N - 1, ...) from `start`; where an interval is not usable, anew from zero."""
+    flat = inputs.reshape(len(inputs), -1)
+    out = np.empty_like(flat)
+    value = np.zeros(flat.shape[1]) if start is None else start
+    for i in range(len(flat)):
+        if steps.usable[i]:
+            a = steps.keep[i]
+            value = a * value + (1.0 - a) * flat[i]
+        else:
+            value = np.zeros_like(value)
+        out[i] = value
+    return out.reshape(inputs.shape)
+
+
+def settled(steps: Steps, bandwidth: float) -> NDArray[np.bool_]:
+    """Per interval, has the filter run for long enough since its last start?"""
+    since, told = 0.0, np.zeros(len(steps.dt), dtype=bool)
+    for i, dt in enumerate(steps.dt):
+        since = since + dt if steps.usable[i] else 0.0
+        told[i] = since >= SETTLING / bandwidth
+    return told
+
+
+def _beside(dt: Array, values: Array) -> Array:
+    return np.maximum(dt, 1e-9).reshape(-1, *(1 for _ in values.shape[1:]))

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What was identified, as text."""
+
+import numpy as np
+
+from touchline.identify.fit import main_links
+from touchline.identify.identification import Identification
+
+UNITS = {"bias": "Nm", "viscous": "Nm s/rad", "coulomb": "Nm", "rotor": "kg m2", "gain": ""}
+WORDS = {
+    "bias": "offset",
+    "viscous": "viscous friction",
+    "coulomb": "Coulomb friction",
+    "rotor": "rotor inertia",
+    "gain": "gain, relative",
+}
+SHORT = 20.0  # s; less is told to be little
+
+
+def identification_lines(found: Identification) -> list[str]:
+    """What was found and what it is worth."""
+    lines = ["identified, with 1 sigma"]
+    lines += _column_lines(found) + _body_lines(found)
+    if len(lines) == 1:
+        lines.append("  nothing that foretells data held out better than the description does")
+    if found.seconds < SHORT:
+        lines.append(
+            f"  from {found.seconds:.1f} s: offsets may be worth it, inertias and friction of "
+            "joints that hardly moved are not; a minute of motion of all joints tells them"
+        )
+    return [*lines, "", *_residual_lines(found)]
+
+
+def _column_lines(found: Identification) -> list[str]:
+    names, solution = found.evidence.rows.names, found.solution
+    lines = []
+    rows = sorted({column.row for column in found.problem.columns})
+    for row in rows:
+        told = []
+        for column, value, error in zip(
+            found.problem.columns, solution.values, solution.errors, strict=True
+        ):
+            if column.row != row:
+                continue
+            unit = UNITS[column.kind]
+            if column.kind == "bias" and row >= found.evidence.joints:
+                unit = "N" if names[row].endswith(("fx", "fy", "fz")) else "Nm"
+            what = f"{WORDS[column.kind]} {value:+.3g} +- {error:.2g} {unit}".rstrip()
+            if column.kind == "coulomb":
+                what += f" (within {column.width:g} rad/s)"
+            told.append(what)
+        lines.append(f"  {names[row]}: {', '.join(told)}")
+    return lines
+
+
+def _body_lines(found: Identification) -> list[str]:
+    problem = found.problem
+    if not problem.bodies:
+        return []
+    links = main_links(found.evidence.robot)
+    sigma = problem.bodies[0].sigma
+    lines = [
+        f"  inertias drawn to the model's (1 sigma {100 * sigma:g} % of their square root): mass"
+    ]
+    for body, change, error in zip(
+        problem.bodies, found.solution.changes(), found.solution.body_errors, strict=True
+    ):
+        mass = body.model[0]
+        lines.append(
+            f"    {links[body.node][0]}: {mass:.3f} kg {change[0]:+.3f} +- {error[0]:.2g} kg"
+        )
+    lines.append("    single masses are worth little: only sums that a joint or sensor feels are")
+    return lines
+
+
+def _residual_lines(found: Identification) -> list[str]:
+    """RMS of the residuals before and after, on data that played no part."""
+    used = np.flatnonzero(found.evidence.used)
+    lines = [
+        f"residuals at K = {found.evidence.bandwidth:g} rad/s on data that played no part "
+        f"({found.parted}), RMS",
+        f"  {'row':20} {'before':>8} {'after':>8}",
+    ]
+    for row in used:
+        name, is_joint = found.evidence.rows.names[row], row < found.evidence.joints
+        unit = "N" if not is_joint and name.endswith(("fx", "fy", "fz")) else "Nm"
+        lines.append(f"  {name:20} {found.before[row]:8.3g} {found.after[row]:8.3g} {unit}")
+    joints = used[used < found.evidence.joints]
+    if len(joints):
+        before, after = float(found.before[joints].sum()), float(found.after[joints].sum())
+        share = f" ({100 * after / before:.0f} %)" if before > 0 else ""
+        lines.append(f"  {'sum over joints':20} {before:8.3g} {after:8.3g} Nm{share}")
+    return lines

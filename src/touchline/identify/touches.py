@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which instants of a recording are left out because something seems to touch the robot."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.identify.evidence import Evidence
+
+Array = NDArray[np.float64]
+
+QUIET = 0.4  # of the instants at least are untouched, and tell the usual scatter
+FAR = 8.0  # usual sigmas; what a good fit leaves seldom lies so far out
+SHORTEST = 0.1  # s; shorter excursions are reversals, not touches
+STICTION = 2.5  # times Coulomb friction, that a slow joint may hold without anybody's help
+SLOW = 0.2  # rad/s; up to here, less and less of it
+BESIDE = 2.0  # time constants of the filter on either side belong to a touch
+_QUANTILE = 0.524  # 40 % of normal values lie within so many sigmas of the middle
+
+
+def usual_scatter(left: Array, used: NDArray[np.bool_]) -> Array:
+    """1 sigma (R,) of most of the residuals (N, R), whatever the others do."""
+    return np.where(used, np.maximum(_shortest(left)[1], 1e-9), 1.0)
+
+
+def usual_middle(left: Array) -> Array:
+    """Where most of the residuals (N, R) lie, whatever the others do."""
+    return _shortest(left)[0]
+
+
+def _shortest(left: Array) -> tuple[Array, Array]:
+    """Middle and scatter (R,) by the shortest interval that holds `QUIET` of the values."""
+    ordered = np.sort(left, axis=0)
+    inside = max(1, int(np.ceil(QUIET * len(ordered))))
+    widths = ordered[inside - 1 :] - ordered[: len(ordered) - inside + 1]
+    at = np.argmin(widths, axis=0)
+    columns = np.arange(left.shape[1])
+    low, high = ordered[at, columns], ordered[at + inside - 1, columns]
+    return 0.5 * (low + high), 0.5 * (high - low) / _QUANTILE
+
+
+def find_touches(evidence: Evidence, left: Array, coulomb: Array) -> NDArray[np.bool_]:
+    """Which instants (N,) are touched.
+
+    Args:
+        evidence: the instants.
+        left: (N, R) residuals after a fit.
+        coulomb: (n,) Coulomb friction of the joints by that fit [Nm]. A joint that hardly moves
+            holds up to more than that, of either sign.
+    """
+    scatter = usual_scatter(left, evidence.used)
+    centred = left - usual_middle(left)
+    slow = np.maximum(0.0, 1.0 - np.abs(evidence.qd) / SLOW)
+    excess = np.abs(centred)
+    excess[:, : evidence.joints] -= STICTION * coulomb * slow
+    out = (excess / scatter > FAR)[:, evidence.used].any(axis=1)
+    touched = np.zeros(len(evidence), dtype=bool)
+    beside = BESIDE / evidence.bandwidth
+    for start, stop in _runs(out, evidence):
+        begin, end = evidence.time[start], evidence.time[stop]
+        if end - begin < SHORTEST:
+            continue
+        own = evidence.recording == evidence.recording[start]
+        near = (evidence.time >= begin - beside) & (evidence.time <= end + beside)
+        touched |= own & near
+    return touched
+
+
+def stretches(evidence: Evidence, touched: NDArray[np.bool_]) -> list[tuple[int, float, float]]:
+    """Recording, begin and end [s] of the touched stretches."""
+    return [
+        (int(evidence.recording[a]), float(evidence.time[a]), float(evidence.time[b]))
+        for a, b in _runs(touched, evidence)
+    ]
+
+
+def _runs(flags: NDArray[np.bool_], evidence: Evidence) -> list[tuple[int, int]]:
+    """First and last index of each run; a recording's end ends a run."""
+    runs: list[tuple[int, int]] = []
+    for i in np.flatnonzero(flags).tolist():
+        same = runs and runs[-1][1] == i - 1 and evidence.recording[i] == evidence.recording[i - 1]
+        if same:
+            runs[-1] = runs[-1][0], i
+        else:
+            runs.append((i, i))
+    return runs
