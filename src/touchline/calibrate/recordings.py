@@ -73,7 +73,9 @@ class Recordings:
             stretches: number of the recording, begin and end [s].
         """
         self._left_out += stretches
-        self.seconds -= sum(end - start + 2.0 * BESIDE for _, start, end in stretches)
+        self.seconds = sum(
+            len(part) * self.period for i in range(len(self._logs)) for part in self._parts(i)
+        )
 
     def _parts(self, number: int) -> Iterator[Samples]:
         stretches = [(a - BESIDE, b + BESIDE) for i, a, b in self._left_out if i == number]

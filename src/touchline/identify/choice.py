@@ -73,180 +73,173 @@ class Chooser:
         self.evidence, self.use = evidence, use
         self.start = evidence.residual()
         self.floor = LEAST_SCATTER * np.abs(evidence.reading).max(axis=0, initial=0.0)
-        self.scale = self._scatter(self.start)
-        joints = evidence.robot.description.joints
-        self.moved = [
-            bool(np.sqrt(np.mean(evidence.qd[use, j] ** 2)) > MOVED) for j in range(len(joints))
-        ]
+        self.folds = list(folds_of(evidence, use))
+        self.blocks = blocks_of(evidence)
+        self.moved = np.sqrt(np.mean(evidence.qd[use] ** 2, axis=0)) > MOVED
+        self.links = main_links(evidence.robot)
+        self.nodes = self._seen()
+        self.weight = self._weight(self.start)
+        self.rich = self._richest(self.start)
+        for _ in range(2):
+            found = self.fit(self.richest())
+            left = self.start + applied(evidence, found)
+            self.weight = self._weight(left)
+        self.scale = self._scatter(left)
+        bodies = Solution(replace(found.problem, columns=()), np.empty(0), found.steps)
+        if found.problem.bodies:
+            self.rich = self._richest(self.start + applied(evidence, bodies))
+
+    def richest(self, sigma: float = 0.1) -> Problem:
+        """Every column that any row may have, and inertias that may leave the model's somewhat."""
+        return Problem(self.rich, self._bodies(sigma))
 
     def choose(self) -> Problem:
         """Columns of every row, then bodies, then the columns once more beside these."""
-        columns = self._columns_of_rows(Problem())
-        self._rescale(Problem(columns))
-        bodies = self._bodies(columns)
+        parts = [self._equations(self.richest(), fold.test) for fold in self.folds]
+        columns = self._columns_of_rows(self.start)
+        bodies = self._choose_bodies(parts, columns)
         if bodies:
-            columns = self._columns_of_rows(Problem((), bodies))
+            found = self.fit(Problem(self.rich, bodies))
+            only = Solution(Problem((), bodies), np.empty(0), found.steps)
+            columns = self._columns_of_rows(self.start + applied(self.evidence, only))
         return Problem(columns, bodies)
 
-    def richest(self) -> Problem:
-        """Every column that any row may have, and inertias that may leave the model's somewhat."""
-        columns = tuple(c for r in self._rows() for c in self._richest(r, self.start))
-        links = main_links(self.evidence.robot)
-        return Problem(columns, tuple(BodyChange(i, links[i][1], 0.1) for i in self._seen(links)))
-
     def fit(self, problem: Problem, use: NDArray[np.bool_] | None = None) -> Solution:
-        """Fits a problem, equations that are far off with less weight."""
-        use = self.use if use is None else use
-        part, start = self.evidence.part(use), self.start[use]
-        weight = np.broadcast_to(CORRELATED / self.scale**2, start.shape)
-        found = Equations(part, problem, start, weight).solve()
-        for _ in range(2):
-            left = np.abs(start + applied(part, found)) / self.scale
-            robust = weight * np.minimum(1.0, HUBER / np.maximum(left, 1e-12))
-            found = Equations(part, problem, start, robust).solve()
-        return found
+        """Fits a problem; equations that are far off count less."""
+        return self._equations(problem, self.use if use is None else use).solve()
 
     def with_errors(self, found: Solution) -> Solution:
         """The solution with standard errors."""
-        part, start = self.evidence.part(self.use), self.start[self.use]
-        weight = np.broadcast_to(CORRELATED / self.scale**2, start.shape)
-        equations = Equations(part, found.problem, start, weight)
-        return equations.with_errors(found, blocks_of(part))
-
-    def _rescale(self, problem: Problem) -> None:
-        found = self.fit(problem)
         left = self.start + applied(self.evidence, found)
-        self.scale = self._scatter(left)
+        equations = self._equations(found.problem, self.use)
+        return equations.with_errors(found, left, self.weight, self.use, self.blocks)
+
+    def _equations(self, problem: Problem, use: NDArray[np.bool_]) -> Equations:
+        return Equations.of(self.evidence, problem, self.start, self.weight, use)
 
     def _scatter(self, left: Array) -> Array:
         return np.maximum(usual_scatter(left[self.use], self.evidence.used), self.floor)
 
-    def _held_out(self, problem: Problem) -> Array:
-        """Residuals (N, R) of each instant by fits that have not seen it; NaN outside of `use`."""
-        left = np.full(self.start.shape, np.nan)
-        for fold in folds_of(self.evidence, self.use):
-            found = self.fit(problem, fold.train)
-            test = self.evidence.part(fold.test)
-            left[fold.test] = self.start[fold.test] + applied(test, found)
-        return left
+    def _weight(self, left: Array) -> Array:
+        """One over variance (N, R), less for what is far off (Huber)."""
+        scale = self._scatter(left)
+        far = np.abs(left) / scale
+        return CORRELATED / scale**2 * np.minimum(1.0, HUBER / np.maximum(far, 1e-12))
 
-    def _cost(self, left: Array) -> Array:
-        """(blocks, R) mean of squares in units of the usual scatter, far ones tamed."""
-        blocks = blocks_of(self.evidence)
-        size = np.minimum(np.abs(left) / self.scale, 10.0 * HUBER) ** 2
-        numbers = np.unique(blocks[self.use])
-        return np.array([size[self.use & (blocks == b)].mean(axis=0) for b in numbers])
+    def _seen(self) -> list[int]:
+        """Nodes whose inertia some row feels; none in one pose, which tells no inertia."""
+        model, used = self.evidence.model, self.evidence.used
+        if np.ptp(self.evidence.q[self.use], axis=0).max(initial=0.0) < POSES:
+            return []
+        return [i for i in self.links if np.abs(model[:, used, i]).max(initial=0.0) > 0]
 
-    def _wins(self, larger: Array, smaller: Array) -> bool:
-        """Is one cost (blocks,) lower than the other beyond chance?"""
-        gain = smaller - larger
-        error = float(np.std(gain)) / np.sqrt(max(len(gain), 1))
-        return float(np.mean(gain)) > BETTER * error
-
-    def _columns_of_rows(self, beside: Problem) -> tuple[Column, ...]:
-        """For every row the columns that foretell it best, others as they are."""
-        chosen: list[Column] = []
-        base = self.start
-        if beside.bodies:
-            # The bodies as fitted together with the richest columns stay as they are meanwhile.
-            rich = tuple(c for r in self._rows() for c in self._richest(r, base))
-            found = self.fit(Problem(rich, beside.bodies))
-            only = Solution(Problem((), beside.bodies), np.empty(0), found.steps)
-            base = self.start + applied(self.evidence, only)
-        kept, self.start = self.start, base
-        try:
-            for r in self._rows():
-                chosen += self._columns_of_row(r)
-        finally:
-            self.start = kept
-        return tuple(chosen)
+    def _bodies(self, sigma: float) -> tuple[BodyChange, ...]:
+        return tuple(BodyChange(i, self.links[i][1], sigma) for i in self.nodes)
 
     def _rows(self) -> list[int]:
         return np.flatnonzero(self.evidence.used).tolist()
 
-    def _columns_of_row(self, r: int) -> list[Column]:
-        rich = self._richest(r, self.start)
-        options = [[], [Column("bias", r)]]
-        if len(rich) > 1:
-            options += [[c for c in rich if c.kind != "rotor"], rich]
-            motion = [c for c in rich if c.kind in ("coulomb", "viscous")]
-            options += [[Column("bias", r), c] for c in motion]
-        options = [list(x) for x in dict.fromkeys(tuple(o) for o in options)]
-        options.sort(key=len)
-        costs = [self._cost(self._held_out_row(r, tuple(o)))[:, r] for o in options]
-        best = int(np.argmin([c.mean() for c in costs]))
-        for option, cost in zip(options, costs, strict=True):
-            if not self._wins(costs[best], cost):
-                return option
-        return options[best]
+    def _cost(self, left: Array, row: int | None = None) -> Array:
+        """(blocks,) mean of squares in units of the usual scatter, far ones tamed."""
+        rows = slice(None) if row is None else [row]
+        size = np.minimum(np.abs(left[:, rows]) / self.scale[rows], 10.0 * HUBER) ** 2
+        numbers, at = np.unique(self.blocks[self.use], return_inverse=True)
+        total = np.zeros(len(numbers))
+        np.add.at(total, at, size[self.use].sum(axis=1))
+        return total / np.bincount(at)
 
-    def _held_out_row(self, r: int, columns: tuple[Column, ...]) -> Array:
-        left = np.full(self.start.shape, np.nan)
-        for fold in folds_of(self.evidence, self.use):
-            left[fold.test, r] = self._row_fit(r, columns, fold.train, fold.test)
-        return left
+    def _simplest(self, costs: list[Array]) -> int:
+        """The first of the options, the simpler ones first, that is as good as the best."""
+        best = int(np.argmin([cost.mean() for cost in costs]))
+        for i, cost in enumerate(costs[:best]):
+            gain = cost - costs[best]
+            if gain.mean() <= BETTER * gain.std() / np.sqrt(len(gain)):
+                return i
+        return best
 
-    def _row_fit(self, r: int, columns: tuple[Column, ...], train: NDArray, test: NDArray) -> Array:
-        """What is left of one row where its own columns alone are fitted."""
-        if not columns:
-            return self.start[test, r]
-        only = replace(self.evidence, used=np.arange(len(self.evidence.used)) == r)
-        part, start = only.part(train), self.start[train]
-        weight = np.zeros(start.shape)
-        weight[:, r] = CORRELATED / self.scale[r] ** 2
-        values = np.zeros(len(columns))
-        for _ in range(3):
-            values = Equations(part, Problem(columns), start, weight).solve().values
-            rest = start[:, r] + _sum(part, columns, values)
-            far = np.abs(rest) / self.scale[r]
-            weight[:, r] = CORRELATED / self.scale[r] ** 2 * np.minimum(1.0, HUBER / (far + 1e-12))
-        return self.start[test, r] + _sum(only.part(test), columns, values)
+    def _columns_of_rows(self, start: Array) -> tuple[Column, ...]:
+        """For every row the columns that foretell it best, the bodies being as they are."""
+        chosen: list[Column] = []
+        for r in self._rows():
+            rich = [c for c in self.rich if c.row == r]
+            options = _options(rich)
+            left = np.zeros((len(options), *start.shape))
+            for fold in self.folds:
+                for i, option in enumerate(options):
+                    left[i, fold.test, r] = self._row_left(start, r, option, fold.train, fold.test)
+            chosen += options[self._simplest([self._cost(x, r) for x in left])]
+        return tuple(chosen)
 
-    def _richest(self, r: int, start: Array) -> list[Column]:
-        """All that a row may have, with the width of Coulomb friction that fits best."""
-        columns = [Column("bias", r)]
-        if r >= self.evidence.joints or not self.moved[r]:
-            return columns
-        columns.append(Column("viscous", r))
-        if self.evidence.robot.description.joints[r].torque == "motor":
-            columns.append(Column("rotor", r))
-        kept, self.start = self.start, start
-        own = self.evidence.robot.description.joints[r].friction
-        widths = WIDTHS if own.coulomb == 0.0 else (own.coulomb_width,)
-        costs = []
-        for width in widths:
-            tried = (*columns, Column("coulomb", r, width))
-            left = self._row_fit(r, tried, self.use, self.use)
-            costs.append(float(np.mean(np.minimum(np.abs(left) / self.scale[r], 30.0) ** 2)))
-        self.start = kept
-        columns.append(Column("coulomb", r, widths[int(np.argmin(costs))]))
-        return columns
-
-    def _bodies(self, columns: tuple[Column, ...]) -> tuple[BodyChange, ...]:
+    def _choose_bodies(
+        self, parts: list[Equations], columns: tuple[Column, ...]
+    ) -> tuple[BodyChange, ...]:
         """How freely inertias may leave the model's; none if that foretells nothing better."""
-        links = main_links(self.evidence.robot)
-        seen = self._seen(links)
-        if not seen:
+        if not self.nodes:
             return ()
-        options: list[tuple[BodyChange, ...]] = [()]
-        options += [tuple(BodyChange(i, links[i][1], s) for i in seen) for s in SIGMAS]
-        costs = [self._cost(self._held_out(Problem(columns, o))).sum(axis=1) for o in options]
-        best = int(np.argmin([c.mean() for c in costs]))
-        for option, cost in zip(options, costs, strict=True):
-            if not self._wins(costs[best], cost):
-                return option
-        return options[best]
+        options = [(), *(self._bodies(sigma) for sigma in SIGMAS)]
+        costs = []
+        for option in options:
+            left = np.zeros(self.start.shape)
+            for k, fold in enumerate(self.folds):
+                train = _sum([part for i, part in enumerate(parts) if i != k])
+                found = train.only(Problem(columns, option)).solve()
+                left[fold.test] = (self.start + applied(self.evidence, found))[fold.test]
+            costs.append(self._cost(left))
+        return options[self._simplest(costs)]
 
-    def _seen(self, links: dict[int, tuple[str, Array]]) -> list[int]:
-        """Nodes that some row carries."""
-        model, used = self.evidence.model, self.evidence.used
-        if np.ptp(self.evidence.q[self.use], axis=0).max(initial=0.0) < POSES:
-            return []
-        return [i for i in links if np.abs(model[:, used, i]).max(initial=0.0) > 0]
+    def _row_left(
+        self, start: Array, r: int, columns: list[Column], train: NDArray, test: NDArray
+    ) -> Array:
+        """What is left of a row where its own columns alone are fitted to other instants."""
+        if not columns:
+            return start[test, r]
+        problem = Problem(tuple(columns))
+        only = replace(self.evidence, used=np.arange(len(self.evidence.used)) == r)
+        values = Equations.of(only, problem, start, self.weight, train).solve().values
+        added = sum(v * column_of(only, c) for v, c in zip(values, columns, strict=True))
+        return (start[:, r] + added)[test]
+
+    def _richest(self, start: Array) -> tuple[Column, ...]:
+        """All columns that rows may have, with the width of Coulomb friction that fits best."""
+        columns: list[Column] = []
+        joints = self.evidence.robot.description.joints
+        for r in self._rows():
+            own = [Column("bias", r)]
+            if r < len(joints) and self.moved[r]:
+                own.append(Column("viscous", r))
+                if joints[r].torque == "motor":
+                    own.append(Column("rotor", r))
+                own.append(self._best_coulomb(start, r, own))
+            columns += own
+        return tuple(columns)
+
+    def _best_coulomb(self, start: Array, r: int, beside: list[Column]) -> Column:
+        law = self.evidence.robot.description.joints[r].friction
+        widths = WIDTHS if law.coulomb == 0.0 else (law.coulomb_width,)
+        options = [Column("coulomb", r, width) for width in widths]
+        costs = []
+        for option in options:
+            left = self._row_left(start, r, [*beside, option], self.use, self.use)
+            costs.append(float((self.weight[self.use, r] * left**2).sum()))
+        return options[int(np.argmin(costs))]
 
 
-def _sum(part: Evidence, columns: tuple[Column, ...], values: Array) -> Array:
-    total = np.zeros(len(part))
-    for column, value in zip(columns, values, strict=True):
-        total += value * column_of(part, column)
+def _options(rich: list[Column]) -> list[list[Column]]:
+    """Sets of columns that a row may have, simpler ones first."""
+    kinds = [
+        (),
+        ("bias",),
+        ("bias", "coulomb"),
+        ("bias", "viscous"),
+        ("bias", "coulomb", "viscous"),
+        ("bias", "coulomb", "viscous", "rotor"),
+    ]
+    sets = [tuple(c for c in rich if c.kind in of) for of in kinds]
+    return [list(option) for option in dict.fromkeys(sets)]
+
+
+def _sum(parts: list[Equations]) -> Equations:
+    total = parts[0]
+    for part in parts[1:]:
+        total = total + part
     return total

@@ -19,6 +19,8 @@ from touchline.model.tree import invert
 
 Array = NDArray[np.float64]
 
+UNCHANGED = 1e-3  # steps of `PhysicalBody` below it: no data told anything of the link
+SMALLEST = 1e-9  # in SI units; smaller figures are rounding errors
 DIGITS = 6  # of a written figure
 
 
@@ -46,7 +48,10 @@ def link_corrections(robot: Robot, solution: Solution) -> dict[str, LinkCorrecti
     """Mass, centre and inertia of the links that changed, in link axes."""
     links = main_links(robot)
     found = {}
-    for body, change in zip(solution.problem.bodies, solution.changes(), strict=True):
+    changes = solution.changes()
+    for body, step, change in zip(solution.problem.bodies, solution.steps, changes, strict=True):
+        if np.abs(step).max() < UNCHANGED:
+            continue
         name = links[body.node][0]
         T_link_node = invert(robot.places[name].T_node_link)
         own = move_inertia(body_of_vector(body.model + change), T_link_node)
@@ -108,6 +113,8 @@ def _joint(joint: JointDescription, row: int, found: Solution) -> JointDescripti
     for column, value in zip(found.problem.columns, found.values, strict=True):
         if (column.kind, column.row) == ("coulomb", row):
             coulomb, width = law.coulomb + value, column.width
+    if coulomb <= 0.0:
+        coulomb, width = 0.0, law.coulomb_width
     law = replace(
         law,
         coulomb=_short(coulomb),
@@ -136,7 +143,7 @@ def _changed(link: Link, correction: LinkCorrection, robot: Robot) -> Link:
 
 
 def _short(value: float) -> float:
-    return float(f"{value:.{DIGITS}g}")
+    return float(f"{value:.{DIGITS}g}") if abs(value) > SMALLEST else 0.0
 
 
 def _all(values: Array) -> tuple[float, ...]:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Least squares on the filtered equations: some parameters free, the rest as described."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -104,39 +105,55 @@ class Solution:
 
 
 class Equations:
-    """The equations of some instants for one problem, weighed.
+    """The normal equations of some instants for one problem.
 
-    Args:
-        evidence: the instants.
+    Attributes:
+        evidence: all instants.
         problem: what is free.
-        start: (N, R) the residual that the columns and bodies are added to.
-        weight: (N, R) one over variance; 0 leaves out.
+        normal, gradient: of half the weighed sum of squares, at zero; the ten parameters of each
+            body stand after the columns.
     """
 
-    def __init__(self, evidence: Evidence, problem: Problem, start: Array, weight: Array) -> None:
+    def __init__(self, evidence: Evidence, problem: Problem, normal: Array, gradient: Array):
         self.evidence, self.problem = evidence, problem
-        self.start, self.weight = start, weight
+        self.normal, self.gradient = normal, gradient
+
+    @staticmethod
+    def of(
+        evidence: Evidence, problem: Problem, start: Array, weight: Array, use: NDArray[np.bool_]
+    ) -> "Equations":
+        """Sums up some instants.
+
+        Args:
+            evidence: all instants.
+            problem: what is free.
+            start: (N, R) the residual that the columns and bodies are added to.
+            weight: (N, R) one over variance.
+            use: (N,) the instants.
+        """
         linear = len(problem.columns)
         size = linear + PARAMETERS * len(problem.bodies)
-        self.normal, self.gradient = np.zeros((size, size)), np.zeros(size)
-        bodies = [b.node for b in problem.bodies]
-        for r in np.flatnonzero(evidence.used):
-            own = [i for i, c in enumerate(problem.columns) if c.row == r]
-            index = np.array(own + list(range(linear, size)), dtype=int)
-            if not len(index):
-                continue
-            A = self._row(r, own, bodies)
-            w = weight[:, r, None]
-            self.normal[np.ix_(index, index)] += A.T @ (w * A)
-            self.gradient[index] += A.T @ (w[:, 0] * start[:, r])
+        normal, gradient = np.zeros((size, size)), np.zeros(size)
+        for r, index, A in _rows_of(evidence, problem, use):
+            w = weight[use, r]
+            normal[np.ix_(index, index)] += A.T @ (w[:, None] * A)
+            gradient[index] += A.T @ (w * start[use, r])
+        return Equations(evidence, problem, normal, gradient)
 
-    def _row(self, r: int, own: list[int], bodies: list[int]) -> Array:
-        e = self.evidence
-        columns = [column_of(e, self.problem.columns[i]) for i in own]
-        parts = [np.column_stack(columns)] if columns else []
-        if bodies:
-            parts.append(e.model[:, r, bodies].reshape(len(e), -1))
-        return np.concatenate(parts, axis=1)
+    def __add__(self, other: "Equations") -> "Equations":
+        normal, gradient = self.normal + other.normal, self.gradient + other.gradient
+        return Equations(self.evidence, self.problem, normal, gradient)
+
+    def only(self, problem: Problem) -> "Equations":
+        """The same instants with less that is free, or with other priors."""
+        linear = len(self.problem.columns)
+        index = [self.problem.columns.index(column) for column in problem.columns]
+        nodes = [body.node for body in self.problem.bodies]
+        for body in problem.bodies:
+            first = linear + PARAMETERS * nodes.index(body.node)
+            index += range(first, first + PARAMETERS)
+        normal = self.normal[np.ix_(index, index)]
+        return Equations(self.evidence, problem, normal, self.gradient[index])
 
     def solve(self) -> Solution:
         """The most likely parameters."""
@@ -189,8 +206,17 @@ class Equations:
             J[at : at + PARAMETERS, at : at + PARAMETERS] = body.jacobian(step)
         return J
 
-    def with_errors(self, found: Solution, blocks: Array) -> Solution:
+    def with_errors(
+        self, found: Solution, left: Array, weight: Array, use: NDArray[np.bool_], blocks: Array
+    ) -> Solution:
         """The solution with standard errors.
+
+        Args:
+            found: from these equations.
+            left: (N, R) residuals with it.
+            weight: (N, R) as for `of`.
+            use: (N,) the instants.
+            blocks: (N,) numbers of blocks of time.
 
         The residuals of one block of time may be correlated as they like; those of two are not
         (a sandwich of the normal matrix and the blocks' gradients).
@@ -205,24 +231,16 @@ class Equations:
             ]
         )
         bread = np.linalg.pinv(J.T @ self.normal @ J + np.diag(prior))
-        rest = self.start + applied(self.evidence, found)
-        meat = np.zeros_like(bread)
-        bodies = [b.node for b in self.problem.bodies]
-        size = linear + PARAMETERS * len(bodies)
-        scores = {b: np.zeros(size) for b in np.unique(blocks)}
-        for r in np.flatnonzero(self.evidence.used):
-            own = [i for i, c in enumerate(self.problem.columns) if c.row == r]
-            index = np.array(own + list(range(linear, size)), dtype=int)
-            if not len(index):
-                continue
-            scored = self._row(r, own, bodies) * (self.weight[:, r] * rest[:, r])[:, None]
-            for b in scores:
-                scores[b][index] += scored[blocks == b].sum(axis=0)
-        for score in scores.values():
-            s = J.T @ score
-            meat += np.outer(s, s)
+        numbers, at = np.unique(blocks[use], return_inverse=True)
+        scores = np.zeros((len(numbers), len(self.gradient)))
+        for r, index, A in _rows_of(self.evidence, self.problem, use):
+            scored = A * (weight[use, r] * left[use, r])[:, None]
+            own = np.zeros((len(numbers), len(index)))
+            np.add.at(own, at, scored)
+            scores[:, index] += own
+        scores = scores @ J
         count = len(scores)
-        meat *= count / max(count - 1, 1)
+        meat = scores.T @ scores * count / max(count - 1, 1)
         C = bread @ (meat + np.diag(prior)) @ bread
         full = J @ C @ J.T
         sigma = np.sqrt(np.maximum(np.diag(full), 0.0))
@@ -233,6 +251,25 @@ class Equations:
             sigma[:linear],
             sigma[linear:].reshape(-1, PARAMETERS),
         )
+
+
+def _rows_of(
+    e: Evidence, problem: Problem, use: NDArray[np.bool_]
+) -> Iterator[tuple[int, NDArray[np.int64], Array]]:
+    """Rows with something free in them: number, indices of the parameters, equations (N, ...)."""
+    linear = len(problem.columns)
+    size = linear + PARAMETERS * len(problem.bodies)
+    nodes = [body.node for body in problem.bodies]
+    for r in np.flatnonzero(e.used).tolist():
+        own = [i for i, c in enumerate(problem.columns) if c.row == r]
+        parts = [column_of(e, problem.columns[i])[use, None] for i in own]
+        index = own
+        if nodes:
+            part = e.model[:, r][use][:, nodes]
+            parts.append(part.reshape(len(part), -1))
+            index = own + list(range(linear, size))
+        if parts:
+            yield r, np.array(index), np.concatenate(parts, axis=1)
 
 
 def column_of(e: Evidence, column: Column) -> Array:

@@ -100,7 +100,6 @@ def identify(evidence: Evidence, trust: bool = False) -> Identification:
     if float(after.sum()) >= float(before.sum()):
         problem, after = Problem(), before
     whole = Chooser(evidence, ~touched)
-    whole.scale = chooser.scale
     solution = whole.with_errors(whole.fit(problem))
     return Identification(evidence, solution, touched, before, after, parted)
 
