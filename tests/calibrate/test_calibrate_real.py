@@ -26,10 +26,24 @@ def real(*parts):
 
 
 @pytest.mark.parametrize("logs", [("a4", "c5"), ("b6", "b8"), ("f2", "a6")])
-def test_a_real_panda_that_is_touched_half_of_the_time_is_refused(logs, tmp_path):
+def test_a_real_panda_that_is_touched_half_of_the_time_gets_offsets(logs, tmp_path):
+    paths = [real("panda_touches", f"{log}.csv.gz") for log in logs]
+    result = calibrate(paths, EXAMPLES / "panda_hand.yaml", tmp_path / "out.yaml")
+    assert result.thresholds is None or result.seconds > 20.0
+    found = result.identification
+    assert {column.kind for column in found.problem.columns} == {"bias"}
+    assert found.problem.bodies == ()
+    assert 0.2 < found.touched.mean() < 0.6
+    assert (found.after <= 1.01 * found.before).all()
+    biases = [joint.bias for joint in tl.load_robot(tmp_path / "out.yaml").description.joints]
+    assert np.abs(biases).max() < 1.5
+
+
+@pytest.mark.parametrize("logs", [("a4", "c5"), ("b6", "b8"), ("f2", "a6")])
+def test_without_identification_such_recordings_are_refused(logs, tmp_path):
     paths = [real("panda_touches", f"{log}.csv.gz") for log in logs]
     with pytest.raises(InputError, match=r"panda_joint\d is more than .* % of the time"):
-        calibrate(paths, EXAMPLES / "panda_hand.yaml", tmp_path / "out.yaml")
+        calibrate(paths, EXAMPLES / "panda_hand.yaml", tmp_path / "out.yaml", identification=False)
 
 
 def test_a_real_ur10_gets_thresholds_that_its_own_motion_keeps_below(tmp_path):
@@ -37,16 +51,17 @@ def test_a_real_ur10_gets_thresholds_that_its_own_motion_keeps_below(tmp_path):
     text = (EXAMPLES / "ur10.yaml").read_text()
     robot = tmp_path / "ur10.yaml"
     robot.write_text("\n".join(x for x in text.splitlines() if not x.startswith("  contact:")))
-    result = calibrate([log], robot, robot)
+    result = calibrate([log], robot, robot, identification=False)
 
-    thresholds = make_thresholds(tl.load_robot(robot), result.description.period)
+    period = result.thresholds.description.period
+    thresholds = make_thresholds(tl.load_robot(robot), period)
     assert thresholds.calibrated
     contact = np.array([row.contact for row in thresholds.rows])
-    usual = np.array([row.typical for row in result.description.rows.values()])
+    usual = np.array([row.typical for row in result.thresholds.description.rows.values()])
     assert (contact > 5 * usual).all() and (contact < 60).all()
 
     # Two thirds foresee what the last third does, within chance.
-    telling = [h for h in result.held_out if h.rate * h.hours > 3]
+    telling = [h for h in result.thresholds.held_out if h.rate * h.hours > 3]
     assert {h.method for h in telling} == {"rows", "scaled", "chi2", "glrt", "cusum"}
     for h in telling:
         low, high = h.interval

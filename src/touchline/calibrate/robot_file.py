@@ -61,7 +61,7 @@ def _named(entries: list[dict[str, Any]], changes: dict[str, Any]) -> list[dict[
     """Entries with new values in those that are named; new entries where there are none."""
     if not entries:
         return [{"name": name} | values for name, values in changes.items()]
-    return [entry | changes.get(entry.get("name"), {}) for entry in entries]
+    return [entry | changes.get(str(entry.get("name")), {}) for entry in entries]
 
 
 def _listed(lines: list[str], key: str, old: list[Any], new: list[Any]) -> list[str]:

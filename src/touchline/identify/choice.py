@@ -163,10 +163,10 @@ class Chooser:
         for r in self._rows():
             rich = [c for c in self.rich if c.row == r]
             options = _options(rich)
-            left = np.zeros((len(options), *start.shape))
+            left = [np.zeros(start.shape) for _ in options]
             for fold in self.folds:
                 for i, option in enumerate(options):
-                    left[i, fold.test, r] = self._row_left(start, r, option, fold.train, fold.test)
+                    left[i][fold.test, r] = self._row_left(start, r, option, fold.train, fold.test)
             chosen += options[self._simplest([self._cost(x, r) for x in left])]
         return tuple(chosen)
 

@@ -146,11 +146,12 @@ def _gather_one(robot: Robot, parts: list[Samples], bandwidth: float) -> Evidenc
         return None
     bare = bare_robot(robot)
     rows = rows_of(bare)
-    usual = np.isfinite(q).all(axis=1) & np.isfinite(qd).all(axis=1)
+    usual = np.all(np.isfinite(np.concatenate([q, qd], axis=1)), axis=1)
     q, qd = (np.where(usual[:, None], x, 0.0) for x in (q, qd))
     reading = _read(bare, q, qd, tau, wrench)
     used = np.isfinite(reading).mean(axis=0) > PRESENT
-    present = usual & np.isfinite(reading[:, used]).all(axis=1)
+    there = np.isfinite(reading[:, used]).all(axis=1)
+    present = np.logical_and(usual, there)
     steps = make_steps(time, bandwidth, present)
     ready = settled(steps, bandwidth)
     period = float(np.median(steps.dt))

@@ -207,7 +207,7 @@ class Equations:
         return J
 
     def with_errors(
-        self, found: Solution, left: Array, weight: Array, use: NDArray[np.bool_], blocks: Array
+        self, found: Solution, left: Array, weight: Array, use: NDArray[np.bool_], blocks: NDArray
     ) -> Solution:
         """The solution with standard errors.
 

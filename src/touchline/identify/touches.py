@@ -47,12 +47,15 @@ def find_touches(evidence: Evidence, left: Array, coulomb: Array) -> NDArray[np.
         coulomb: (n,) Coulomb friction of the joints by that fit [Nm]. A joint that hardly moves
             holds up to more than that, of either sign.
     """
-    scatter = usual_scatter(left, evidence.used)
-    centred = left - usual_middle(left)
+    centred = left.copy()
+    for number in np.unique(evidence.recording):  # each may rest in a pose of its own
+        own = evidence.recording == number
+        centred[own] -= usual_middle(left[own])
+    scatter = usual_scatter(centred, evidence.used)
     slow = np.maximum(0.0, 1.0 - np.abs(evidence.qd) / SLOW)
     excess = np.abs(centred)
     excess[:, : evidence.joints] -= STICTION * coulomb * slow
-    out = (excess / scatter > FAR)[:, evidence.used].any(axis=1)
+    out = np.any((excess / scatter > FAR)[:, evidence.used], axis=1)
     touched = np.zeros(len(evidence), dtype=bool)
     beside = BESIDE / evidence.bandwidth
     for start, stop in _runs(out, evidence):

@@ -35,5 +35,5 @@ class Samples:
 
     def where(self, keep: np.ndarray) -> "Samples":
         """Some of the samples; `row` stays that of the first of all."""
-        signals = (self.time, self.q, self.qd, self.tau, self.wrench)
-        return Samples(*(signal[keep] for signal in signals), self.row)
+        q, qd, tau, wrench = self.q[keep], self.qd[keep], self.tau[keep], self.wrench[keep]
+        return Samples(self.time[keep], q, qd, tau, wrench, self.row)
