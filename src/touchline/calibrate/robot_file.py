@@ -44,6 +44,8 @@ def write_description(source: Path, out: Path, changes: dict[str, Any]) -> None:
     for key, values in changes.items():
         if key in NAMED:
             values = _named(data.get(key) or [], values)
+        if key == "loads":
+            values = [*(data.get(key) or []), *values[len(data.get(key) or []) :]]
         if isinstance(values, list):
             lines = _listed(lines, key, data.get(key) or [], values)
             expected[key] = values

@@ -18,6 +18,7 @@ from touchline.identify.fit import (
     column_of,
     main_links,
 )
+from touchline.identify.payload import guess_payload, seen_leaves
 from touchline.identify.touches import usual_scatter
 
 Array = NDArray[np.float64]
@@ -97,12 +98,19 @@ class Chooser:
         """Columns of every row, then bodies, then the columns once more beside these."""
         parts = [self._equations(self.richest(), fold.test) for fold in self.folds]
         columns = self._columns_of_rows(self.start)
-        bodies = self._choose_bodies(parts, columns)
+        loads = self._choose_loads(parts, columns)
+        if loads:
+            columns = self._beside(loads)
+        bodies = loads + self._choose_bodies(parts, columns, loads)
         if bodies:
-            found = self.fit(Problem(self.rich, bodies))
-            only = Solution(Problem((), bodies), np.empty(0), found.steps)
-            columns = self._columns_of_rows(self.start + applied(self.evidence, only))
+            columns = self._beside(bodies)
         return Problem(columns, bodies)
+
+    def _beside(self, bodies: tuple[BodyChange, ...]) -> tuple[Column, ...]:
+        """Columns of the rows beside bodies, which are fitted with all columns first."""
+        found = self.fit(Problem(self.rich, bodies))
+        only = Solution(Problem((), bodies), np.empty(0), found.steps)
+        return self._columns_of_rows(self.start + applied(self.evidence, only))
 
     def fit(self, problem: Problem, use: NDArray[np.bool_] | None = None) -> Solution:
         """Fits a problem; equations that are far off count less."""
@@ -170,22 +178,40 @@ class Chooser:
             chosen += options[self._simplest([self._cost(x, r) for x in left])]
         return tuple(chosen)
 
-    def _choose_bodies(
+    def _choose_loads(
         self, parts: list[Equations], columns: tuple[Column, ...]
+    ) -> tuple[BodyChange, ...]:
+        """Payloads that the model lacks, as far as they foretell something."""
+        whole, loads = _sum(parts), ()
+        for node in seen_leaves(self.evidence):
+            if node not in self.nodes:
+                continue
+            guess = guess_payload(whole.only(Problem(self.rich, whole.problem.bodies)), node)
+            if guess is None:
+                continue
+            options = [loads, (*loads, guess)]
+            costs = [self._foretold(parts, Problem(columns, option)) for option in options]
+            loads = options[self._simplest(costs)]
+        return loads
+
+    def _choose_bodies(
+        self, parts: list[Equations], columns: tuple[Column, ...], loads: tuple[BodyChange, ...]
     ) -> tuple[BodyChange, ...]:
         """How freely inertias may leave the model's; none if that foretells nothing better."""
         if not self.nodes:
             return ()
         options = [(), *(self._bodies(sigma) for sigma in SIGMAS)]
-        costs = []
-        for option in options:
-            left = np.zeros(self.start.shape)
-            for k, fold in enumerate(self.folds):
-                train = _sum([part for i, part in enumerate(parts) if i != k])
-                found = train.only(Problem(columns, option)).solve()
-                left[fold.test] = (self.start + applied(self.evidence, found))[fold.test]
-            costs.append(self._cost(left))
+        costs = [self._foretold(parts, Problem(columns, loads + option)) for option in options]
         return options[self._simplest(costs)]
+
+    def _foretold(self, parts: list[Equations], problem: Problem) -> Array:
+        """Cost (blocks,) on instants that a fit to the other parts of time has not seen."""
+        left = np.zeros(self.start.shape)
+        for k, fold in enumerate(self.folds):
+            train = _sum([part for i, part in enumerate(parts) if i != k])
+            found = train.only(problem).solve()
+            left[fold.test] = (self.start + applied(self.evidence, found))[fold.test]
+        return self._cost(left)
 
     def _row_left(
         self, start: Array, r: int, columns: list[Column], train: NDArray, test: NDArray

@@ -7,11 +7,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.identify.fit import Solution, main_links
+from touchline.identify.fit import Solution, link_vector, main_links
 from touchline.identify.identification import Identification
+from touchline.identify.payload import payload_link
 from touchline.identify.regressor import body_of_vector
 from touchline.model.corrections import corrected_inertia, load_inertia
-from touchline.model.description import JointDescription, LinkCorrection, SensorDescription
+from touchline.model.description import (
+    JointDescription,
+    LinkCorrection,
+    Load,
+    RobotDescription,
+    SensorDescription,
+)
 from touchline.model.mechanism import Link
 from touchline.model.robot import Robot
 from touchline.model.transforms import combine_inertias, move_inertia
@@ -35,11 +42,12 @@ def identified_robot(found: Identification) -> Robot:
     )
     corrections = link_corrections(robot, solution)
     links = dict(description.links) | corrections
-    changed = replace(description, joints=joints, sensors=sensors, links=links)
+    loads = (*description.loads, *added_loads(robot, solution))
+    changed = replace(description, joints=joints, sensors=sensors, links=links, loads=loads)
     mechanism = robot.mechanism
     bodies = {
-        name: _changed(mechanism.links[name], correction, robot)
-        for name, correction in corrections.items()
+        name: _changed(robot, changed, name)
+        for name in {*corrections, *(load.link for load in loads)}
     }
     return Robot(changed, replace(mechanism, links=mechanism.links | bodies))
 
@@ -50,7 +58,7 @@ def link_corrections(robot: Robot, solution: Solution) -> dict[str, LinkCorrecti
     found = {}
     changes = solution.changes()
     for body, step, change in zip(solution.problem.bodies, solution.steps, changes, strict=True):
-        if np.abs(step).max() < UNCHANGED:
+        if body.added or np.abs(step).max() < UNCHANGED:
             continue
         name = links[body.node][0]
         T_link_node = invert(robot.places[name].T_node_link)
@@ -60,8 +68,21 @@ def link_corrections(robot: Robot, solution: Solution) -> dict[str, LinkCorrecti
     return found
 
 
+def added_loads(robot: Robot, solution: Solution) -> tuple[Load, ...]:
+    """Payloads that were found, in the axes of the links that carry them."""
+    loads = []
+    for body, change in zip(solution.problem.bodies, solution.changes(), strict=True):
+        if body.added:
+            name = payload_link(robot, body.node)
+            T_link_node = invert(robot.places[name].T_node_link)
+            own = move_inertia(body_of_vector(change), T_link_node)
+            six = own.inertia[np.triu_indices(3)]
+            loads.append(Load(name, _short(own.mass), _all(own.com), _all(six)))
+    return tuple(loads)
+
+
 def description_changes(robot: Robot, new: Robot) -> dict[str, Any]:
-    """Top-level keys of `robot.yaml` whose values changed: joints, sensors and links.
+    """Top-level keys of `robot.yaml` whose values changed: joints, sensors, links and loads.
 
     `joints` and `force_torque_sensors` come as {name: {key: value}} with what is new of each; of
     the joints all are named, because those that a file does not name are not observed.
@@ -85,6 +106,16 @@ def description_changes(robot: Robot, new: Robot) -> dict[str, Any]:
     }
     if links:
         changes["links"] = links
+    if new.description.loads != robot.description.loads:
+        changes["loads"] = [
+            {
+                "link": load.link,
+                "mass": load.mass,
+                "com": list(load.com),
+                "inertia": list(load.inertia),
+            }
+            for load in new.description.loads
+        ]
     return changes
 
 
@@ -135,10 +166,13 @@ def _sensor(sensor: SensorDescription, first: int, found: Solution) -> SensorDes
     return replace(sensor, bias=_all(np.array(bias)))
 
 
-def _changed(link: Link, correction: LinkCorrection, robot: Robot) -> Link:
+def _changed(robot: Robot, new: RobotDescription, name: str) -> Link:
     """The link as corrected, and its loads."""
-    own = corrected_inertia(link.inertia, correction)
-    loads = [load_inertia(load) for load in robot.description.loads if load.link == link.name]
+    link, place = robot.mechanism.links[name], robot.places[name]
+    own = move_inertia(body_of_vector(link_vector(robot, name)), invert(place.T_node_link))
+    if name in new.links:
+        own = corrected_inertia(own, new.links[name])
+    loads = [load_inertia(load) for load in new.loads if load.link == name]
     return replace(link, inertia=combine_inertias([own, *loads]))
 
 

@@ -50,11 +50,17 @@ class BodyChange:
         node: its number.
         model: (10,) those of the link that is corrected, in the node's frame.
         sigma: prior, 1 sigma of each of the ten numbers of `PhysicalBody`.
+        added: a body that the model lacks, `model` being a first guess.
     """
 
     node: int
     model: Array
     sigma: float
+    added: bool = False
+
+    def physical(self) -> PhysicalBody:
+        """Its parameters as a function of ten free numbers."""
+        return PhysicalBody(self.model, self.added)
 
 
 @dataclass(frozen=True)
@@ -91,7 +97,7 @@ class Solution:
     def changes(self) -> Array:
         """(bodies, 10) what is added to the ten parameters."""
         found = [
-            PhysicalBody(b.model).change(step)
+            b.physical().change(step)
             for b, step in zip(self.problem.bodies, self.steps, strict=True)
         ]
         return np.array(found).reshape(-1, PARAMETERS)
@@ -157,12 +163,12 @@ class Equations:
 
     def solve(self) -> Solution:
         """The most likely parameters."""
-        physical = [PhysicalBody(b.model) for b in self.problem.bodies]
+        physical = [b.physical() for b in self.problem.bodies]
         linear = len(self.problem.columns)
         prior = np.concatenate(
             [np.zeros(linear), *(np.full(PARAMETERS, b.sigma**-2.0) for b in self.problem.bodies)]
         )
-        prior[:linear] = self._prior()
+        prior[:linear] = self.prior()
         least = np.array([_least(self.evidence, c) for c in self.problem.columns])
         held = np.zeros(linear, dtype=bool)
         values, steps = np.zeros(linear), np.zeros((len(physical), PARAMETERS))
@@ -189,7 +195,7 @@ class Equations:
                 break
         return Solution(self.problem, values, steps)
 
-    def _prior(self) -> Array:
+    def prior(self) -> Array:
         """One over variance of the columns before any data: biases are small, the rest is free."""
         prior = 1e-9 * np.maximum(np.diag(self.normal)[: len(self.problem.columns)], 1e-12)
         for i, column in enumerate(self.problem.columns):
@@ -221,12 +227,12 @@ class Equations:
         The residuals of one block of time may be correlated as they like; those of two are not
         (a sandwich of the normal matrix and the blocks' gradients).
         """
-        physical = [PhysicalBody(b.model) for b in self.problem.bodies]
+        physical = [b.physical() for b in self.problem.bodies]
         linear = len(self.problem.columns)
         J = self._jacobian(physical, found.steps)
         prior = np.concatenate(
             [
-                self._prior(),
+                self.prior(),
                 *(np.full(PARAMETERS, b.sigma**-2.0) for b in self.problem.bodies),
             ]
         )

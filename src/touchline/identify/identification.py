@@ -14,7 +14,7 @@ from touchline.identify.touches import find_touches, stretches
 
 Array = NDArray[np.float64]
 
-LEAST_SECONDS = 4.0  # of settled, untouched data; less tells an offset at best
+LEAST_SECONDS = 2.0  # of settled, untouched data; less tells an offset at best
 HELD_OUT = 3  # every third recording, or the last third of each
 WORSE = 1.01  # a row that is left larger than this on data held out keeps what is described
 MOST_TOUCHED = 0.6  # of the time; beyond it nobody can say which state is the usual one
@@ -55,9 +55,10 @@ class Identification:
         """Recording, begin and end [s] of what was left out."""
         return stretches(self.evidence, self.touched)
 
-    def left(self) -> Array:
-        """Residuals (N, R) of all instants after the fit to all of them."""
-        return self.evidence.residual() + applied(self.evidence, self.solution)
+    def left(self, evidence: Evidence | None = None) -> Array:
+        """Residuals (N, R) after the fit: of all its own instants, or of other ones."""
+        evidence = evidence or self.evidence
+        return evidence.residual() + applied(evidence, self.solution)
 
 
 def identify(evidence: Evidence, trust: bool = False) -> Identification:
@@ -102,6 +103,12 @@ def identify(evidence: Evidence, trust: bool = False) -> Identification:
     whole = Chooser(evidence, ~touched)
     solution = whole.with_errors(whole.fit(problem))
     return Identification(evidence, solution, touched, before, after, parted)
+
+
+def identify_all(evidence: Evidence) -> Solution:
+    """What all untouched instants tell, none being kept for a judgement: for short recordings."""
+    chooser = Chooser(evidence, ~touched_instants(evidence))
+    return chooser.with_errors(chooser.fit(chooser.choose()))
 
 
 def touched_instants(evidence: Evidence) -> NDArray[np.bool_]:

@@ -27,9 +27,10 @@ class PhysicalBody:
 
     Args:
         vector: (10,) the model's parameters; its mass is positive.
+        added: the model lacks the body; a change is then all of it.
     """
 
-    def __init__(self, vector: Array) -> None:
+    def __init__(self, vector: Array, added: bool = False) -> None:
         self.model = vector
         P = pseudo_inertia(vector)
         mass, centre = vector[0], vector[1:4] / vector[0]
@@ -39,16 +40,12 @@ class PhysicalBody:
         mended = axes @ np.diag(np.maximum(values, floor)) @ axes.T
         P[:3, :3] = mended + mass * np.outer(centre, centre)
         self._root = np.linalg.cholesky(P)
-        self._start = vector_of_pseudo(P)
+        self._start = np.zeros(PARAMETERS) if added else vector_of_pseudo(P)
 
     def change(self, step: Array) -> Array:
         """What a step (10,) adds to the parameters."""
         L = self._root @ _triangle(step)
         return vector_of_pseudo(L @ L.T) - self._start
-
-    def vector(self, step: Array) -> Array:
-        """The parameters (10,) after a step: always those of a possible body."""
-        return self._start + self.change(step) if step.any() else self.model
 
     def jacobian(self, step: Array) -> Array:
         """Derivatives (10, 10) of the parameters with respect to the step."""

@@ -5,6 +5,7 @@ import numpy as np
 
 from touchline.identify.fit import main_links
 from touchline.identify.identification import Identification
+from touchline.identify.payload import payload_link
 
 UNITS = {"bias": "Nm", "viscous": "Nm s/rad", "coulomb": "Nm", "rotor": "kg m2", "gain": ""}
 WORDS = {
@@ -54,17 +55,28 @@ def _column_lines(found: Identification) -> list[str]:
 
 
 def _body_lines(found: Identification) -> list[str]:
-    problem = found.problem
-    if not problem.bodies:
-        return []
+    problem, lines = found.problem, []
+    own = [body for body in problem.bodies if not body.added]
+    for body, change, error in zip(
+        problem.bodies, found.solution.changes(), found.solution.body_errors, strict=True
+    ):
+        if body.added:
+            centre = ", ".join(f"{x:.3f}" for x in change[1:4] / change[0])
+            name = payload_link(found.evidence.robot, body.node)
+            lines.append(f"  payload at {name}: {change[0]:.3f} +- {error[0]:.2g} kg, centre at")
+            lines[-1] += f" [{centre}] m in the axes of its joint"
+    if not own:
+        return lines
     links = main_links(found.evidence.robot)
-    sigma = problem.bodies[0].sigma
-    lines = [
+    sigma = own[0].sigma
+    lines += [
         f"  inertias drawn to the model's (1 sigma {100 * sigma:g} % of their square root): mass"
     ]
     for body, change, error in zip(
         problem.bodies, found.solution.changes(), found.solution.body_errors, strict=True
     ):
+        if body.added:
+            continue
         mass = body.model[0]
         lines.append(
             f"    {links[body.node][0]}: {mass:.3f} kg {change[0]:+.3f} +- {error[0]:.2g} kg"
