@@ -33,7 +33,7 @@ def test_a_real_panda_that_is_touched_half_of_the_time_gets_offsets(logs, tmp_pa
     found = result.identification
     assert {column.kind for column in found.problem.columns} == {"bias"}
     assert found.problem.bodies == ()
-    assert 0.2 < found.touched.mean() < 0.6
+    assert 0.4 < found.touched.mean() < 0.7  # labelled: 41 to 48 %, without the filter's tails
     assert (found.after <= 1.01 * found.before).all()
     biases = [joint.bias for joint in tl.load_robot(tmp_path / "out.yaml").description.joints]
     assert np.abs(biases).max() < 1.5

@@ -183,6 +183,22 @@ def real(*, data: Directory = None) -> int:
     return 0
 
 
+def identify(*, data: Directory = None) -> int:
+    """What identification leaves of the residuals of real arms, on motion that played no part.
+
+    Example: touchline bench identify --data recordings
+
+    Args:
+        data: Folder of the recordings (see docs/calibration.md).
+    """
+    if data is None:
+        print("Identification of real arms: no recordings, name their folder with --data")
+        return 0
+    from touchline.bench.identify.run import main
+
+    return main(data)
+
+
 BENCHMARKS: dict[str, Callable[..., int]] = {
     "observer": observer,
     "localization": localization,
@@ -190,5 +206,6 @@ BENCHMARKS: dict[str, Callable[..., int]] = {
     "reaction": reaction,
     "wrench": wrench,
     "detection": detection,
+    "identify": identify,
     "real": real,
 }

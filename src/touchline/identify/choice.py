@@ -18,7 +18,7 @@ from touchline.identify.fit import (
     column_of,
     main_links,
 )
-from touchline.identify.payload import guess_payload, seen_leaves
+from touchline.identify.payload import SETTLED, guess_payload, seen_leaves
 from touchline.identify.touches import usual_scatter
 
 Array = NDArray[np.float64]
@@ -192,7 +192,13 @@ class Chooser:
             options = [loads, (*loads, guess)]
             costs = [self._foretold(parts, Problem(columns, option)) for option in options]
             loads = options[self._simplest(costs)]
-        return loads
+        return self._settled(loads) if loads else ()
+
+    def _settled(self, loads: tuple[BodyChange, ...]) -> tuple[BodyChange, ...]:
+        """Payloads as the model's links let them be: what these may explain comes after them."""
+        found = self.fit(Problem(self.rich, loads))
+        pairs = zip(loads, found.changes(), strict=True)
+        return tuple(replace(load, model=change, sigma=SETTLED) for load, change in pairs)
 
     def _choose_bodies(
         self, parts: list[Equations], columns: tuple[Column, ...], loads: tuple[BodyChange, ...]

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 LEAST_SECONDS = 2.0  # of settled, untouched data; less tells an offset at best
 HELD_OUT = 3  # every third recording, or the last third of each
 WORSE = 1.01  # a row that is left larger than this on data held out keeps what is described
-MOST_TOUCHED = 0.6  # of the time; beyond it nobody can say which state is the usual one
+MOST_TOUCHED = 0.7  # of the time; beyond it nobody can say which state is the usual one
 ROUNDS = 3  # of fitting and finding touches
 
 

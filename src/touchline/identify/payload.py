@@ -14,9 +14,10 @@ Array = NDArray[np.float64]
 
 LIGHTEST = 0.03  # kg; less is left to the links' own corrections
 SURE = 4.0  # standard errors of the mass
-FARTHEST = 0.5  # m from the node's origin; a centre beyond it is not that of a tool
+FARTHEST = 0.25  # m from the flange; a mass centred farther off is an error of the links
 RADIUS = 0.05  # m, of gyration of a first guess
 SIGMA = 0.3  # prior of the steps from a first guess
+SETTLED = 0.01  # the same, once it has been fitted beside links that are as modelled
 CENTRE_SIGMA = 0.1  # m, prior of the centre, so that mass and offsets part where the data can
 
 
@@ -59,7 +60,9 @@ def guess_payload(equations: Equations, node: int) -> BodyChange | None:
     if mass < LIGHTEST or mass < SURE * error:
         return None
     centre = found[linear + 1 :] / mass
-    if np.linalg.norm(centre) > FARTHEST:
+    robot = equations.evidence.robot
+    flange = robot.places[payload_link(robot, node)].T_node_link[:3, 3]
+    if np.linalg.norm(centre - flange) > FARTHEST:
         return None
     ball = Inertia(mass, centre, mass * RADIUS**2 * np.eye(3))
     return BodyChange(node, body_vector(ball), SIGMA, added=True)
@@ -75,6 +78,4 @@ def payload_mass(found: Solution) -> tuple[float, float]:
 def seen_leaves(evidence: Evidence) -> list[int]:
     """Leaf nodes whose weight or motion some row feels."""
     model, used = evidence.model, evidence.used
-    return [
-        i for i in leaf_nodes(evidence.robot) if np.abs(model[:, used, i]).max(initial=0.0) > 0
-    ]
+    return [i for i in leaf_nodes(evidence.robot) if np.abs(model[:, used, i]).max(initial=0.0) > 0]

@@ -70,7 +70,11 @@ package_dirs: ["{data}"]
 KINOVA = """\
 name: gen3
 model: {data}/kinova_gen3/kinovaGen3V12.urdf
-log: {{time: {{column: Time, factor: 0.001}}, q: "Position{{i1}}", qd: "Velocity{{i1}}", tau: "TorqueSm{{i1}}"}}
+log:
+  time: {{column: Time, factor: 0.001}}
+  q: "Position{{i1}}"
+  qd: "Velocity{{i1}}"
+  tau: "TorqueSm{{i1}}"
 """
 KINOVA_LOGS = "kinova_gen3/opti_traj_testing1.csv", "kinova_gen3/opti_traj_testing2.csv"
 ARMS = (

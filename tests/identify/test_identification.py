@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is put into a robot is found again, and nothing that is not there."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from free_motion import free_motion
+from robots import random_robot
+
+import touchline as tl
+from touchline.identify.described import description_changes, identified_robot
+from touchline.identify.evidence import gather
+from touchline.identify.identification import identify
+from touchline.identify.payload import payload_mass
+from touchline.identify.physical import PhysicalBody, pseudo_inertia
+from touchline.identify.regressor import body_vector
+from touchline.model.robot import Robot
+
+SECONDS, RATE = 30.0, 100.0
+
+
+def arm(seed=0, sensors=0):
+    """A chain of five joints, with a sensor at its base if wanted."""
+    robot = random_robot(seed, sensors=max(sensors, 1), chain=True, bandwidth=20.0, movable=5)
+    if sensors:
+        return robot
+    return Robot(replace(robot.description, sensors=()), robot.mechanism)
+
+
+def recorded(robot, noise=0.01):
+    """Samples of a robot as it moves; its description is not applied to them."""
+    return free_motion(robot, SECONDS, RATE, seed=1, noise=noise)
+
+
+def test_residuals_are_those_of_the_native_observer():
+    robot = arm(1, sensors=2)
+    s = recorded(robot)
+    s.time[1000:] += 0.2  # a gap
+    evidence = gather(robot, [[s]], bandwidth=20.0)
+    estimate = tl.Observer(robot, bandwidth=20.0, method="paper").run(
+        s.time, s.q, s.qd, s.tau, s.wrench
+    )
+    native = np.concatenate([estimate.tau_ext, estimate.sensor_wrench.reshape(len(s), -1)], axis=1)
+    at = np.searchsorted(s.time, evidence.time)
+    np.testing.assert_allclose(evidence.residual(), native[at], atol=1e-9)
+
+
+def test_nothing_is_found_where_nothing_is_wrong():
+    found = identify(gather(arm(), [[recorded(arm())]]))
+    assert np.abs(found.solution.values).max(initial=0.0) < 0.01
+    assert payload_mass(found.solution)[0] == 0.0
+    assert (found.after <= 1.01 * found.before).all()
+
+
+def test_friction_and_offsets_are_found_again():
+    robot = arm()
+    s = recorded(robot)
+    truth = [(0.8, 0.05, 0.5, 0.3), (0.0, 0.05, 0.0, -0.2), (1.5, 0.02, 0.0, 0.0)]
+    for j, (coulomb, width, viscous, bias) in enumerate(truth):
+        s.tau[:, j] += coulomb * np.tanh(s.qd[:, j] / width) + viscous * s.qd[:, j] + bias
+    found = identify(gather(robot, [[s]]))
+    joints = identified_robot(found).description.joints
+    for joint, (coulomb, width, viscous, bias) in zip(joints, truth, strict=False):
+        assert joint.friction.coulomb == pytest.approx(coulomb, rel=0.05, abs=0.05)
+        assert joint.friction.viscous == pytest.approx(viscous, abs=0.05)
+        assert joint.bias == pytest.approx(bias, abs=0.05)
+        if coulomb:
+            assert joint.friction.coulomb_width == width
+    for value, error in zip(found.solution.values, found.solution.errors, strict=True):
+        assert error < 0.2 * max(abs(value), 0.5)
+
+
+def test_a_rotor_is_found_where_the_torque_is_that_of_the_motor():
+    robot = arm()
+    joints = tuple(replace(joint, torque="motor") for joint in robot.description.joints)
+    robot = Robot(replace(robot.description, joints=joints), robot.mechanism)
+    s = recorded(robot)
+    s.tau[:, 1] += 0.8 * np.gradient(s.qd[:, 1], s.time) + 2.0 * np.tanh(s.qd[:, 1] / 0.05)
+    joint = identified_robot(identify(gather(robot, [[s]]))).description.joints[1]
+    assert joint.rotor_inertia == pytest.approx(0.8, abs=0.03)
+    assert joint.friction.coulomb == pytest.approx(2.0, rel=0.05)
+
+
+def test_a_payload_is_found_and_the_written_robot_explains_the_motion():
+    robot = arm()
+    link = robot.mechanism.links["link5"]
+    heavier = replace(link.inertia, mass=link.inertia.mass + 0.0)
+    node = robot.places["link5"].node
+    from touchline.model.corrections import load_inertia
+    from touchline.model.description import Load
+    from touchline.model.transforms import combine_inertias
+
+    load = Load("link5", 1.2, (0.05, 0.0, 0.1), (0.004, 0.0, 0.0, 0.004, 0.0, 0.003))
+    body = combine_inertias([heavier, load_inertia(load)])
+    links = robot.mechanism.links | {"link5": replace(link, inertia=body)}
+    loaded = Robot(robot.description, replace(robot.mechanism, links=links))
+    assert loaded.nodes[node].inertia.mass > robot.nodes[node].inertia.mass
+    found = identify(gather(robot, [[recorded(loaded)]]))
+    mass, error = payload_mass(found.solution)
+    assert mass == pytest.approx(1.2, abs=0.02) and error < 0.02
+    new = identified_robot(found)
+    left = found.evidence.residual(new)
+    np.testing.assert_allclose(left, found.left(), atol=1e-3)
+    changes = description_changes(robot, new)
+    (written,) = changes["loads"]
+    assert written["com"] == pytest.approx([0.05, 0.0, 0.1], abs=0.01)
+
+
+def test_a_bias_of_a_sensor_is_found_while_the_arm_moves():
+    robot = arm(2, sensors=1)
+    s = recorded(robot)
+    bias = np.array([2.0, -1.0, 0.0, 0.3, 0.0, -0.2])
+    s.wrench[:, 0] += bias
+    sensor = identified_robot(identify(gather(robot, [[s]]))).description.sensors[0]
+    np.testing.assert_allclose(sensor.bias, bias, atol=0.1)
+
+
+def test_touches_are_left_out():
+    robot = arm()
+    s = recorded(robot)
+    s.tau[:, 0] += 0.5 * np.tanh(s.qd[:, 0] / 0.05)
+    touched = (s.time % 6.0 > 4.5) & (s.time % 6.0 < 5.5)
+    s.tau[touched] += np.array([6.0, 4.0, 3.0, 0.0, 0.0])
+    found = identify(gather(robot, [[s]]))
+    label = touched[np.searchsorted(s.time, found.evidence.time)]
+    assert found.touched[label].mean() > 0.95
+    assert found.touched[~label].mean() < 0.15
+    joint = identified_robot(found).description.joints[0]
+    assert joint.friction.coulomb == pytest.approx(0.5, abs=0.05)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_every_step_is_that_of_a_possible_body(seed):
+    rng = np.random.default_rng(seed)
+    vector = body_vector(arm(seed).nodes[2].inertia)
+    body = PhysicalBody(vector)
+    step = rng.normal(size=10) * rng.uniform(0.01, 0.7)
+    assert np.linalg.eigvalsh(pseudo_inertia(vector + body.change(step))).min() > -1e-9
+    assert np.abs(body.change(np.zeros(10))).max() < 1e-12
+    J, h = body.jacobian(step), 1e-6
+    for i in range(10):
+        away = np.eye(10)[i] * h
+        slope = (body.change(step + away) - body.change(step - away)) / (2 * h)
+        np.testing.assert_allclose(J[:, i], slope, atol=1e-5 * max(1.0, np.abs(J).max()))
