@@ -21,12 +21,51 @@ from touchline.report.facts import bandwidth_warnings, bandwidths
 STILL = 0.01  # rad/s or m/s
 
 
+GROSS = (  # words of findings that must be mended before weights mean anything
+    "opposite",
+    "swapped",
+    "use factor",
+    "look like degrees",
+    "polarity:",
+    "frame:",
+    "compensated:",
+    "always",
+    "no value",
+    "milliseconds",
+    "saturated",
+    "infinite",
+)
+
+
 def check_recording(robot: Robot, path: Path, findings: Findings) -> None:
-    """Read a log once and judge it.
+    """Judges a log.
+
+    Where weights are off and nothing coarser is wrong, what would explain them (a hand, a tilted
+    base) is found first, and the rest is judged as if that were mended.
 
     Raises:
         InputError: the log cannot be read, or holds no samples.
     """
+    from touchline.check.loads import explain_weights
+
+    plain = Findings()
+    _judge_recording(robot, path, plain)
+    coarse = any(word in line for line in plain.findings for word in GROSS)
+    explained, mended = Findings(), robot
+    if not coarse:
+        with open_log(path, robot.description) as log:
+            mended = explain_weights(robot, log.chunks(1 << 15), explained)
+    if mended is not robot:
+        plain = Findings()
+        _judge_recording(mended, path, plain)
+    for line in (*explained.findings, *plain.findings):
+        findings.find(line)
+    for section, lines in plain.notes.items():
+        findings.note(section, *lines)
+
+
+def _judge_recording(robot: Robot, path: Path, findings: Findings) -> None:
+    """Reads a log once and judges it by the robot as it is."""
     table = SignalTable(robot)
     stamps = maker = None
     with open_log(path, robot.description) as log:

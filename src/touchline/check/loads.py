@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What would explain that weights are off: a body too many or too few, or a base that is tilted."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.check.findings import Findings
+from touchline.identify.evidence import Evidence, gather
+from touchline.identify.identification import MOST_TOUCHED, touched_instants
+from touchline.identify.payload import payload_link
+from touchline.identify.touches import usual_scatter
+from touchline.model.description import Load, RobotDescription
+from touchline.model.mechanism import Inertia
+from touchline.model.robot import Robot
+from touchline.model.transforms import combine_inertias
+from touchline.observer.dynamics import gravity_loads
+from touchline.observer.samples import Samples
+
+Array = NDArray[np.float64]
+
+MOST = 400_000  # samples that are looked at
+OFFSET = 0.3  # Nm or N, 1 sigma: what offsets and friction leave in any row of a sound robot
+OFFSET_SHARE = 0.01  # the same, as a part of the largest reading
+CENTRE = 0.1  # m, 1 sigma of a payload's centre about a hand's breadth before the flange
+EXPLAINED = 0.6  # of what is off; less is no explanation
+LEAST_MASS, LEAST_TILT = 0.15, np.radians(1.5)  # kg, rad: smaller ones are not told
+SURE = 4.0  # standard errors
+ONE_POSE = 0.1  # rad
+EDGE = 1e-4  # rad; residuals change linearly with so small a tilt
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What would make up for what is off.
+
+    Attributes:
+        words: of the finding.
+        share: of the squares that it explains.
+        mended: the robot with it.
+    """
+
+    words: str
+    share: float
+    mended: Robot
+
+
+def explain_weights(robot: Robot, parts: Iterable[Samples], findings: Findings) -> Robot:
+    """Finds missing or surplus bodies and a tilted base; returns the robot as it then would be."""
+    try:
+        evidence = gather(robot, [_first(parts)])
+    except ValueError:
+        return robot
+    touched = touched_instants(evidence)
+    if touched.mean() > MOST_TOUCHED or not evidence.used.any():
+        return robot
+    evidence = evidence.part(~touched)
+    for _ in range(2):
+        best = max(_explanations(evidence, robot), key=lambda x: x.share, default=None)
+        if best is None or best.share < EXPLAINED:
+            break
+        findings.find(best.words)
+        robot = best.mended
+    return robot
+
+
+def _first(parts: Iterable[Samples]) -> Iterable[Samples]:
+    count = 0
+    for part in parts:
+        yield part
+        count += len(part)
+        if count > MOST:
+            return
+
+
+def _explanations(evidence: Evidence, robot: Robot) -> list[Explanation]:
+    left = evidence.residual(robot)
+    largest = np.abs(evidence.reading).max(axis=0)
+    noise = usual_scatter(left, evidence.used)
+    sigma = np.sqrt(np.maximum(OFFSET, OFFSET_SHARE * largest) ** 2 + noise**2)
+    found = [_payload(evidence, robot, left, sigma, node) for node in _ends(robot)]
+    found.append(_tilt(evidence, robot, left, sigma))
+    return [x for x in found if x is not None]
+
+
+def _ends(robot: Robot) -> list[int]:
+    """Nodes at the end of the tree: there hands and tools are mounted."""
+    parents = {node.parent for node in robot.nodes}
+    return [i for i, node in enumerate(robot.nodes) if i not in parents and node.links]
+
+
+def _payload(
+    evidence: Evidence, robot: Robot, left: Array, sigma: Array, node: int
+) -> Explanation | None:
+    A = evidence.model[:, :, node, :4]
+    if not np.abs(A[:, evidence.used]).max(initial=0.0) > 0.0:
+        return None
+    name = payload_link(robot, node)
+    T = robot.places[name].T_node_link
+    expected = T[:3, 3] + 0.5 * CENTRE * T[:3, 2]
+    # In terms of the mass and of the way of its centre from where a hand's would be.
+    A = np.concatenate([A[..., :1] + A[..., 1:] @ expected[:, None], A[..., 1:]], axis=-1)
+    prior = np.array([0.0, *np.full(3, (0.7 * CENTRE) ** -2.0)])
+    values, errors, share = _fit(A, left, sigma, evidence, prior)
+    mass, error = float(values[0]), float(errors[0])
+    if abs(mass) < max(LEAST_MASS, SURE * error):
+        return None
+    centre = expected + np.clip(values[1:] / mass, -CENTRE, CENTRE)
+    own = sum(robot.mechanism.links[x].inertia.mass for x in robot.nodes[node].links)
+    if mass < 0.0 and -mass > 1.05 * own:
+        return None
+    place = np.linalg.inv(T) @ np.append(centre, 1.0)
+    com = ", ".join(f"{x:.3f}" for x in place[:3])
+    pose = "; one pose alone cannot tell it from offsets" if _one_pose(evidence) else ""
+    what = f"{abs(mass):.2f} +- {max(error, 0.01):.2f} kg"
+    if mass > 0:
+        words = (
+            f"{what} are missing at {name} ({100 * share:.0f} % of what is off{pose}): a hand or "
+            f"tool that the model lacks? loads: [{{link: {name}, mass: {mass:.2f}, com: [{com}]}}]"
+        )
+        return Explanation(words, share, _loaded(robot, Load(name, mass, tuple(place[:3]))))
+    words = (
+        f"{what} too many at {name} ({100 * share:.0f} % of what is off{pose}): a hand that is "
+        f"modelled but not mounted? links: {{LINK: {{mass: 0.0}}}} for what is not there"
+    )
+    return Explanation(words, share, _lighter(robot, node, -mass))
+
+
+def _tilt(evidence: Evidence, robot: Robot, left: Array, sigma: Array) -> Explanation | None:
+    """The angles about the two level axes by which gravity would have to be turned."""
+    g = robot.gravity
+    size = float(np.linalg.norm(g))
+    if size == 0.0:
+        return None
+    down = g / size
+    level = np.linalg.svd(down[None])[2][1:]
+    A = np.stack([_turned(evidence, robot, np.cross(axis, g)) for axis in level], axis=-1)
+    values, errors, share = _fit(A, left, sigma, evidence, np.zeros(2))
+    angle, error = float(np.linalg.norm(values)), float(np.linalg.norm(errors))
+    if angle < max(LEAST_TILT, SURE * error) or angle > 0.7:
+        return None
+    new = g + sum(value * np.cross(axis, g) for value, axis in zip(values, level, strict=True))
+    new *= size / float(np.linalg.norm(new))
+    numbers = ", ".join(f"{x:.3f}" for x in new)
+    words = (
+        f"the base is tilted by {np.degrees(angle):.1f} +- {np.degrees(max(error, 2e-3)):.1f} "
+        f"degrees ({100 * share:.0f} % of what is off): gravity: [{numbers}]"
+    )
+    mechanism = replace(robot.mechanism, gravity=new)
+    return Explanation(words, share, Robot(robot.description, mechanism))
+
+
+def _turned(evidence: Evidence, robot: Robot, change: Array) -> Array:
+    """(N, R) what a small change of gravity, per unit, adds to the residual."""
+
+    def loads(gravity: Array) -> Array:
+        moved = Robot(robot.description, replace(robot.mechanism, gravity=gravity))
+        found = gravity_loads(moved, evidence.q)
+        wrench = found.wrench.reshape(len(evidence), -1)
+        return np.concatenate([found.torque, wrench], axis=1)
+
+    slope = (loads(robot.gravity + EDGE * change) - loads(robot.gravity)) / EDGE
+    return np.where(evidence.used & ~evidence.rows.silent & ~evidence.rows.weightless, slope, 0.0)
+
+
+def _fit(
+    A: Array, left: Array, sigma: Array, evidence: Evidence, prior: Array
+) -> tuple[Array, Array, float]:
+    """Values, standard errors and explained share of squares; an instant counts little."""
+    rows = evidence.used
+    X = (A[:, rows] / sigma[rows][:, None]).reshape(-1, A.shape[-1])
+    y = (left[:, rows] / sigma[rows]).ravel()
+    poses = _poses(evidence)
+    weight = poses / len(evidence)  # instants in one pose repeat each other
+    normal = weight * X.T @ X + np.diag(prior)
+    covariance = np.linalg.pinv(normal)
+    values = -covariance @ (weight * X.T @ y)
+    rest = y + X @ values
+    share = 1.0 - float(rest @ rest) / max(float(y @ y), 1e-12)
+    return values, np.sqrt(np.diag(covariance)), share
+
+
+def _poses(evidence: Evidence) -> float:
+    """How many poses that differ the recording shows, roughly."""
+    cells = np.unique(np.round(evidence.q / 0.3), axis=0)
+    return float(len(cells))
+
+
+def _one_pose(evidence: Evidence) -> bool:
+    return bool(np.ptp(evidence.q, axis=0).max(initial=0.0) < ONE_POSE)
+
+
+def _loaded(robot: Robot, load: Load) -> Robot:
+    link = robot.mechanism.links[load.link]
+    ball = Inertia(load.mass, np.array(load.com), 1e-3 * load.mass * np.eye(3))
+    links = robot.mechanism.links | {
+        load.link: replace(link, inertia=combine_inertias([link.inertia, ball]))
+    }
+    return _with_links(robot, robot.description, links)
+
+
+def _lighter(robot: Robot, node: int, mass: float) -> Robot:
+    """The robot with the masses of a node's links scaled down together."""
+    names = robot.nodes[node].links
+    own = sum(robot.mechanism.links[x].inertia.mass for x in names)
+    factor = max(0.0, 1.0 - mass / own)
+    links = dict(robot.mechanism.links)
+    for name in names:
+        body = links[name].inertia
+        scaled = Inertia(factor * body.mass, body.com, factor * body.inertia)
+        links[name] = replace(links[name], inertia=scaled)
+    return _with_links(robot, robot.description, links)
+
+
+def _with_links(robot: Robot, description: RobotDescription, links: dict) -> Robot:
+    return Robot(description, replace(robot.mechanism, links=links))
