@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every mistake that a user makes in a description or a log is named."""
 
+import os
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +13,9 @@ from free_motion import free_motion
 import touchline as tl
 from touchline.check.run import check
 from touchline.logs import write_table
+from touchline.model.robot import Robot
+
+REPOSITORY = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -168,9 +174,51 @@ def test_a_load_that_the_model_lacks(tmp_path, robot, recording):
     path.write_text(text + "loads:\n  - {link: tool, mass: 0.6, com: [0, 0, 0.05]}\n")
     loaded = free_motion(tl.load_robot(path), rate=100.0)
     findings = findings_of(tmp_path, robot, loaded)
-    found = [line for line in findings if "sensor wrist" in line]
-    assert len(found) == 1
-    assert "1.500 kg measured" in found[0] and "0.900 kg in the model" in found[0]
+    (found,) = findings
+    mass = re.match(r"(\S+) \+- \S+ kg are missing at tool", found)
+    assert mass is not None and abs(float(mass[1]) - 0.6) < 0.03
+    assert "loads: [{link: tool, mass: 0.6" in found
+
+
+def test_a_tool_that_is_modelled_but_not_mounted(tmp_path, robot, recording):
+    path = tmp_path / "robot.yaml"
+    text = robot.description.path.read_text()
+    path.write_text(text + "loads:\n  - {link: tool, mass: 0.6, com: [0, 0, 0.05]}\n")
+    findings = findings_of(tmp_path, robot, recording, str(path))
+    (found,) = findings
+    mass = re.match(r"(\S+) \+- \S+ kg too many at tool", found)
+    assert mass is not None and abs(float(mass[1]) - 0.6) < 0.03
+
+
+@pytest.mark.parametrize("degrees", [3.0, 5.0, 20.0])
+def test_a_base_that_is_tilted_is_told_as_such(tmp_path, robot, degrees):
+    angle = np.radians(degrees)
+    gravity = 9.81 * np.array([np.sin(angle), 0.0, -np.cos(angle)])
+    tilted = Robot(robot.description, replace(robot.mechanism, gravity=gravity))
+    findings = findings_of(tmp_path, robot, free_motion(tilted, rate=100.0))
+    told = [re.match(r"the base is tilted by (\S+) \+- .* gravity: \[(.*)\]", x) for x in findings]
+    assert all(told) and abs(float(told[0][1]) - degrees) < 0.5
+    numbers = [float(x) for x in told[-1][2].split(",")]
+    assert np.allclose(numbers, gravity, atol=0.2)
+
+
+@pytest.mark.parametrize("log", ["c2", "f2", "a4", "d3"])
+def test_a_real_panda_whose_hand_is_not_modelled(tmp_path, log):
+    data = Path(os.environ.get("TOUCHLINE_DATA", REPOSITORY.parent / "shared" / "data"))
+    path = data / "panda_touches" / f"{log}.csv.gz"
+    if not path.exists():
+        pytest.skip(f"no recordings at {data}: set TOUCHLINE_DATA")
+    pytest.importorskip("pinocchio", reason="comes with example-robot-data, the arms' models")
+    text = (REPOSITORY / "examples" / "robots" / "panda_hand.yaml").read_text()
+    fingers = "panda_leftfinger: {mass: 0.0}, panda_rightfinger: {mass: 0.0}"
+    robot = tmp_path / "robot.yaml"
+    robot.write_text(text + f"links: {{panda_hand: {{mass: 0.0}}, {fingers}}}\n")
+    found = [
+        re.match(r"(\S+) \+- \S+ kg are missing at panda_link8", x)
+        for x in check(robot, path).findings
+    ]
+    (mass,) = [float(m[1]) for m in found if m]
+    assert 0.5 <= mass <= 0.9
 
 
 def test_a_bandwidth_too_high_for_the_rate(tmp_path, robot):

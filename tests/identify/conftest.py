@@ -15,5 +15,5 @@ def data():
     folder = Path(os.environ.get("TOUCHLINE_DATA", REPOSITORY.parent / "shared" / "data"))
     if not folder.is_dir():
         pytest.skip(f"no recordings at {folder}: set TOUCHLINE_DATA")
-    pytest.importorskip("example_robot_data", reason="the arms' models")
+    pytest.importorskip("pinocchio", reason="comes with example-robot-data, the arms' models")
     return folder

@@ -29,6 +29,7 @@ EXPLAINED = 0.6  # of what is off; less is no explanation
 LEAST_MASS, LEAST_TILT = 0.15, np.radians(1.5)  # kg, rad: smaller ones are not told
 SURE = 4.0  # standard errors
 ONE_POSE = 0.1  # rad
+MOST_FOUND = 3
 EDGE = 1e-4  # rad; residuals change linearly with so small a tilt
 
 
@@ -57,7 +58,7 @@ def explain_weights(robot: Robot, parts: Iterable[Samples], findings: Findings) 
     if touched.mean() > MOST_TOUCHED or not evidence.used.any():
         return robot
     evidence = evidence.part(~touched)
-    for _ in range(2):
+    for _ in range(MOST_FOUND):
         best = max(_explanations(evidence, robot), key=lambda x: x.share, default=None)
         if best is None or best.share < EXPLAINED:
             break
@@ -77,6 +78,9 @@ def _first(parts: Iterable[Samples]) -> Iterable[Samples]:
 
 def _explanations(evidence: Evidence, robot: Robot) -> list[Explanation]:
     left = evidence.residual(robot)
+    first = evidence.robot.gravity  # that the equations were made with
+    if not np.array_equal(first, robot.gravity):
+        left += _weights(evidence, robot, robot.gravity) - _weights(evidence, robot, first)
     largest = np.abs(evidence.reading).max(axis=0)
     noise = usual_scatter(left, evidence.used)
     sigma = np.sqrt(np.maximum(OFFSET, OFFSET_SHARE * largest) ** 2 + noise**2)
@@ -138,11 +142,14 @@ def _tilt(evidence: Evidence, robot: Robot, left: Array, sigma: Array) -> Explan
     level = np.linalg.svd(down[None])[2][1:]
     A = np.stack([_turned(evidence, robot, np.cross(axis, g)) for axis in level], axis=-1)
     values, errors, share = _fit(A, left, sigma, evidence, np.zeros(2))
-    angle, error = float(np.linalg.norm(values)), float(np.linalg.norm(errors))
+    # Loads are linear in gravity, whose level part is the sine of the angle.
+    angle = float(np.arcsin(min(1.0, np.linalg.norm(values))))
+    error = float(np.linalg.norm(errors))
     if angle < max(LEAST_TILT, SURE * error) or angle > 0.7:
         return None
-    new = g + sum(value * np.cross(axis, g) for value, axis in zip(values, level, strict=True))
-    new *= size / float(np.linalg.norm(new))
+    new = np.cos(angle) * g
+    for value, axis in zip(values, level, strict=True):
+        new = new + value * np.cross(axis, g)
     numbers = ", ".join(f"{x:.3f}" for x in new)
     words = (
         f"the base is tilted by {np.degrees(angle):.1f} +- {np.degrees(max(error, 2e-3)):.1f} "
@@ -154,15 +161,17 @@ def _tilt(evidence: Evidence, robot: Robot, left: Array, sigma: Array) -> Explan
 
 def _turned(evidence: Evidence, robot: Robot, change: Array) -> Array:
     """(N, R) what a small change of gravity, per unit, adds to the residual."""
+    now, then = robot.gravity, robot.gravity + EDGE * change
+    return (_weights(evidence, robot, then) - _weights(evidence, robot, now)) / EDGE
 
-    def loads(gravity: Array) -> Array:
-        moved = Robot(robot.description, replace(robot.mechanism, gravity=gravity))
-        found = gravity_loads(moved, evidence.q)
-        wrench = found.wrench.reshape(len(evidence), -1)
-        return np.concatenate([found.torque, wrench], axis=1)
 
-    slope = (loads(robot.gravity + EDGE * change) - loads(robot.gravity)) / EDGE
-    return np.where(evidence.used & ~evidence.rows.silent & ~evidence.rows.weightless, slope, 0.0)
+def _weights(evidence: Evidence, robot: Robot, gravity: Array) -> Array:
+    """(N, R) what holds the robot at rest, as far as the readings show it."""
+    moved = Robot(robot.description, replace(robot.mechanism, gravity=gravity))
+    found = gravity_loads(moved, evidence.q)
+    loads = np.concatenate([found.torque, found.wrench.reshape(len(evidence), -1)], axis=1)
+    shown = evidence.used & ~evidence.rows.silent & ~evidence.rows.weightless
+    return np.where(shown, loads, 0.0)
 
 
 def _fit(
