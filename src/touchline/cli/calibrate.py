@@ -10,10 +10,11 @@ Method = Literal["rows", "scaled", "chi2", "glrt", "cusum"]
 
 
 def calibrate(
-    logs: Annotated[Positional[tuple[Path, ...]], arg(metavar="LOG [LOG ...]")],
+    logs: Annotated[Positional[tuple[Path, ...]], arg(metavar="LOG [LOG ...]")] = (),
     /,
-    robot: Annotated[str, arg(metavar="ROBOT")],
-    out: Annotated[Path, arg(metavar="ROBOT")],
+    robot: Annotated[str | None, arg(metavar="ROBOT")] = None,
+    out: Annotated[Path | None, arg(metavar="ROBOT")] = None,
+    plan: Annotated[str | None, arg(metavar="ROBOT")] = None,
     method: tuple[Method, ...] = (),
     false_alarms: Annotated[float | None, arg(metavar="PER_HOUR")] = None,
     trust: bool = False,
@@ -34,10 +35,17 @@ def calibrate(
     Stretches in which something seems to touch the robot are left out and listed. Where most of a
     recording seems touched it is refused, with the row that stands out.
 
+    With --plan ROBOT it proposes a motion of 40 s instead, within the limits of joints, speeds,
+    torques and of the arm's own links, and foretells what it will identify. It writes the motion
+    into the folder --out: as a table, as a JointTrajectory (YAML, JSON) and as Python lists; for an
+    arm with force-torque sensors also poses to rest in.
+    Example: touchline calibrate --plan robot.yaml --out motion
+
     Args:
         logs: Recordings of contact-free motion: tables (.parquet, .csv, .csv.gz) or rosbag2.
         robot: The robot.yaml, or the name of a robot that ships with Touchline (sara).
-        out: The new robot.yaml; may be the same file.
+        out: The new robot.yaml; may be the same file. With --plan: a folder.
+        plan: A robot that needs a motion to be identified by.
         method: Of detection: rows (a threshold per row), scaled (which grows with speed and
             acceleration), chi2 (all rows of a segment together), glrt (of several windows of the
             unfiltered loads; quick), cusum (of innovations; quick). Several may be named; an event
@@ -47,6 +55,12 @@ def calibrate(
         identify: False takes biases, friction and inertias as they are described.
         figure: Draws how often which statistic was exceeded, with the thresholds (.svg, .png).
     """
+    from touchline.errors import InputError
+
+    if plan is not None:
+        return _plan(plan, out or Path("motion"))
+    if robot is None or out is None:
+        raise InputError("calibrate: --robot and --out are needed, or --plan ROBOT")
     from touchline.calibrate.run import calibrate as run
     from touchline.calibrate.summary import summary_text
 
@@ -61,4 +75,15 @@ def calibrate(
 
         draw_calibration(result, figure)
         print(f"drawn:   {figure}")
+    return 0
+
+
+def _plan(robot: str, folder: Path) -> int:
+    from touchline.calibrate.plan import make_plan, write_plan
+    from touchline.model.robot import load_robot
+
+    plan = make_plan(load_robot(robot))
+    written = write_plan(plan, folder)
+    print(plan.text())
+    print("\nwritten: " + ", ".join(str(path) for path in written))
     return 0

@@ -165,10 +165,7 @@ class Equations:
         """The most likely parameters."""
         physical = [b.physical() for b in self.problem.bodies]
         linear = len(self.problem.columns)
-        prior = np.concatenate(
-            [np.zeros(linear), *(np.full(PARAMETERS, b.sigma**-2.0) for b in self.problem.bodies)]
-        )
-        prior[:linear] = self.prior()
+        prior = self.whole_prior()
         least = np.array([_least(self.evidence, c) for c in self.problem.columns])
         held = np.zeros(linear, dtype=bool)
         values, steps = np.zeros(linear), np.zeros((len(physical), PARAMETERS))
@@ -204,6 +201,16 @@ class Equations:
                 prior[i] += max(BIAS, BIAS_SHARE * largest) ** -2.0
         return prior
 
+    def whole_prior(self) -> Array:
+        """The same of all free numbers, the steps of the bodies last."""
+        bodies = [np.full(PARAMETERS, body.sigma**-2.0) for body in self.problem.bodies]
+        return np.concatenate([self.prior(), *bodies])
+
+    def jacobian_at_start(self) -> Array:
+        """Derivatives of the parameters with respect to the free numbers, at no change."""
+        physical = [body.physical() for body in self.problem.bodies]
+        return self._jacobian(physical, np.zeros((len(physical), PARAMETERS)))
+
     def _jacobian(self, physical: list[PhysicalBody], steps: Array) -> Array:
         linear = len(self.problem.columns)
         J = np.eye(linear + steps.size)
@@ -230,12 +237,7 @@ class Equations:
         physical = [b.physical() for b in self.problem.bodies]
         linear = len(self.problem.columns)
         J = self._jacobian(physical, found.steps)
-        prior = np.concatenate(
-            [
-                self.prior(),
-                *(np.full(PARAMETERS, b.sigma**-2.0) for b in self.problem.bodies),
-            ]
-        )
+        prior = self.whole_prior()
         bread = np.linalg.pinv(J.T @ self.normal @ J + np.diag(prior))
         numbers, at = np.unique(blocks[use], return_inverse=True)
         scores = np.zeros((len(numbers), len(self.gradient)))
