@@ -20,6 +20,7 @@ def calibrate(
     trust: bool = False,
     identify: bool = True,
     figure: Annotated[Path | None, arg(metavar="FILE")] = None,
+    pictures: Annotated[Path | None, arg(metavar="DIR")] = None,
 ) -> int:
     """Identifies what a robot's model lacks, its noise figures and its detection thresholds.
 
@@ -54,6 +55,7 @@ def calibrate(
         trust: Nothing touched the robot: what stands out is friction or the like, and counts.
         identify: False takes biases, friction and inertias as they are described.
         figure: Draws how often which statistic was exceeded, with the thresholds (.svg, .png).
+        pictures: Draws residuals before and after, and friction over speed, into this folder.
     """
     from touchline.errors import InputError
 
@@ -75,6 +77,11 @@ def calibrate(
 
         draw_calibration(result, figure)
         print(f"drawn:   {figure}")
+    if pictures is not None and result.identification is not None:
+        from touchline.calibrate.pictures import draw_identification
+
+        drawn = draw_identification(result.identification, pictures)
+        print(f"drawn:   {', '.join(str(path) for path in drawn)}")
     return 0
 
 

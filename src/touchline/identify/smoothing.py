@@ -4,7 +4,8 @@
     r+ = a r + (1 - a) e,   e = (p_k+1 - p_k) / dt - (u_k + u_k+1) / 2
 
 The poles are those of the native core with `automatic`: Tustin's up to K dt = 0.5. Gaps of up to
-two lost samples are bridged, longer ones begin anew at zero.
+two lost samples are bridged. The core bridges longer ones as well, with a doubt of its own; here
+the filter begins anew, since nothing shall be learnt from doubtful values.
 """
 
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-LONGEST = 3.5  # periods; an interval longer than this is not integrated over, as in the core
+LONGEST = 3.5  # periods; an interval longer than this is not integrated over
 SETTLING = 5.0  # time constants after a start
 
 
