@@ -127,13 +127,10 @@ def judge(arm: Arm, data: Path) -> Judgement:
     return Judgement(arm, rms(rest.residual()), rms(found.left(rest)))
 
 
-def tool_masses(data: Path) -> tuple[tuple[float, float], ...]:
+def tool_masses(data: Path) -> list[tuple[float, float]]:
     """Mass of the Kinova's tool and its standard error [kg], from each file alone."""
     robot = described(KINOVA, data)
-    masses = []
-    for log in KINOVA_LOGS:
-        masses.append(payload_mass(identify_all(read(robot, data / log))))
-    return tuple(masses)
+    return [payload_mass(identify_all(read(robot, data / log))) for log in KINOVA_LOGS]
 
 
 def described(text: str, data: Path) -> Robot:
