@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+# pyright: reportMissingImports=false
 """`franka://HOST`: a Franka arm, read at 1 kHz with franky-control; nothing is commanded."""
 
 import time

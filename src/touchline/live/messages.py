@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+# pyright: reportMissingImports=false
 """What is felt as ROS 2 messages.
 
 Contacts travel as JSON in a `std_msgs/String`, with the keys of `contacts.parquet`: no standard

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+# pyright: reportMissingImports=false
 """A ROS 2 lifecycle node that feels with a running robot and publishes what it feels.
 
     python -m touchline.live.node --ros-args -p robot:=robot.yaml -p source:=ros2://

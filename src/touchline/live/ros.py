@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+# pyright: reportMissingImports=false
 """`ros2://`: topics of joint states and wrenches, unsynchronised, matched by name."""
 
 import time

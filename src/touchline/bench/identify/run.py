@@ -116,11 +116,11 @@ class Judgement:
 def judge(arm: Arm, data: Path) -> Judgement:
     """Identifies an arm from the first half, and judges on the rest."""
     robot = described(arm.description, data)
-    if len(arm.logs) > 1:
-        first = read(robot, data / arm.logs[0])
-        rest = read(robot, data / arm.logs[1])
+    recordings = [read(robot, data / log) for log in arm.logs]
+    if len(recordings) > 1:
+        first, rest = recordings[:2]
     else:
-        whole = read(robot, data / arm.logs[0])
+        (whole,) = recordings
         index = np.arange(len(whole))
         first, rest = whole.part(index < len(index) // 2), whole.part(index >= len(index) // 2)
     found = identify(first)
