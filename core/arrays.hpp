@@ -77,6 +77,39 @@ inline nb::object line(const std::vector<double>& values) {
   return out.release();
 }
 
+// Columns of an array of float64 (..., width) as a view: (..., count), or (..., count / columns,
+// columns) unless `columns` is 0.
+inline nb::object view(nb::handle object, std::size_t first, std::size_t count,
+                       std::size_t columns) {
+  if (!PyArray_Check(object.ptr())) throw nb::type_error("not an array");
+  PyArrayObject* array = reinterpret_cast<PyArrayObject*>(object.ptr());
+  constexpr int kMostAxes = 4;
+  const int axes = PyArray_NDIM(array);
+  if (PyArray_TYPE(array) != NPY_DOUBLE || axes < 1 || axes > kMostAxes ||
+      static_cast<std::size_t>(PyArray_DIMS(array)[axes - 1]) < first + count)
+    throw nb::type_error("not an array of float64 with these columns");
+  npy_intp dims[kMostAxes + 1], strides[kMostAxes + 1];
+  std::copy_n(PyArray_DIMS(array), axes, dims);
+  std::copy_n(PyArray_STRIDES(array), axes, strides);
+  const npy_intp step = strides[axes - 1];
+  const bool split = columns > 0;
+  dims[axes - 1] = static_cast<npy_intp>(split ? count / columns : count);
+  if (split) {
+    dims[axes] = static_cast<npy_intp>(columns);
+    strides[axes] = step;
+    strides[axes - 1] = static_cast<npy_intp>(columns) * step;
+  }
+  char* data = PyArray_BYTES(array) + static_cast<npy_intp>(first) * step;
+  nb::object out = nb::steal(PyArray_NewFromDescr(
+      &PyArray_Type, PyArray_DescrFromType(NPY_DOUBLE), axes + (split ? 1 : 0), dims, strides,
+      data, PyArray_FLAGS(array) & NPY_ARRAY_WRITEABLE, nullptr));
+  if (!out.is_valid()) throw nb::python_error();
+  object.inc_ref();
+  if (PyArray_SetBaseObject(reinterpret_cast<PyArrayObject*>(out.ptr()), object.ptr()) < 0)
+    throw nb::python_error();
+  return out;
+}
+
 // Numbers row by row as a new array.
 inline nb::object table(const std::vector<double>& values, std::size_t columns) {
   Out out({values.size() / columns, columns});

@@ -232,6 +232,9 @@ NB_MODULE(TOUCHLINE_MODULE, m) {
   localization::bind(m);
   detection::bind(m);
   pipelines::bind(m);
+  m.def("view", &arrays::view, "rows"_a, "first"_a, "count"_a, "columns"_a,
+        nb::sig("def view(rows: " TOUCHLINE_ARRAY ", first: int, count: int, columns: int) -> "
+                TOUCHLINE_ARRAY));
   nb::class_<Observer>(m, "Observer")
       .def("__init__",
            [](Observer* self, std::vector<tl::Node> nodes, const std::vector<double>& gravity,

@@ -7,9 +7,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from touchline.model.robot import Robot
+from touchline.native import core
 from touchline.value import Value, told_shortly
 
 Array = NDArray[np.float64]
+
+view = core.view
 
 METHODS = ("segment", "paper")
 DISCRETIZATIONS = ("automatic", "tustin", "exponential")
@@ -42,12 +45,12 @@ class Estimate(Value):
         """Other rows of the same observer."""
         return Estimate(rows, self._slices)
 
-    def _part(self, name: str) -> Array:
-        return self.rows[..., self._slices[name]]
+    def _part(self, name: str, columns: int = 0) -> Array:
+        part = self._slices[name]
+        return view(self.rows, part.start, part.stop - part.start, columns)
 
     def _wrenches(self, name: str) -> Array:
-        part = self._part(name)
-        return part.reshape(*part.shape[:-1], part.shape[-1] // 6, 6)
+        return self._part(name, 6)
 
     @property
     def tau_ext(self) -> Array:
@@ -110,14 +113,14 @@ class Estimate(Value):
     @property
     def segment_gap_std(self) -> Array:
         """The same (m, 2) [N, Nm] of each segment's force, and moment about its own sensor."""
-        part = self._part("segment_gap_std")
-        return part.reshape(*part.shape[:-1], part.shape[-1] // 2, 2)
+        return self._part("segment_gap_std", 2)
 
     @property
     def health(self) -> Any:
         """Health bits (see `touchline.Health`): an int, or (N,) integers for a recording."""
-        value = self._part("health")[..., 0].astype(np.uint32)
-        return int(value) if value.ndim == 0 else value
+        if self.rows.ndim == 1:
+            return int(self.rows[self._slices["health"].start])
+        return self._part("health")[..., 0].astype(np.uint32)
 
 
 class Observer:

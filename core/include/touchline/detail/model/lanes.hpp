@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
 
 namespace touchline {
 
@@ -33,6 +34,50 @@ inline void set_lane(double& v, int, double x) { v = x; }
 inline double lane(const Lanes& v, int i) { return v[i]; }
 inline void set_lane(Lanes& v, int i, double x) { v[i] = x; }
 #endif
+
+// The lanes moved on by one: the first takes the last of `before`.
+inline Lanes shifted(const Lanes& before, const Lanes& v) {
+  Lanes out = v;
+#if defined(__GNUC__) || defined(__clang__)
+#if defined(__AVX__)
+  out = __builtin_shufflevector(before, v, 3, 4, 5, 6);
+#else
+  out = __builtin_shufflevector(before, v, 1, 2);
+#endif
+#else
+  out = before;
+#endif
+  return out;
+}
+
+// kLanes rows of as many lanes, turned: lane k of row i becomes lane i of row k.
+inline void transpose(Lanes* rows) {
+#if defined(__AVX__) && (defined(__GNUC__) || defined(__clang__))
+  const Lanes a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 2, 6);
+  const Lanes b = __builtin_shufflevector(rows[0], rows[1], 1, 5, 3, 7);
+  const Lanes c = __builtin_shufflevector(rows[2], rows[3], 0, 4, 2, 6);
+  const Lanes d = __builtin_shufflevector(rows[2], rows[3], 1, 5, 3, 7);
+  rows[0] = __builtin_shufflevector(a, c, 0, 1, 4, 5);
+  rows[1] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
+  rows[2] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
+  rows[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
+#else
+  for (int i = 0; i < kLanes; ++i) {
+    for (int k = 0; k < i; ++k) {
+      const double swapped = lane(rows[i], k);
+      set_lane(rows[i], k, lane(rows[k], i));
+      set_lane(rows[k], i, swapped);
+    }
+  }
+#endif
+}
+
+inline Lanes load_lanes(const double* from) {
+  Lanes v;
+  std::memcpy(&v, from, sizeof v);
+  return v;
+}
+inline void store_lanes(const Lanes& v, double* to) { std::memcpy(to, &v, sizeof v); }
 
 inline Lanes all_lanes(double x) { return Lanes{} + x; }
 

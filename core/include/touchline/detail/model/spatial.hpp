@@ -88,30 +88,45 @@ BasicMat3<T> identity() {
 }
 
 // Pose of a frame B in A: x_A = R x_B + p.
-struct Pose {
-  Mat3 R = identity<double>();
-  Vec3 p;
+template <class T>
+struct BasicPose {
+  BasicMat3<T> R = identity<T>();
+  BasicVec3<T> p;
 };
+using Pose = BasicPose<double>;
 
 // A wrench from frame B to A, with the pose of B in A.
-inline Spatial wrench_to_parent(const Pose& X, const Spatial& w) {
-  const Vec3 f = X.R * w.linear;
+template <class T>
+BasicSpatial<T> wrench_to_parent(const BasicPose<T>& X, const BasicSpatial<T>& w) {
+  const BasicVec3<T> f = X.R * w.linear;
   return {f, X.R * w.angular + cross(X.p, f)};
 }
 // A wrench from frame A to B, with the pose of B in A.
-inline Spatial wrench_to_child(const Pose& X, const Spatial& w) {
+template <class T>
+BasicSpatial<T> wrench_to_child(const BasicPose<T>& X, const BasicSpatial<T>& w) {
   return {transposed_times(X.R, w.linear),
           transposed_times(X.R, w.angular - cross(X.p, w.linear))};
 }
 
-inline Vec3 load_vector(const double* in) { return {in[0], in[1], in[2]}; }
-inline Mat3 load_rotation(const double* in) {
+template <class T>
+BasicVec3<T> load_vector(const T* in) {
+  return {in[0], in[1], in[2]};
+}
+template <class T>
+BasicMat3<T> load_rotation(const T* in) {
   return {load_vector(in), load_vector(in + 3), load_vector(in + 6)};
 }
-inline Pose load_pose(const double* in) { return {load_rotation(in), load_vector(in + 9)}; }
-inline Spatial load(const double* in) { return {{in[0], in[1], in[2]}, {in[3], in[4], in[5]}}; }
+template <class T>
+BasicPose<T> load_pose(const T* in) {
+  return {load_rotation(in), load_vector(in + 9)};
+}
+template <class T>
+BasicSpatial<T> load(const T* in) {
+  return {load_vector(in), load_vector(in + 3)};
+}
 
-inline void store(const Spatial& a, double* out) {
+template <class T>
+void store(const BasicSpatial<T>& a, T* out) {
   out[0] = a.linear.x;
   out[1] = a.linear.y;
   out[2] = a.linear.z;

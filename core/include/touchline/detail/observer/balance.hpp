@@ -68,6 +68,11 @@ class Balances {
   // Does any e of this instant span a gap?
   bool bridged() const { return bridged_; }
 
+  std::size_t size() const { return p_.size(); }
+  // Momenta and loads of the last sample, all rows; for those who go on by other means.
+  double* momenta() { return p_.data(); }
+  double* loads() { return u_.data(); }
+
   void begin(const Instant& now) {
     bridged_ = false;
     p_.swap(p_before_);

@@ -56,6 +56,8 @@ class Channels {
   std::size_t segment(std::size_t g) const { return joints_.size() + g; }
   std::size_t sensor(std::size_t s) const { return joints_.size() + segments_ + s; }
   std::size_t local(std::size_t s) const { return local_balances_[s]; }
+  // The first row of all sensors, six each, among those of the balances.
+  std::size_t sensor_rows() const { return joints_.size() + 6 * segments_; }
 
   // Numbers of groups of filters: all of a joint's external torque, without what the next sensors
   // outboard see, without what the sensor inboard sees; then the wrenches.

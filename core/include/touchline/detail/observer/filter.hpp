@@ -80,10 +80,21 @@ class Filters {
   const double* half_change(std::size_t g) const { return half_change_.data() + groups_[g].first; }
   const double* surprise(std::size_t g) const { return surprise_.data() + groups_[g].first; }
 
+  std::size_t size() const { return value_.size(); }
+  double* values() { return value_.data(); }
+  // The poles of all rows for a step of `dt` [s].
+  void write_poles(double dt, double* out) {
+    if (dt != dt_) set_poles(dt);
+    std::copy(keep_.begin(), keep_.end(), out);
+  }
+
   // Poles of all rows for the interval from the sample before: without more ado, all filter.
   void begin(const Instant& now) {
     const double dt = now.time - now.before;
-    if (dt == dt_) return;
+    if (dt != dt_) set_poles(dt);
+  }
+
+  void set_poles(double dt) {
     for (std::size_t h = 0; h < poles_.size(); ++h) poles_[h] = pole_of(h, dt);
     if (poles_.size() == 1) {
       std::fill(keep_.begin(), keep_.end(), poles_[0]);

@@ -20,6 +20,7 @@
 #include "touchline/detail/observer/projections.hpp"
 #include "touchline/detail/observer/readings.hpp"
 #include "touchline/detail/observer/row.hpp"
+#include "touchline/detail/observer/side_by_side.hpp"
 #include "touchline/detail/observer/signals.hpp"
 #include "touchline/detail/observer/terms.hpp"
 #include "touchline/detail/observer/tuning.hpp"
@@ -46,10 +47,11 @@ class Observer {
         row_{count(joints_), count(sensors_), count(layout_.segments)},
         writer_(row_, terms_.at(), layout_, sensors_, method),
         frames_((kLanes + 1) * terms_.at().width(), 0.0),
-        packed_q_(2 * joints_.size()),
         sensor_present_(sensors_.size(), 0),
         output_(row_.width(), kNaN),
-        clock_(tuning) {
+        clock_(tuning),
+        side_by_side_(layout_, joints_, sensors_, channels_, packed_, projections_, torques_,
+                      wrenches_, row_) {
     for (int i = 0; i < kLanes; ++i) ahead_[i] = frames_.data() + i * terms_.at().width();
     before_ = frames_.data() + kLanes * terms_.at().width();
     const double tolerance = tuning.limit_tolerance;
@@ -68,7 +70,7 @@ class Observer {
     return step({time, q, qd, tau, wrench});
   }
   const double* step(const Sample& sample) {
-    terms_.evaluate(sample.q, sample.qd, ahead_.data());
+    terms_.evaluate(sample.q, sample.qd, ahead_[0]);
     advance(sample, ahead_[0], output_.data(), output_.data());
     return output_.data();
   }
@@ -80,6 +82,7 @@ class Observer {
            const double* tau, const double* wrench, double* out, Each&& each) {
     const std::size_t n = joints_.size(), w = 6 * sensors_.size(), width = output_.size();
     const double* last = output_.data();
+    leave_lanes();
     for (std::size_t i = 0; i < samples; ++i) {
       const std::size_t k = i % kLanes;
       if (k == 0) look_ahead(samples - i, q + i * n, qd + i * n);
@@ -91,9 +94,25 @@ class Observer {
     if (samples > 0) std::copy_n(last, width, output_.begin());
   }
 
+  // The same, as fast as it goes: as long as nothing happens, several samples side by side.
   void run(std::size_t samples, const double* time, const double* q, const double* qd,
            const double* tau, const double* wrench, double* out) {
-    run(samples, time, q, qd, tau, wrench, out, [](const double*) {});
+    const std::size_t n = joints_.size(), w = 6 * sensors_.size(), width = output_.size();
+    const auto nothing = [](const double*) {};
+    const double* last = output_.data();
+    for (std::size_t i = 0; i < samples;) {
+      const std::size_t left = samples - i, count = std::min<std::size_t>(kLanes, left);
+      double* rows = out + i * width;
+      const Sample first{time[i], q + i * n, qd + i * n, tau + i * n, wrench + i * w};
+      if (count < kLanes || !step_together(first, time + i, rows)) {
+        if (last != output_.data()) std::copy_n(last, width, output_.begin());
+        run(count, time + i, first.q, first.qd, first.tau, first.wrench, rows, nothing);
+      }
+      i += count;
+      last = out + (i - 1) * width;
+    }
+    leave_lanes();
+    if (samples > 0) std::copy_n(last, width, output_.begin());
   }
 
   // Forgets everything: the next sample starts anew.
@@ -158,16 +177,51 @@ class Observer {
     const std::size_t n = joints_.size();
     if (left < kLanes) {
       for (std::size_t k = 0; k < left; ++k)
-        terms_.evaluate(q + k * n, qd + k * n, ahead_.data() + k);
+        terms_.evaluate(q + k * n, qd + k * n, ahead_[k]);
       return;
     }
-    for (std::size_t j = 0; j < n; ++j) {
-      for (int k = 0; k < kLanes; ++k) {
-        set_lane(packed_q_[j], k, q[k * n + j]);
-        set_lane(packed_q_[n + j], k, qd[k * n + j]);
+    side_by_side_.evaluate(q, qd);
+    for (int k = 0; k < kLanes; ++k) side_by_side_.copy_terms(k, ahead_[k]);
+  }
+
+  // kLanes samples at once; or nothing, if one of them is not as usual. `first`: of them.
+  bool step_together(const Sample& first, const double* time, double* out) {
+    if (!steady_ || !writer_.all_settled() || !side_by_side_.possible()) return false;
+    if (channels_.filters.doubtful()) return false;
+    const std::size_t n = joints_.size(), w = 6 * sensors_.size();
+    Clock clock = clock_;
+    Health health[kLanes] = {};
+    Instant now[kLanes], before = now_;
+    for (int k = 0; k < kLanes; ++k) {
+      if (clock.take(time[k], health[k]) != Clock::Verdict::accepted) return false;
+      now[k] = {time[k], before.time, clock.period(), clock.usual_step()};
+      before = now[k];
+      const Sample sample{time[k], first.q + k * n, first.qd + k * n, first.tau + k * n,
+                          first.wrench + k * w};
+      health[k] |= judge_state(sample);
+      if ((health[k] & ~kModelLimit) != 0 || !now[k].usual(now[k].before)) return false;
+      if (!torques_.sound(sample.tau)) return false;
+      for (std::size_t s = 0; s < sensors_.size(); ++s) {
+        if (!wrenches_[s].sound(sample.wrench + 6 * s)) return false;
       }
     }
-    packed_.evaluate(packed_q_.data(), packed_q_.data() + n, ahead_.data());
+    if (!in_lanes_) side_by_side_.enter(before_);
+    in_lanes_ = true;
+    side_by_side_.evaluate(first.q, first.qd);
+    side_by_side_.balance(first.tau, first.wrench, now);
+    compare(side_by_side_.projected(), side_by_side_.e(), side_by_side_.inputs());
+    side_by_side_.filter(now);
+    side_by_side_.write(writer_.quality(), health, out);
+    clock_ = clock;
+    now_ = now[kLanes - 1];
+    return true;
+  }
+
+  // What the samples side by side have left behind, for those that come one by one.
+  void leave_lanes() {
+    if (!in_lanes_) return;
+    side_by_side_.leave(before_);
+    in_lanes_ = false;
   }
 
   // The sequential part of a step. `terms`: those of the sample, exchanged for room for others;
@@ -177,7 +231,6 @@ class Observer {
     if (!accept(sample, health, last, out)) return;
     std::swap(terms, before_);
     const double *now = before_, *earlier = terms;
-    const std::size_t joint = channels_.joint(0), sensor = channels_.sensor(0);
     channels_.balances.begin(now_);
     channels_.filters.begin(now_);
     const bool complete = read(sample, now, health);
@@ -191,8 +244,7 @@ class Observer {
     }
     channels_.balances.balance();
     if (!steady) channels_.balances.blank();
-    projections_.project(earlier, now, channels_.balances.e(sensor));
-    compare(channels_.balances.e(joint));
+    project(earlier, now);
     if (!steady) channels_.decide(now_);
     channels_.filters.run();
     writer_.write(channels_, now_, steady, now, health, out);
@@ -291,18 +343,32 @@ class Observer {
   // How much the known loads of all filters have changed over a gap.
   void compare_loads(const double* earlier, const double* now) {
     channels_.balances.compare_loads();
-    projections_.project(earlier, now, channels_.balances.e(channels_.sensor(0)));
-    compare(channels_.balances.e(channels_.joint(0)));
+    project(earlier, now);
     channels_.filters.take_load_changes();
   }
 
-  // The inputs of all filters, from the innovations of all balances.
-  void compare(double* e) {
-    Filters& filters = channels_.filters;
-    const double* projected = projections_.values();
+  // From the balances to the inputs of the filters, with the terms at both ends of the interval.
+  void project(const double* earlier, const double* now) {
+    double* e = channels_.balances.e(0);
+    projections_.project(earlier, now, e + channels_.sensor_rows());
+    compare(projections_.values(), e, channels_.filters.input(0));
+  }
+
+  // The inputs of all filters, from the innovations `e` of all balances and what these do to the
+  // joints.
+  template <class T>
+  void compare(const T* projected, T* e, T* inputs) const {
+    const Balances& balances = channels_.balances;
+    const Filters& filters = channels_.filters;
+    const auto sum = [projected, this](const std::vector<Projection>& pairs) {
+      T total{};
+      for (const Projection& pair : pairs) total += projected[projections_.at(pair)];
+      return total;
+    };
     for (std::size_t j : sources_) e[j] = sum(layout_.source_sensors[j]);
-    double* external = filters.input(channels_.external(0));
-    double *own = filters.input(channels_.own(0)), *parity = filters.input(channels_.parity(0));
+    T *external = inputs + filters.group(channels_.external(0)).first,
+      *own = inputs + filters.group(channels_.own(0)).first,
+      *parity = inputs + filters.group(channels_.parity(0)).first;
     for (std::size_t j = 0; j < joints_.size(); ++j) {
       external[j] = e[j];
       own[j] = e[j] - projected[outboard_[j]];
@@ -311,21 +377,16 @@ class Observer {
     for (std::size_t j : forks_) own[j] = e[j] - sum(layout_.outboard_sensors[j]);
     for (std::size_t j : branches_)  // what loads the sensor, but neither the joint nor its segment
       parity[j] += sum(layout_.inboard_sensors[j]) - projected[inboard_[j]];
-    std::copy_n(channels_.balances.e(channels_.segment(0)), 6 * row_.segments,
-                filters.input(channels_.segment_filter(0)));
+    std::copy_n(e + balances.group(channels_.segment(0)).first, 6 * row_.segments,
+                inputs + filters.group(channels_.segment_filter(0)).first);
     for (std::size_t s = 0; s < sensors_.size(); ++s) {
       const Channels::SensorFilter kind = channels_.kind(s);
       if (kind == Channels::SensorFilter::none) continue;
       const bool local = kind == Channels::SensorFilter::local;
-      std::copy_n(channels_.balances.e(local ? channels_.local(s) : channels_.sensor(s)), 6,
-                  filters.input(channels_.sensor_filter(s)));
+      const std::size_t balance = local ? channels_.local(s) : channels_.sensor(s);
+      std::copy_n(e + balances.group(balance).first, 6,
+                  inputs + filters.group(channels_.sensor_filter(s)).first);
     }
-  }
-
-  double sum(const std::vector<Projection>& pairs) const {
-    double total = 0.0;
-    for (const Projection& pair : pairs) total += projections_.values()[projections_.at(pair)];
-    return total;
   }
 
   const Tree tree_;
@@ -344,15 +405,16 @@ class Observer {
   std::vector<double> frames_;  // terms of the sample before and of those at work
   std::array<double*, kLanes> ahead_{};
   double* before_ = nullptr;
-  std::vector<Lanes> packed_q_;  // positions, then velocities
   std::vector<char> sensor_present_;
   // Joints that are read from sensors; with several sensors outboard; with some on other branches.
   std::vector<std::size_t> sources_, forks_, branches_;
   std::vector<std::size_t> outboard_, inboard_;   // per joint: where its projections stand
   std::vector<double> output_;
   Clock clock_;
+  SideBySide side_by_side_;
   Instant now_;
   bool started_ = false, steady_ = false;
+  bool in_lanes_ = false;  // is the state of the last sample with those side by side?
 };
 
 }  // namespace touchline

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "touchline/detail/model/lanes.hpp"
 #include "touchline/detail/observer/balance.hpp"
 #include "touchline/detail/observer/layout.hpp"
 #include "touchline/detail/observer/terms.hpp"
@@ -42,6 +43,26 @@ class Projections {
       if (needed_[s]) multiply(mean_.data(), lines_, e + 6 * s, values_.data() + s * lines_);
     }
   }
+
+  // The same for samples side by side. `before`: terms of the samples before these, in whose last
+  // lane is the one before the first.
+  void project(const Lanes* before, const Lanes* terms, const Lanes* e, std::size_t used,
+               Lanes* values) const {
+    for (std::size_t i = 0; i < used; ++i) {
+      Lanes S[6];
+      for (std::size_t c = 0; c < 6; ++c) {
+        const std::size_t at = first_ + c * lines_ + i;
+        S[c] = 0.5 * (shifted(before[at], terms[at]) + terms[at]);
+      }
+      for (std::size_t s = 0; s < needed_.size(); ++s) {
+        if (!needed_[s]) continue;
+        const Lanes* w = e + 6 * s;
+        values[s * lines_ + i] = (S[0] * w[0] + S[1] * w[1] + S[2] * w[2]) +
+                                 (S[3] * w[3] + S[4] * w[4] + S[5] * w[5]);
+      }
+    }
+  }
+  std::size_t room() const { return values_.size(); }
 
  private:
   static void average(const double* __restrict a, const double* __restrict b,

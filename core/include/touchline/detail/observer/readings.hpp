@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "touchline/detail/model/lanes.hpp"
 #include "touchline/detail/model/spatial.hpp"
 #include "touchline/detail/observer/balance.hpp"
 #include "touchline/detail/observer/health.hpp"
@@ -29,6 +30,27 @@ class JointReadings {
                                          : kNoLimit);
     }
     present_ = measured_;
+  }
+
+  // The same for samples side by side, all of which are usable: `logged` (kLanes, n).
+  void read(const double* logged, const Lanes* qd, const Lanes* n_bar, Lanes* u) const {
+    const std::size_t n = slope_.size();
+    for (std::size_t j = 0; j < n; ++j) {
+      Lanes tau;
+      for (int k = 0; k < kLanes; ++k) set_lane(tau, k, logged[k * n + j]);
+      u[j] = slope_[j] * tau - offset_[j] - viscous_[j] * qd[j] - n_bar[j];
+    }
+    for (std::size_t j : rough_) {
+      for (int k = 0; k < kLanes; ++k) {
+        const double speed = lane(qd[j], k);
+        const double friction = joints_[j].coulomb * std::tanh(speed / joints_[j].coulomb_width);
+        set_lane(u[j], k, lane(u[j], k) - friction);
+      }
+    }
+  }
+  // Are all torques of one sample usable and within their ranges?
+  bool sound(const double* logged) const {
+    return all_below(logged, limits_.data(), limits_.size());
   }
 
   // Per joint: was its last torque usable?
@@ -85,6 +107,21 @@ class SensorReading {
   explicit SensorReading(const SensorRow& sensor)
       : sensor_(sensor), usual_(sensor.six_axis() && !sensor.turned) {
     for (int i = 0; i < 6; ++i) limits_[i] = safe_limit(sensor.range[i]);
+  }
+
+  // All axes, logged in those of the sensor?
+  bool usual() const { return usual_; }
+  // Is a reading of such a sensor usable and within its range?
+  bool sound(const double* logged) const { return all_below(logged, limits_, 6); }
+  // Of such a sensor, for samples side by side that are sound; `stride`: from one to the next.
+  BasicSpatial<Lanes> read(const double* logged, std::size_t stride) const {
+    Lanes w[6];
+    for (int i = 0; i < 6; ++i) {
+      Lanes v;
+      for (int k = 0; k < kLanes; ++k) set_lane(v, k, logged[k * stride + i]);
+      w[i] = sensor_.sign * v - sensor_.bias[i];
+    }
+    return touchline::load(w);
   }
 
   // From six logged numbers. `R_world_sensor`, `R_world_log`: of the sensor frame and, for a

@@ -63,6 +63,10 @@ class RowWriter {
     write_health(health | (all_settled_ ? 0 : kSettling), out);
   }
 
+  bool all_settled() const { return all_settled_; }
+  // What stands from `joint_settled` on as long as no gap and no restart comes.
+  const std::vector<double>& quality() const { return quality_; }
+
   // Nothing is known at this sample.
   void write_nothing(Health health, double* out) const {
     std::fill_n(out, row_.joint_settled(), kNaN);

@@ -54,9 +54,9 @@ class Terms {
   // Brings the tree to joint positions q and velocities qd.
   void sweep(const T* q, const T* qd) { tree_.sweep(q, qd, state_); }
 
-  // The same, and writes one row of `at().width()` numbers per lane; joint rows are without what
+  // The same, and writes a row of `at().width()` numbers; joint rows are without what
   // the joint's driver has already taken out of its torque.
-  void evaluate(const T* q, const T* qd, double* const* out) {
+  void evaluate(const T* q, const T* qd, T* out) {
     sweep(q, qd);
     std::size_t line = 0;
     for (std::size_t j = 0; j < joints_.size(); ++j) {
@@ -131,7 +131,7 @@ class Terms {
     return dot(a, turns(i) ? weight_moment(i) : weight(i));
   }
 
-  void put_line(double* const* out, std::size_t line, int i, const Vector& a) const {
+  void put_line(T* out, std::size_t line, int i, const Vector& a) const {
     const std::size_t linear = at_.subspaces() + line, angular = linear + 3 * at_.lines;
     if (turns(i)) {
       put(out, linear, cross(state_.node(i).p, a), at_.lines);
@@ -142,7 +142,7 @@ class Terms {
     }
   }
 
-  void put_sensor(double* const* out, std::size_t s) const {
+  void put_sensor(T* out, std::size_t s) const {
     const SensorRow& sensor = sensors_[s];
     const NodeState<T>& node = state_.node(sensor.node);
     const std::size_t first = at_.sensor(s);
@@ -166,15 +166,15 @@ class Terms {
     put(out, first + TermsLayout::kLocalBias + 3, n.angular);
   }
 
-  static void put(double* const* out, std::size_t at, const T& value) {
-    for (int i = 0; i < LaneCount<T>::value; ++i) out[i][at] = lane(value, i);
+  static void put(T* out, std::size_t at, const T& value) {
+    out[at] = value;
   }
-  static void put(double* const* out, std::size_t at, const Vector& v, std::size_t stride = 1) {
+  static void put(T* out, std::size_t at, const Vector& v, std::size_t stride = 1) {
     put(out, at, v.x);
     put(out, at + stride, v.y);
     put(out, at + 2 * stride, v.z);
   }
-  static void put(double* const* out, std::size_t at, const BasicMat3<T>& m) {
+  static void put(T* out, std::size_t at, const BasicMat3<T>& m) {
     put(out, at, m.x);
     put(out, at + 3, m.y);
     put(out, at + 6, m.z);

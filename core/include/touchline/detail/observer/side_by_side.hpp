@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: Apache-2.0
+// Several samples of a recording at once, as long as all of them are as usual: every number stands
+// with those of the next samples side by side, but for the filters, which run through time with
+// several rows side by side. Every operation is that of a single step, lane by lane, so the numbers
+// are the same to the last bit. No allocation but in the constructor.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include "touchline/detail/model/lanes.hpp"
+#include "touchline/detail/model/spatial.hpp"
+#include "touchline/detail/observer/channels.hpp"
+#include "touchline/detail/observer/layout.hpp"
+#include "touchline/detail/observer/projections.hpp"
+#include "touchline/detail/observer/readings.hpp"
+#include "touchline/detail/observer/row.hpp"
+#include "touchline/detail/observer/terms.hpp"
+
+namespace touchline {
+
+class SideBySide {
+ public:
+  SideBySide(const Layout& layout, const std::vector<JointRow>& joints,
+             const std::vector<SensorRow>& sensors, Channels& channels, Terms<Lanes>& terms,
+             const Projections& projections, const JointReadings& torques,
+             const std::vector<SensorReading>& wrenches, const RowLayout& row)
+      : layout_(layout),
+        joints_(joints),
+        sensors_(sensors),
+        channels_(channels),
+        model_(terms),
+        projections_(projections),
+        torques_(torques),
+        wrenches_(wrenches),
+        row_(row),
+        q_(2 * joints.size()),
+        terms_(terms.at().width()),
+        terms_before_(terms_.size()),
+        p_(channels.balances.size(), all_lanes(kNaN)),
+        u_(p_),
+        p_before_(p_),
+        u_before_(p_),
+        e_(padded(p_.size()), all_lanes(kNaN)),
+        projected_(projections.room(), Lanes{}),
+        inputs_(padded(channels.filters.size()), all_lanes(kNaN)),
+        values_(inputs_.size(), kNaN),
+        keep_(kLanes * inputs_.size(), 0.0) {
+    projected_.back() = all_lanes(kNaN);
+    possible_ = kLanes > 1;
+    for (std::size_t s = 0; s < sensors.size(); ++s) {
+      possible_ = possible_ && wrenches[s].usual() &&
+                  channels.kind(s) != Channels::SensorFilter::local;
+    }
+  }
+
+  // Is there a way for this robot at all?
+  bool possible() const { return possible_; }
+
+  // The terms of kLanes samples.
+  void evaluate(const double* q, const double* qd) {
+    const std::size_t n = joints_.size();
+    for (std::size_t j = 0; j < n; ++j) {
+      for (int k = 0; k < kLanes; ++k) {
+        set_lane(q_[j], k, q[k * n + j]);
+        set_lane(q_[n + j], k, qd[k * n + j]);
+      }
+    }
+    terms_.swap(terms_before_);
+    model_.evaluate(q_.data(), q_.data() + n, terms_.data());
+  }
+  void copy_terms(int k, double* out) const {
+    for (std::size_t i = 0; i < terms_.size(); ++i) out[i] = lane(terms_[i], k);
+  }
+
+  // Begins with what single steps have left; `terms`: of the last sample.
+  void enter(const double* terms) {
+    for (std::size_t i = 0; i < terms_.size(); ++i) terms_[i] = all_lanes(terms[i]);
+    Balances& balances = channels_.balances;
+    for (std::size_t i = 0; i < p_.size(); ++i) {
+      p_[i] = all_lanes(balances.momenta()[i]);
+      u_[i] = all_lanes(balances.loads()[i]);
+    }
+    std::copy_n(channels_.filters.values(), channels_.filters.size(), values_.begin());
+  }
+
+  // Leaves for single steps what the last sample was.
+  void leave(double* terms) const {
+    copy_terms(kLanes - 1, terms);
+    Balances& balances = channels_.balances;
+    for (std::size_t i = 0; i < p_.size(); ++i) {
+      balances.momenta()[i] = lane(p_[i], kLanes - 1);
+      balances.loads()[i] = lane(u_[i], kLanes - 1);
+    }
+    std::copy_n(values_.begin(), channels_.filters.size(), channels_.filters.values());
+  }
+
+  // After `evaluate`: momenta, known loads, innovations and what these do to the joints.
+  void balance(const double* tau, const double* wrench, const Instant* now) {
+    p_.swap(p_before_);
+    u_.swap(u_before_);
+    const TermsLayout& at = model_.at();
+    const std::size_t n = at.joints;
+    std::copy_n(terms_.data() + at.joint_momentum(), n, p_.data());
+    torques_.read(tau, q_.data() + n, terms_.data() + at.joint_bias(), u_.data());
+    for (std::size_t s = 0; s < at.sensors; ++s) {
+      const Lanes* terms = terms_.data() + at.sensor(s);
+      const std::size_t first = row(channels_.sensor(s));
+      const BasicSpatial<Lanes> reading = wrenches_[s].read(wrench + 6 * s, 6 * at.sensors);
+      const BasicSpatial<Lanes> weight = sensors_[s].gravity_compensated
+                                             ? BasicSpatial<Lanes>{}
+                                             : load(terms + TermsLayout::kWeight);
+      std::copy_n(terms + TermsLayout::kMomentum, 6, p_.data() + first);
+      store(wrench_to_parent(load_pose(terms + TermsLayout::kPose), reading) + weight,
+            u_.data() + first);
+    }
+    for (std::size_t g = 0; g < layout_.segments.size(); ++g) add_segment(g);
+    Lanes rate;
+    for (int k = 0; k < kLanes; ++k) set_lane(rate, k, now[k].time - now[k].before);
+    rate = 1.0 / rate;
+    for (std::size_t i = 0; i < p_.size(); ++i) {
+      e_[i] = rate * (p_[i] - shifted(p_before_[i], p_[i])) -
+              0.5 * (shifted(u_before_[i], u_[i]) + u_[i]);
+    }
+    projections_.project(terms_before_.data(), terms_.data(), e_.data() + channels_.sensor_rows(),
+                         layout_.lines.size(), projected_.data());
+  }
+
+  const Lanes* projected() const { return projected_.data(); }
+  Lanes* e() { return e_.data(); }
+  Lanes* inputs() { return inputs_.data(); }
+
+  // The filters, sample after sample: afterwards row by row in `inputs`, kLanes rows at a time,
+  // the values of one sample.
+  void filter(const Instant* now) {
+    const std::size_t size = inputs_.size();
+    for (int k = 0; k < kLanes; ++k)
+      channels_.filters.write_poles(now[k].time - now[k].before, keep_.data() + k * size);
+    for (std::size_t i = 0; i < size; i += kLanes) {
+      Lanes* of_rows = inputs_.data() + i;
+      transpose(of_rows);
+      Lanes value = load_lanes(values_.data() + i);
+      for (int k = 0; k < kLanes; ++k) {
+        const Lanes keep = load_lanes(keep_.data() + k * size + i);
+        value = keep * value + (1.0 - keep) * of_rows[k];
+        of_rows[k] = value;
+      }
+      store_lanes(value, values_.data() + i);
+    }
+  }
+
+  // The rows of all samples. Blocks of kLanes columns may reach into those that follow, which are
+  // written later.
+  void write(const std::vector<double>& quality, const Health* health, double* out) {
+    const std::size_t n = joints_.size(), width = row_.width();
+    for (int k = 0; k < kLanes; ++k) {
+      double* to = out + k * width;
+      for (std::size_t i = 0; i < 3 * n; i += kLanes) store_lanes(inputs_[i + k], to + i);
+    }
+    put(e_.data(), n, out + row_.joint_innovation());
+    const std::size_t wrenches = channels_.filters.group(channels_.segment_filter(0)).first;
+    for (int i = 0; i < 6 * row_.segments; ++i) segment_wrenches_[i] = filtered(wrenches + i);
+    for (int s = 0; s < row_.sensors; ++s) {
+      BasicSpatial<Lanes> sum;
+      for (int g : layout_.segments_outboard[s]) sum = sum + load(segment_wrenches_.data() + 6 * g);
+      const Lanes* pose = terms_.data() + model_.at().sensor(s) + TermsLayout::kPose;
+      store(wrench_to_child(load_pose(pose), sum), sensor_wrenches_.data() + 6 * s);
+    }
+    put(sensor_wrenches_.data(), 6 * row_.sensors, out + row_.sensor_wrench());
+    put(segment_wrenches_.data(), 6 * row_.segments, out + row_.segment_wrench());
+    put(e_.data() + row(channels_.segment(0)), 6 * row_.segments, out + row_.segment_innovation());
+    for (int k = 0; k < kLanes; ++k) {
+      double* to = out + k * width;
+      std::copy(quality.begin(), quality.end(), to + row_.joint_settled());
+      to[row_.health()] = static_cast<double>(health[k]);
+    }
+  }
+
+ private:
+  static std::size_t padded(std::size_t rows) { return (rows + kLanes - 1) / kLanes * kLanes; }
+  std::size_t row(std::size_t balance) const { return channels_.balances.group(balance).first; }
+
+  // A segment's momentum and load: those of its sensor without those of the next ones outboard.
+  void add_segment(std::size_t g) {
+    const Segment& segment = layout_.segments[g];
+    if (segment.sensor < 0) return;
+    const std::size_t to = row(channels_.segment(g)), from = row(channels_.sensor(segment.sensor));
+    std::copy_n(p_.data() + from, 6, p_.data() + to);
+    std::copy_n(u_.data() + from, 6, u_.data() + to);
+    for (int t : segment.successors) {
+      const std::size_t next = row(channels_.sensor(t));
+      for (int i = 0; i < 6; ++i) p_[to + i] -= p_[next + i];
+      for (int i = 0; i < 6; ++i) u_[to + i] -= u_[next + i];
+    }
+  }
+
+  // Row i of the filters, of all samples.
+  Lanes filtered(std::size_t i) const {
+    const Lanes* of_rows = inputs_.data() + i / kLanes * kLanes;
+    Lanes v;
+    for (int k = 0; k < kLanes; ++k) set_lane(v, k, lane(of_rows[k], static_cast<int>(i % kLanes)));
+    return v;
+  }
+
+  // `count` columns of all rows of the output.
+  void put(const Lanes* columns, std::size_t count, double* out) const {
+    const std::size_t width = row_.width();
+    for (std::size_t i = 0; i < count; i += kLanes) {
+      Lanes block[kLanes];
+      for (std::size_t c = 0; c < kLanes; ++c)
+        block[c] = columns[std::min(i + c, count - 1)];
+      transpose(block);
+      for (int k = 0; k < kLanes; ++k) store_lanes(block[k], out + k * width + i);
+    }
+  }
+
+  const Layout& layout_;
+  const std::vector<JointRow>& joints_;
+  const std::vector<SensorRow>& sensors_;
+  Channels& channels_;
+  Terms<Lanes>& model_;
+  const Projections& projections_;
+  const JointReadings& torques_;
+  const std::vector<SensorReading>& wrenches_;
+  RowLayout row_;
+  bool possible_ = false;
+  std::vector<Lanes> q_;  // positions, then velocities
+  std::vector<Lanes> terms_, terms_before_;
+  std::vector<Lanes> p_, u_, p_before_, u_before_, e_;  // as in the balances
+  std::vector<Lanes> projected_, inputs_;
+  std::vector<Lanes> segment_wrenches_ = std::vector<Lanes>(6 * row_.segments);
+  std::vector<Lanes> sensor_wrenches_ = std::vector<Lanes>(6 * row_.sensors);
+  std::vector<double> values_, keep_;  // of the filters: one per row, and per sample and row
+};
+
+}  // namespace touchline
