@@ -13,6 +13,7 @@
 #include "classifier_bindings.hpp"
 #include "detector_bindings.hpp"
 #include "guard.hpp"
+#include "live_bindings.hpp"
 #include "localizer_bindings.hpp"
 #include "mesh_bindings.hpp"
 #include "pipeline_bindings.hpp"
@@ -235,6 +236,7 @@ NB_MODULE(TOUCHLINE_MODULE, m) {
   m.def("view", &arrays::view, "rows"_a, "first"_a, "count"_a, "columns"_a,
         nb::sig("def view(rows: " TOUCHLINE_ARRAY ", first: int, count: int, columns: int) -> "
                 TOUCHLINE_ARRAY));
+  live::bind(m);
   nb::class_<Observer>(m, "Observer")
       .def("__init__",
            [](Observer* self, std::vector<tl::Node> nodes, const std::vector<double>& gravity,

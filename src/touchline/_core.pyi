@@ -491,6 +491,57 @@ class Pipeline:
 
 def view(rows: numpy.typing.NDArray[numpy.float64], first: int, count: int, columns: int) -> numpy.typing.NDArray[numpy.float64]: ...
 
+class Admission:
+    def __init__(self) -> None: ...
+
+    def take(self, time: float) -> int: ...
+
+class Runner:
+    def __init__(self, pipeline: Pipeline, slots: int) -> None: ...
+
+    def results(self) -> list: ...
+
+    @property
+    def idle(self) -> bool: ...
+
+    @property
+    def refused(self) -> int: ...
+
+    @property
+    def unseen(self) -> int: ...
+
+    @property
+    def overrun(self) -> int: ...
+
+    @property
+    def taken(self) -> int: ...
+
+    def longest_gap(self) -> float: ...
+
+    def stop(self) -> None: ...
+
+class RtdeLayout:
+    recipe: int
+    size: int
+    time: int
+    q: int
+    qd: int
+    tau: int
+    wrench: int
+    measured: list[bool]
+    frequency: float
+    first: float
+
+    def __init__(self) -> None: ...
+
+class RtdeReader:
+    def __init__(self, runner: Runner, socket: int, layout: RtdeLayout, begun: bytes) -> None: ...
+
+    @property
+    def fault(self) -> str: ...
+
+    def stop(self) -> None: ...
+
 class Observer:
     def __init__(self, arg0: Sequence[Node], arg1: Sequence[float], arg2: Sequence[JointRow], arg3: Sequence[SensorRow], arg4: Method, arg5: Discretization, /) -> None: ...
 

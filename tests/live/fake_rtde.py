@@ -5,6 +5,7 @@ It is written from the protocol's description and shares no code with the reader
 """
 
 import contextlib
+import multiprocessing
 import select
 import socket
 import struct
@@ -31,9 +32,10 @@ class FakeController:
         version: the newest protocol it speaks.
         rate: [Hz] at which samples are sent.
         tamper: changes the list of packages (number, bytes) that are due.
+        apart: runs in a process of its own, which no stall of this one reaches.
     """
 
-    def __init__(self, samples, lacks=(), version=2, rate=500.0, tamper=None, port=0):
+    def __init__(self, samples, lacks=(), version=2, rate=500.0, tamper=None, port=0, apart=False):
         self.samples, self.lacks, self.version, self.rate = samples, set(lacks), version, rate
         self.tamper = tamper or (lambda due: due)
         self.clock = 0.0  # s that are added to the time stamps
@@ -46,7 +48,10 @@ class FakeController:
         self._listener.bind(("127.0.0.1", port))
         self._listener.listen(4)
         self.port = self._listener.getsockname()[1]
-        self._thread = threading.Thread(target=self._serve, daemon=True)
+        if apart:
+            self._thread = multiprocessing.get_context("fork").Process(target=self._serve)
+        else:
+            self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
 
     @property
@@ -56,6 +61,8 @@ class FakeController:
     def stop(self):
         """As if its power had been cut, but for the operating system's farewell."""
         self._stop.set()
+        if not isinstance(self._thread, threading.Thread):
+            self._thread.terminate()
         self._thread.join(timeout=5)
         self._listener.close()
 

@@ -48,6 +48,13 @@ def test_the_same_seed_gives_the_same_recording_at_any_speed(sara, recorded):
     assert np.array_equal(slow.rows, live.rows[: len(slow.rows)], equal_nan=True)
 
 
+def test_the_simulated_arm_moves_for_long_and_is_not_felt_where_nothing_touches_it(sara):
+    seen = watch(sara, "sim://?speed=0&force=0", duration=20.0)
+    assert len(seen.times) == 20001 and seen.events == []
+    estimates = np.array(seen.rows)[6000:, 1:7]
+    assert np.isfinite(estimates[:, [0, 1, 2, 3]]).all()
+
+
 def test_what_is_recorded_holds_arrival_and_sequence(recorded):
     table = pq.read_table(recorded[".parquet"][0])
     assert table["sequence"].to_pylist() == list(range(len(table)))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A UR arm over RTDE, against a controller that is written for the test."""
 
+import ctypes
 import socket
 import subprocess
 import sys
@@ -245,6 +246,56 @@ def stop(each):
             session.connection.close()
 
     return act
+
+
+def test_a_stall_of_python_costs_no_sample_and_no_time(arm, samples):
+    hold = ctypes.PyDLL(None).usleep  # a call that keeps the interpreter's lock
+    with FakeController(samples, apart=True) as controller:
+        stalls, gaps = [], []
+
+        def each(session):
+            runner = session.connection.source._runner
+            if runner is None or session.samples < 600 or stalls:
+                return
+            before = runner.taken
+            runner.longest_gap()
+            hold(300_000)
+            stalls.append(runner.taken - before)
+            gaps.append(runner.longest_gap())
+
+        seen = watch(arm, controller.address, duration=2.5, each=each)
+    assert stalls[0] > 75  # of 150; on a quiet machine all of them
+    assert gaps[0] < 0.15
+    steps = np.round(np.diff(seen.times) * 500)
+    assert np.all(steps == 1)
+
+
+def test_what_native_threads_read_survives_a_restart_of_the_controller(arm, samples):
+    first = FakeController(samples)
+    again = []
+
+    def each(session):
+        if session.samples > 700 and not again:
+            first.stop()
+            again.append(FakeController(samples, port=first.port))
+            again[0].clock = 100.0
+
+    seen = watch(arm, first.address, duration=101.0, each=each)
+    again[0].stop()
+    assert any("trying again" in notice.text for notice in seen.notices)
+    assert seen.times[-1] > 100.0 and seen.events == []
+
+
+def test_a_session_that_is_reset_goes_on_with_a_new_pipeline(arm, samples):
+    with FakeController(samples) as controller:
+        done = []
+
+        def each(session):
+            if session.samples > 600 and not done:
+                done.append(session.reset())
+
+        seen = watch(arm, controller.address, duration=1.9, each=each)
+    assert done == [True] and len(seen.times) > 800 and seen.events == []
 
 
 PUBLIC = """

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """`touchline live`."""
 
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from tyro.conf import arg
 
@@ -15,6 +16,11 @@ def live(
     record: Annotated[Path | None, arg(metavar="LOG")] = None,
     duration: Annotated[float | None, arg(metavar="S")] = None,
     force: bool = False,
+    view: bool = False,
+    allow_control: bool = False,
+    host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1",
+    port: int = 8080,
+    browser: bool = True,
 ) -> int:
     """Feels with a running robot: prints contacts and faults of the link as they come.
 
@@ -26,45 +32,76 @@ def live(
 
     Args:
         robot: Its robot.yaml, or the name of a robot that ships with Touchline (sara).
-        source: sim:// (a simulated arm) or replay://LOG?speed=1 (a recording, in its own time;
-            speed=0: as fast as possible).
+        source: sim:// (a simulated arm), replay://LOG?speed=1 (a recording, in its own time;
+            speed=0: as fast as possible), ros2:// (topics), ur://HOST (a UR arm), franka://HOST.
         record: Every sample as it came, to a .mcap or .parquet that `analyze` and replay:// read;
             it can be read even if this program is killed.
         duration: Ends after so long by the sensors' clock [s]. Default: until Ctrl-C, or the end.
         force: Go live whatever the first second looks like.
+        view: Show the robot and what it feels on a page.
+        allow_control: Visitors of the page may let the pipeline start anew.
+        host: Address at which the page is served. Another than 127.0.0.1 lets other machines see
+            it: it needs the token that is then printed.
+        port: The first port that is tried.
+        browser: Open the page in the browser.
     """
     if duration is not None:
         check_positive(duration=duration)
-    import time
-
     from touchline.live.connection import Connection
     from touchline.live.session import Session
     from touchline.live.sources import make_source
-    from touchline.live.telling import began_line, ended_line, notice_line, summary_lines
     from touchline.model.robot import load_robot
 
     model = load_robot(robot)
     connection = Connection(make_source(source, model))
-    with Session(model, connection, record, force) as session:
+    with Session(model, connection, record, force) as session, ExitStack() as kept:
         print(f"connecting to {source}; the robot must stand still for a second ...", flush=True)
         reasons = session.start()
         for line in [*connection.notes, *(f"forced, in spite of {reason}" for reason in reasons)]:
             print(f"  {line}")
+        page = None
+        if view:
+            page = _page(kept, session, allow_control, (host, port), browser)
         print("live; Ctrl-C ends it", flush=True)
-        events, origin = 0, session.origin
-        try:
-            for news in session.run(duration):
-                for notice in session.notices():
-                    print(notice_line(notice, session), flush=True)
-                for event in news.began:
-                    print(began_line(event, origin), flush=True)
-                for event in news.ended:
-                    print(ended_line(event, origin), flush=True)
-                events += len(news.began)
-        except KeyboardInterrupt:
-            print()
-        for line in summary_lines(session, events, time.monotonic()):
-            print(line)
+        _follow(session, duration, page)
     if record is not None:
         print(f"recording: {record}")
     return 0
+
+
+def _page(
+    kept: ExitStack, session: Any, allow_control: bool, address: tuple[str, int], browser: bool
+) -> Any:
+    from touchline.live.page import RobotPage
+    from touchline.view.server import PageServer, open_page
+
+    server = kept.enter_context(PageServer("Touchline", *address))
+    page = RobotPage(server, session, allow_control)
+    print(f"the robot is at {server.url}")
+    if browser:
+        open_page(server.url)
+    return page
+
+
+def _follow(session: Any, duration: float | None, page: Any) -> None:
+    """Tells what happens until it is over."""
+    import time
+
+    from touchline.live.telling import began_line, ended_line, notice_line, summary_lines
+
+    events, origin = 0, session.origin
+    try:
+        for news in session.run(duration):
+            for notice in session.notices():
+                print(notice_line(notice, session), flush=True)
+            for event in news.began:
+                print(began_line(event, origin), flush=True)
+            for event in news.ended:
+                print(ended_line(event, origin), flush=True)
+            events += len(news.began)
+            if page is not None:
+                page.update()
+    except KeyboardInterrupt:
+        print()
+    for line in summary_lines(session, events, time.monotonic()):
+        print(line)

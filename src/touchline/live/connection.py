@@ -12,12 +12,13 @@ import numpy as np
 from touchline.errors import InputError
 from touchline.live.sample import Sample
 from touchline.live.source import EndOfSource, LinkLost, Source
-from touchline.live.streams import SET_BACK, Stream, StreamState
+from touchline.live.streams import Stream, StreamState
+from touchline.native import core
 
 WAIT = 0.004  # s that a read waits at most: faults are told within 20 ms
 RETRY = 0.02  # s between two attempts to reach a peer that is gone
 FIRST_SAMPLE = 5.0  # s until the first sample has come, or nobody sends
-PATIENCE = 10  # older stamps in a row: the clock was set
+REFUSED, SET_BACK = 1, 2  # verdicts of the native `Admission`
 
 
 @dataclass(frozen=True)
@@ -60,8 +61,8 @@ class Connection:
         self.refused = 0
         self._open = self._ended = False
         self._tried = -np.inf
-        self._last: float | None = None  # the newest sample's time [s]
-        self._older = 0  # stamps in a row that were older than it
+        self._admission = core.Admission()
+        self._last = 0.0  # the newest sample's time [s]
         self._states = {stream.name: StreamState.NOT_RECEIVED for stream in source.streams}
         self._ready: deque[Sample] = deque()
 
@@ -151,22 +152,20 @@ class Connection:
 
     def _accept(self, sample: Sample) -> bool:
         """Whether a sample goes on; what comes twice or too late does not."""
-        if not np.isfinite(sample.time):
-            return self._refuse()
-        if self._last is None or sample.time > self._last:
-            self._last, self._older = sample.time, 0
+        if sample.result is not None:  # it went the same way in native code
             return True
-        self._older += 1
-        if sample.time < self._last - SET_BACK or self._older >= PATIENCE:
+        verdict = self._admission.take(sample.time)
+        if verdict == REFUSED:
+            return self._refuse()
+        if verdict == SET_BACK:
             self._tell(
                 self.streams[0].name,
                 StreamState.OK,
                 f"{self.source.name}: the clock was set back by {self._last - sample.time:.3f} s; "
                 "the observer starts anew",
             )
-            self._last, self._older = sample.time, 0
-            return True
-        return self._refuse()
+        self._last = sample.time
+        return True
 
     def _refuse(self) -> bool:
         self.refused += 1

@@ -16,6 +16,7 @@ from typing import Any
 
 from touchline.errors import InputError
 from touchline.live.connection import Connection
+from touchline.live.loopback import keep_local
 from touchline.live.messages import Messages
 from touchline.live.session import EventNews, Session
 from touchline.live.sources import make_source
@@ -291,9 +292,12 @@ def main(arguments: list[str] | None = None) -> int:
     except InputError as error:
         print(f"touchline: {error}", file=sys.stderr)
         return 2
+    local = keep_local()
     context = rclpy.Context()
     rclpy.init(args=sys.argv if arguments is None else arguments, context=context)
     node = TouchlineNode(context)
+    if local:
+        node.node.get_logger().info(local)
     start = node.node.declare_parameter("autostart", True).value
     try:
         if start and not node.autostart():

@@ -2,6 +2,7 @@
 # pyright: reportMissingImports=false
 """`ros2://`: topics of joint states and wrenches, unsynchronised, matched by name."""
 
+import os
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.errors import InputError
+from touchline.live.loopback import RANGE, keep_local
 from touchline.live.sample import Sample, stamp
 from touchline.live.source import Address
 from touchline.live.streams import Stream
@@ -69,7 +71,7 @@ class RosTopics:
 
     def open(self) -> list[str]:
         """Joins the graph, looks for the topics and subscribes."""
-        ros = self._ros
+        ros, local = self._ros, keep_local()
         self._context = ros.rclpy.Context()
         ros.rclpy.init(context=self._context)
         self._node = ros.rclpy.create_node("touchline_live", context=self._context)
@@ -77,7 +79,8 @@ class RosTopics:
         self._executor.add_node(self._node)
         joints, wrenches = self._topics()
         names = {joints: "joints"} | {topic: sensor for sensor, topic in wrenches.items()}
-        notes = [f"{names[topic]}: {topic}" for topic in names]
+        notes = [local] if local else []
+        notes += [f"{names[topic]}: {topic}" for topic in names]
         notes += [w for topic in names for w in self._qos_warnings(topic)]
         self._subscribe(ros.joint_state, joints, self._on_joints)
         for k, sensor in enumerate(self._robot.sensor_names):
@@ -98,9 +101,10 @@ class RosTopics:
             except InputError as error:
                 if time.monotonic() > end:
                     if not published:
+                        where = f"{RANGE}={os.environ[RANGE]}"
                         raise InputError(
                             f"{self.name}: nobody publishes {JOINT_STATE} within "
-                            f"{self._discovery:g} s (domain and discovery range of this shell?)"
+                            f"{self._discovery:g} s (domain? discovery range? {where})"
                         ) from None
                     raise InputError("; ".join(error.problems[:-1])) from None
             time.sleep(SETTLE)

@@ -85,6 +85,18 @@ class Recipe:
     def __post_init__(self) -> None:
         object.__setattr__(self, "_layout", struct.Struct(">B" + self._codes()))
 
+    def offset(self, name: str | None) -> int:
+        """Where a field begins in a package [bytes]; -1 where it is not in it."""
+        if name is None:
+            return -1
+        kinds = self.kinds[: self.names.index(name)]
+        return struct.calcsize(">B" + "".join(_FORMATS[kind] for kind in kinds))
+
+    @property
+    def size(self) -> int:
+        """Of a package [bytes]."""
+        return struct.calcsize(">B" + self._codes())
+
     def _codes(self) -> str:
         return "".join(_FORMATS[kind] for kind in self.kinds)
 
@@ -179,6 +191,12 @@ class Rtde:
             self._fill(timeout)
             found = self._data()
         return found
+
+    def hand_over(self) -> tuple[int, bytes]:
+        """For another reader: the socket's number, and what was received and not looked at."""
+        begun = bytes(self._buffer)
+        self._buffer.clear()
+        return self._socket.fileno(), begun
 
     def _data(self) -> list[bytes]:
         found = []

@@ -63,6 +63,7 @@ class Sample:
         sequence: its number at the source; a step of more than one tells how many were lost. A
             source that counts none has a number for each sample received.
         ages: (k,) how much older than `time` each wrench is [s].
+        result: what a native pipeline has made of it already, if one has.
     """
 
     time: float
@@ -73,6 +74,7 @@ class Sample:
     arrival: float = 0.0
     sequence: int = 0
     ages: Array = field(default_factory=lambda: np.zeros(0))
+    result: Any = None
 
     def __iter__(self) -> Iterator[Any]:
         yield self.time

@@ -14,14 +14,14 @@ from touchline.live.connection import Connection, Notice
 from touchline.live.preflight import SECONDS, Reason, preflight
 from touchline.live.recorder import Recorder, make_recorder
 from touchline.live.sample import Sample
+from touchline.live.source import NativeSource
 from touchline.localizer.skin import Skin
 from touchline.logs.period import typical_period
 from touchline.model.robot import Robot
 from touchline.pipeline.pipeline import Pipeline, Result
 from touchline.result.event import Event
 
-CHECK_EVERY = 0.1  # s between two looks whether an event has ended
-SILENT = 1.0  # s without a sample, after which `duration` is over on this machine's clock too
+SILENT = 5.0  # s without a sample, after which `duration` is over on this machine's clock too
 LONGEST_START = 3.0  # s in which the first second has to come
 
 
@@ -60,6 +60,7 @@ class Session:
         self._record, self._force = record, force
         self._skin = Skin(robot)
         self.pipeline: Pipeline | None = None
+        self._attached: Pipeline | None = None  # the one that a native source feels with
         self._recorder: Recorder | None = None
         self._kept = ExitStack()
         self.reasons: list[Reason] = []
@@ -68,9 +69,7 @@ class Session:
         self.result: Result | None = None
         self._first: list[Sample] = []
         self._origin = 0.0
-        self._open_events: set[int] = set()
-        self._told = 0  # events whose beginning was told
-        self._looked = 0.0
+        self._fresh = EventNews()
 
     def start(self) -> list[Reason]:
         """Connects, looks at the first second and makes everything ready.
@@ -117,8 +116,7 @@ class Session:
         if self.pipeline is None:
             return False
         self.pipeline = self._made()
-        self._open_events.clear()
-        self._told, self.result = 0, None
+        self.result = None
         return True
 
     @property
@@ -153,6 +151,7 @@ class Session:
                 self.result = None
                 if (now := time.monotonic()) > end and self.connection.streams[0].age(now) > SILENT:
                     return  # the sensors' clock stands
+            self._attach()
             yield self._news()
             if self.connection.ended:
                 return
@@ -162,8 +161,22 @@ class Session:
         assert self.pipeline is not None
         if self._recorder is not None:
             self._recorder.add(sample)
-        self.result, self.sample = self.pipeline.update(*sample), sample
+        result: Result = sample.result or self.pipeline.update(*sample)
+        self.result, self.sample = result, sample
         self.samples += 1
+        for change in result.events:
+            if change.happened == "began":
+                self._fresh.began.append(change.event)
+            elif change.happened == "ended":
+                self._fresh.ended.append(change.event)
+
+    def _attach(self) -> None:
+        """Lets a source that can do so feel in native threads, after the samples of the start."""
+        source = self.connection.source
+        if self._attached is not self.pipeline and isinstance(source, NativeSource):
+            assert self.pipeline is not None
+            source.attach(self.pipeline)
+            self._attached = self.pipeline
 
     def notices(self) -> Iterator[Notice]:
         """What happened to the link and was not told yet."""
@@ -171,24 +184,8 @@ class Session:
             yield self.connection.notices.popleft()
 
     def _news(self) -> EventNews:
-        """Events that began or ended."""
-        news = EventNews()
-        assert self.pipeline is not None
-        now = time.monotonic()
-        seen = {c.event for c in self.result.contacts} if self.result is not None else set()
-        known = seen <= self._open_events
-        if known and (not self._open_events or now - self._looked < CHECK_EVERY):
-            return news
-        self._looked = now
-        events = self.pipeline.events
-        for event in events[self._told :]:
-            news.began.append(event)
-            self._open_events.add(event.id)
-        self._told = len(events)
-        for event in [events[number] for number in sorted(self._open_events)]:
-            if event.cleared is not None:
-                news.ended.append(event)
-                self._open_events.discard(event.id)
+        """Events that began or ended since the last call."""
+        news, self._fresh = self._fresh, EventNews()
         return news
 
     def close(self) -> None:

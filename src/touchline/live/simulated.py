@@ -2,6 +2,7 @@
 """`sim://`: a simulated arm that stands, is touched, and then moves and is touched."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from touchline.simulation.noise import SensorNoise
 from touchline.simulation.plant import Plant
 from touchline.simulation.scene import impedance, wandering
 from touchline.simulation.sensing import sense
-from touchline.simulation.setup import read_setup
+from touchline.simulation.setup import Setup, read_setup
 from touchline.simulation.simulator import Rates, Simulation
 from touchline.simulation.touchable import TouchableSurface, structure_links, touchable_links
 
@@ -25,6 +26,7 @@ PHYSICS, RATE = 2000.0, 1000.0  # Hz
 BLOCK = 10  # samples that are simulated at a time: the same numbers at any speed
 FIRST, EVERY, LASTS = 2.0, 3.0, 1.5  # s: of the touches
 MOVES, EASE = 8.0, 2.0  # s: from when on it moves, and how long it takes to begin
+SOFT = 0.2  # of the robot's own stiffness: at all of it 1 kHz is too slow
 TRIES = 200
 
 
@@ -73,7 +75,8 @@ class SimulatedArm:
         plant.reset(setup.home)
         plant.evaluate()
         hands = Hands()
-        simulation = Simulation(plant, impedance(setup, trajectory), [hands], Rates(RATE, RATE))
+        controller = impedance(_softer(setup), trajectory)
+        simulation = Simulation(plant, controller, [hands], Rates(RATE, RATE))
         touches = _Touches(self._robot, hands, self._force, self._seed)
         noise, number = SensorNoise(), 0
         ages = np.zeros(len(self._robot.sensor_names))
@@ -86,6 +89,13 @@ class SimulatedArm:
                 at = stamp(round(number * 1e9 / RATE))
                 yield Sample(at, *signals, sequence=number, ages=ages)
                 number += 1
+
+
+def _softer(setup: Setup) -> Setup:
+    """Stiffness at which the controller is stable at its rate; damped as well as before."""
+    if setup.stiffness is None or setup.damping is None:
+        return setup
+    return replace(setup, stiffness=SOFT * setup.stiffness, damping=np.sqrt(SOFT) * setup.damping)
 
 
 class _Begun:

@@ -3,12 +3,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 from urllib.parse import parse_qsl, unquote, urlsplit
 
 from touchline.errors import InputError
 from touchline.live.sample import Sample
 from touchline.live.streams import Stream
+from touchline.pipeline.pipeline import Pipeline
 from touchline.suggest import did_you_mean, unknown
 
 
@@ -56,6 +57,15 @@ class Source(Protocol):
 
     def close(self) -> None:
         """Disconnects."""
+        ...
+
+
+@runtime_checkable
+class NativeSource(Protocol):
+    """A source that can be read and felt in native threads, whatever Python does."""
+
+    def attach(self, pipeline: Pipeline) -> None:
+        """From now on `read` hands out samples that the pipeline has taken, with its results."""
         ...
 
 

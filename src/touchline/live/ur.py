@@ -2,6 +2,7 @@
 """`ur://HOST`: a Universal Robots arm, read over RTDE at up to 500 Hz."""
 
 import time
+from typing import Any
 
 import numpy as np
 
@@ -11,9 +12,13 @@ from touchline.live.sample import Sample, make_sample, on_nanoseconds
 from touchline.live.source import Address, LinkLost
 from touchline.live.streams import Stream
 from touchline.model.robot import Robot
+from touchline.native import core
+from touchline.pipeline.pipeline import Pipeline
 
 FREQUENCY = 500.0  # Hz; that of an e-Series controller
 JOINTS = 6
+SLOTS = 8192  # samples that may wait for Python: 16 s at 500 Hz
+POLL = 5e-4  # s between two looks at what the native threads have left
 SILENCE = 2.0  # s after which a connection that still stands is given up
 TIME, POSITION, VELOCITY = "timestamp", "actual_q", "actual_qd"
 TORQUES, CURRENTS = "actual_current_as_torque", "actual_current"
@@ -49,6 +54,9 @@ class UrArm:
         self.period: float | None = 1.0 / self._frequency
         self.streams = (Stream("rtde", self.period),)
         self._link: Rtde | None = None
+        self._pipeline: Any = None
+        self._runner: core.Runner | None = None
+        self._reader: core.RtdeReader | None = None
         self._first: float | None = None  # the first time stamp, from which samples are counted
         self._sequence = 0
 
@@ -71,6 +79,7 @@ class UrArm:
             link.close()
             raise
         self._link, self._recipe, self._heard = link, recipe, time.monotonic()
+        self._hand_over()
         return notes
 
     def _choose(self, recipe: Recipe, missing: list[str]) -> list[str]:
@@ -104,9 +113,37 @@ class UrArm:
                 )
         return notes
 
+    def attach(self, pipeline: Pipeline) -> None:
+        """From now on the link is read and the pipeline runs in native threads."""
+        if self._runner is not None:  # another pipeline: the link begins anew with it
+            self.close()
+        self._pipeline, self._runner = pipeline, pipeline.beside(SLOTS)
+        self._hand_over()
+
+    def _hand_over(self) -> None:
+        if self._link is None or self._runner is None:
+            return
+        layout = core.RtdeLayout()
+        recipe = self._recipe
+        layout.recipe, layout.size = recipe.number, recipe.size
+        layout.time, layout.q = recipe.offset(TIME), recipe.offset(POSITION)
+        layout.qd, layout.tau = recipe.offset(VELOCITY), recipe.offset(self._torque)
+        layout.wrench = recipe.offset(self._wrench)
+        layout.measured = [joint.measured for joint in self._robot.description.joints]
+        layout.frequency, layout.first = self._frequency, self._first or 0.0
+        self._reader = core.RtdeReader(self._runner, *self._handed(layout))
+
+    def _handed(self, layout: core.RtdeLayout) -> tuple[int, core.RtdeLayout, bytes]:
+        assert self._link is not None
+        number, begun = self._link.hand_over()
+        return number, layout, begun
+
     def read(self, timeout: float) -> list[Sample]:
-        """The samples that have come."""
-        assert self._link is not None, "open() makes it"
+        """The samples that have come; with results where a pipeline is attached."""
+        if self._link is None:
+            raise LinkLost("the link begins anew")
+        if self._runner is not None:
+            return self._felt(timeout)
         payloads = self._link.receive(timeout)
         now = time.monotonic()
         if payloads:
@@ -116,15 +153,45 @@ class UrArm:
         found = (self._recipe.read(payload) for payload in payloads)
         return [self._sample(values, now) for values in found if values is not None]
 
+    def _felt(self, timeout: float) -> list[Sample]:
+        """What the native threads have left."""
+        assert self._runner is not None and self._link is not None and self._reader is not None
+        end = time.monotonic() + timeout
+        while self._runner.idle and time.monotonic() < end:
+            time.sleep(POLL)
+        found = [self._named(numbers) for numbers in self._runner.results()]
+        self.streams[0].refused = self._runner.refused
+        if found:
+            self._heard = found[-1].arrival
+        elif self._reader.fault:
+            raise LinkLost(f"{self._link.peer}: {self._reader.fault}")
+        elif time.monotonic() - self._heard > SILENCE:
+            raise LinkLost(f"nothing came from {self._link.peer} for {SILENCE:g} s")
+        return found
+
+    def _named(self, numbers: np.ndarray) -> Sample:
+        """A sample and its result from a row of the native threads."""
+        n, k = len(self._robot.joint_names), len(self._robot.sensor_names)
+        arrival, number, at = (float(x) for x in numbers[:3])
+        q, qd, tau, wrench, rest = np.split(numbers[3:], [n, 2 * n, 3 * n, 3 * n + 6 * k])
+        self._count(at, arrival, int(number), bool(np.isfinite(q).all()))
+        result = self._pipeline.result(rest)
+        return Sample(
+            at, q, qd, tau, wrench.reshape(k, 6), arrival, int(number), np.zeros(k), result
+        )
+
+    def _count(self, at: float, arrival: float, number: int, valid: bool) -> None:
+        lost = max(number - self._sequence - 1, 0) if self.streams[0].received else 0
+        self._sequence = number
+        self.streams[0].receive(at, arrival, valid, lost)
+
     def _sample(self, values: dict[str, tuple[float, ...]], now: float) -> Sample:
         at = on_nanoseconds(values[TIME][0])
         if self._first is None:
             self._first = at
         number = round((at - self._first) * self._frequency)
-        lost = max(number - self._sequence - 1, 0) if self.streams[0].received else 0
-        self._sequence = number
         q = np.array(values[POSITION])
-        self.streams[0].receive(at, now, bool(np.isfinite(q).all()), lost)
+        self._count(at, now, number, bool(np.isfinite(q).all()))
         return make_sample(
             self._robot,
             at,
@@ -138,6 +205,9 @@ class UrArm:
 
     def close(self) -> None:
         """Disconnects."""
+        if self._reader is not None:
+            self._reader.stop()
+            self._reader = None
         if self._link is not None:
             self._link.close()
             self._link = None

@@ -170,6 +170,18 @@ class Pipeline:
         """
         write_robot(Path(path), self._native())
 
+    def beside(self, slots: int) -> core.Runner:
+        """A native thread that takes samples for this pipeline; it gives what `result` reads.
+
+        Args:
+            slots: samples and results that may wait.
+        """
+        return core.Runner(self._core, slots)
+
+    def result(self, numbers: Array) -> Result:
+        """What one sample brought, of the numbers that a native thread left."""
+        return Result.of(numbers, self._layout)
+
     def region(self) -> Region:
         """The posterior over links and surfaces of the only contact of the last sample.
 

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From a topic's publication to what is felt, beside its bare delivery by rclpy, in one run.
+
+python benchmarks/live_latency.py [SECONDS] [RATE]
+
+Three processes on this machine: an arm that publishes, the node, and this listener. All times are
+from the stamp that the arm gives a joint state when it publishes it. Needs touchline[ros2].
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+os.environ.setdefault("ROS_DOMAIN_ID", "91")
+os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+
+ARM = """
+import sys, time
+import rclpy
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import JointState
+import touchline as tl
+from touchline.simulation.noise import SensorNoise
+from touchline.simulation.scenario import free_motion
+from touchline.simulation.scene import Run
+robot, rate, seconds = tl.load_robot(sys.argv[1]), float(sys.argv[2]), float(sys.argv[3])
+s = free_motion(robot, 2.0, 0.0, Run(noise=SensorNoise(), rate=rate)).samples
+rclpy.init()
+node = rclpy.create_node("arm")
+out = node.create_publisher(JointState, "/joint_states", qos_profile_sensor_data)
+message = JointState(name=list(robot.joint_names))
+rows = [[x.tolist() for x in row] for row in zip(s.q, s.qd, s.tau)]
+begin = time.monotonic()
+for i in range(int(rate * seconds)):
+    message.position, message.velocity, message.effort = rows[i % len(rows)]
+    while (wait := begin + i / rate - time.monotonic()) > 0:
+        time.sleep(wait)
+    seconds_, rest = divmod(time.time_ns(), 10**9)
+    message.header.stamp.sec, message.header.stamp.nanosec = seconds_, rest
+    out.publish(message)
+"""
+ROBOT = """name: sara-joints
+model: {model}
+joints: [{joints}]
+"""
+
+
+def main() -> None:
+    """Prints p50, p99 and the largest delay of both."""
+    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 30.0
+    rate = float(sys.argv[2]) if len(sys.argv) > 2 else 1000.0
+    with tempfile.TemporaryDirectory() as folder:
+        robot = _robot(Path(folder))
+        arm = [sys.executable, "-c", ARM, str(robot), str(rate), str(seconds + 15.0)]
+        parameters = ["-p", f"robot:={robot}", "-p", "source:=ros2://"]
+        node = [sys.executable, "-m", "touchline.live.node", "--ros-args", *parameters]
+        with subprocess.Popen(arm) as publishes:
+            time.sleep(4.0)
+            with subprocess.Popen(node) as feels:
+                try:
+                    delays = _listen(seconds)
+                finally:
+                    feels.terminate()
+                    publishes.terminate()
+    for name, found in delays.items():
+        if not found:
+            print(f"{name}: nothing came")
+            continue
+        p50, p99 = np.percentile(found, [50, 99])
+        print(
+            f"{name}: {len(found)} messages, p50 {p50:.2f} ms, p99 {p99:.2f} ms, "
+            f"largest {max(found):.1f} ms"
+        )
+    print(f"load of this machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+
+
+def _robot(folder: Path) -> Path:
+    import touchline as tl
+
+    sara = tl.load_robot("sara-full").description
+    joints = ", ".join(f"{{name: {joint.name}, torque: sensor}}" for joint in sara.joints)
+    path = folder / "robot.yaml"
+    path.write_text(ROBOT.format(model=sara.model, joints=joints))
+    return path
+
+
+def _listen(seconds: float) -> dict[str, list[float]]:
+    import rclpy
+    from rclpy.qos import qos_profile_sensor_data
+    from sensor_msgs.msg import JointState
+
+    rclpy.init()
+    listener = rclpy.create_node("listener")
+    delays: dict[str, list[float]] = {"bare delivery": [], "felt": []}
+
+    def note(name: str):
+        def take(message: JointState) -> None:
+            stamp = message.header.stamp
+            delays[name].append((time.time_ns() - stamp.sec * 10**9 - stamp.nanosec) * 1e-6)
+
+        return take
+
+    topics = {"bare delivery": "/joint_states", "felt": "/touchline/external_joint_torques"}
+    for name, topic in topics.items():
+        listener.create_subscription(JointState, topic, note(name), qos_profile_sensor_data)
+    end = time.monotonic() + 60.0
+    while not delays["felt"] and time.monotonic() < end:
+        rclpy.spin_once(listener, timeout_sec=0.1)
+    for found in delays.values():
+        found.clear()
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        rclpy.spin_once(listener, timeout_sec=0.1)
+    return delays
+
+
+if __name__ == "__main__":
+    main()

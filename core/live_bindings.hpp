@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: Apache-2.0
+// A pipeline that runs beside Python: packages of a socket become samples in one thread, samples
+// become results in another, and Python takes both when it has time.
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#if defined(__unix__) || defined(__APPLE__)
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+#define TOUCHLINE_SOCKETS 1
+#endif
+
+#include "arrays.hpp"
+#include "pipeline_bindings.hpp"
+#include "touchline/live.hpp"
+
+namespace live {
+
+namespace nb = nanobind;
+namespace tl = touchline;
+using namespace nb::literals;
+
+// A pipeline in a thread of its own. Python takes of each sample: arrival, sequence, time, signals,
+// then the pipeline's snapshot.
+class Runner {
+ public:
+  Runner(pipelines::Pipeline& pipeline, std::size_t slots)
+      : pipeline_(pipeline),
+        joints_(pipeline.value.robot().joints.size()),
+        sensors_(pipeline.value.robot().sensors.size()),
+        results_(slots, std::vector<double>()),
+        runner_(joints_, sensors_, slots, [this](const tl::Arrived& a) { take(a); }) {}
+
+  std::size_t joints() const { return joints_; }
+  std::size_t sensors() const { return sensors_; }
+
+  template <class Fill>
+  bool push(double time, Fill&& fill) {
+    const tl::Admission::Verdict verdict = admission_.take(time);
+    if (verdict == tl::Admission::Verdict::refused) {
+      refused_.fetch_add(1);
+      return false;
+    }
+    return runner_.push(fill);
+  }
+
+  // All results there are, one list of numbers each.
+  nb::list results() {
+    nb::list found;
+    while (const std::vector<double>* numbers = results_.front()) {
+      found.append(arrays::line(*numbers));
+      results_.release();
+    }
+    return found;
+  }
+  bool idle() const { return results_.empty(); }
+
+  std::size_t refused() const { return refused_.load(); }
+  std::size_t unseen() const { return unseen_.load(); }
+  std::size_t overrun() const { return runner_.overrun(); }
+  std::size_t taken() const { return runner_.taken(); }
+  double longest_gap() { return runner_.longest_gap(); }
+  void stop() { runner_.stop(); }
+
+ private:
+  void take(const tl::Arrived& arrived) {
+    const std::lock_guard<std::mutex> turn(pipeline_.turn);  // no interpreter is held here
+    const tl::Result result = pipeline_.value.update(arrived.sample(joints_));
+    pipelines::keep_ended(pipeline_, result);
+    std::vector<double>* out = results_.vacant();
+    if (out == nullptr) {
+      unseen_.fetch_add(1);
+      return;
+    }
+    pipelines::take_snapshot(pipeline_.value, result, snapshot_);
+    out->clear();
+    out->push_back(arrived.arrival);
+    out->push_back(static_cast<double>(arrived.sequence));
+    out->push_back(arrived.time);
+    out->insert(out->end(), arrived.signals.begin(), arrived.signals.end());
+    out->insert(out->end(), snapshot_.begin(), snapshot_.end());
+    results_.publish();
+  }
+
+  pipelines::Pipeline& pipeline_;
+  std::size_t joints_, sensors_;
+  tl::Ring<std::vector<double>> results_;
+  std::vector<double> snapshot_;
+  tl::Admission admission_;
+  std::atomic<std::size_t> refused_{0}, unseen_{0};
+  tl::Runner runner_;  // last: its thread uses all of the others
+};
+
+#ifdef TOUCHLINE_SOCKETS
+
+// Where the fields of an RTDE data package stand, in bytes behind its head; -1: not there.
+struct RtdeLayout {
+  int recipe = 0;
+  std::size_t size = 0;  // of the payload, the recipe's number included
+  int time = -1, q = -1, qd = -1, tau = -1, wrench = -1;
+  std::vector<bool> measured;  // which joints have a torque signal
+  double frequency = 500.0;    // [Hz], by which samples are counted
+  double first = 0.0;          // [s] the stamp of number 0
+};
+
+// Reads the data packages of a controller in a thread of its own, until the socket ends.
+class RtdeReader {
+ public:
+  RtdeReader(Runner& runner, int socket, RtdeLayout layout, std::string begun)
+      : runner_(runner), socket_(::dup(socket)), layout_(std::move(layout)),
+        buffer_(begun.begin(), begun.end()), thread_([this] { work(); }) {}
+  ~RtdeReader() { stop(); }
+
+  void stop() {
+    stopping_.store(true);
+    if (thread_.joinable()) thread_.join();
+    if (socket_ >= 0) ::close(socket_);
+    socket_ = -1;
+  }
+  // Empty while all is well.
+  std::string fault() const { return ended_.load() ? fault_ : std::string(); }
+
+ private:
+  static constexpr int kPatience = 20;  // [ms] after which the thread looks whether it shall end
+  static constexpr std::size_t kLongest = 4096, kRead = 1 << 16;  // bytes
+  static constexpr unsigned char kData = 'U', kText = 'M';
+
+  void work() {
+    std::vector<unsigned char> read(kRead);
+    while (!stopping_.load()) {
+      if (!packages(tl::monotonic_seconds())) return end("it sends no RTDE any more");
+      pollfd wait{socket_, POLLIN, 0};
+      if (::poll(&wait, 1, kPatience) <= 0) continue;
+      const ssize_t got = ::recv(socket_, read.data(), read.size(), MSG_DONTWAIT);
+      if (got == 0) return end("it has closed the connection");
+      if (got < 0 && errno != EAGAIN && errno != EINTR) return end(std::strerror(errno));
+      if (got > 0) buffer_.insert(buffer_.end(), read.begin(), read.begin() + got);
+    }
+  }
+
+  void end(std::string why) {
+    fault_ = std::move(why);
+    ended_.store(true);
+  }
+
+  // Takes whole packages from the front of the buffer; false where they are none of RTDE.
+  bool packages(double now) {
+    std::size_t at = 0;
+    bool good = true;
+    while (good && buffer_.size() - at >= 3) {
+      const std::size_t size = buffer_[at] * 256u + buffer_[at + 1];
+      if (size < 3 || size > kLongest) good = false;
+      if (!good || buffer_.size() - at < size) break;
+      const unsigned char* payload = buffer_.data() + at + 3;
+      if (buffer_[at + 2] == kData && size - 3 == layout_.size && payload[0] == layout_.recipe)
+        sample(payload, now);
+      at += size;
+    }
+    buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(at));
+    return good;
+  }
+
+  static double number(const unsigned char* bytes) {
+    std::uint64_t bits = 0;
+    for (int i = 0; i < 8; ++i) bits = bits << 8 | bytes[i];
+    double value;
+    std::memcpy(&value, &bits, sizeof value);
+    return value;
+  }
+
+  // A time [s] on whole nanoseconds, to the bits of touchline.live.sample.on_nanoseconds.
+  static double on_nanoseconds(double time) {
+    double seconds = std::floor(time), rest = std::nearbyint((time - seconds) * 1e9);
+    if (rest >= 1e9) rest -= 1e9, seconds += 1.0;
+    return seconds + rest * 1e-9;
+  }
+
+  void sample(const unsigned char* payload, double now) {
+    const double time = on_nanoseconds(number(payload + layout_.time));
+    runner_.push(time, [&](tl::Arrived& slot) {
+      slot.arrival = now;
+      slot.time = time;
+      slot.sequence = std::llround((time - layout_.first) * layout_.frequency);
+      const std::size_t n = runner_.joints();
+      double* out = slot.signals.data();
+      out = copy(payload, layout_.q, n, out);
+      out = copy(payload, layout_.qd, n, out);
+      double* const tau = out;
+      out = copy(payload, layout_.tau, n, out);
+      for (std::size_t j = 0; j < n; ++j)
+        if (!layout_.measured[j]) tau[j] = tl::kUnknown;
+      copy(payload, layout_.wrench, 6 * runner_.sensors(), out);
+    });
+  }
+
+  static double* copy(const unsigned char* payload, int offset, std::size_t count, double* out) {
+    for (std::size_t i = 0; i < count; ++i)
+      *out++ = offset < 0 ? tl::kUnknown : number(payload + offset + 8 * i);
+    return out;
+  }
+
+  Runner& runner_;
+  int socket_;
+  RtdeLayout layout_;
+  std::vector<unsigned char> buffer_;
+  std::atomic<bool> stopping_{false}, ended_{false};
+  std::string fault_;  // written before `ended_` is set
+  std::thread thread_;
+};
+
+#endif
+
+inline int admit(tl::Admission& admission, double time) {
+  return static_cast<int>(admission.take(time));
+}
+
+inline void bind(nb::module_& m) {
+  nb::class_<tl::Admission>(m, "Admission").def(nb::init<>()).def("take", &admit, "time"_a);
+  nb::class_<Runner>(m, "Runner")
+      .def(nb::init<pipelines::Pipeline&, std::size_t>(), "pipeline"_a, "slots"_a,
+           nb::keep_alive<1, 2>())
+      .def("results", &Runner::results)
+      .def_prop_ro("idle", &Runner::idle)
+      .def_prop_ro("refused", &Runner::refused)
+      .def_prop_ro("unseen", &Runner::unseen)
+      .def_prop_ro("overrun", &Runner::overrun)
+      .def_prop_ro("taken", &Runner::taken)
+      .def("longest_gap", &Runner::longest_gap)
+      .def("stop", &Runner::stop, nb::call_guard<nb::gil_scoped_release>());
+#ifdef TOUCHLINE_SOCKETS
+  nb::class_<RtdeLayout>(m, "RtdeLayout")
+      .def(nb::init<>())
+      .def_rw("recipe", &RtdeLayout::recipe)
+      .def_rw("size", &RtdeLayout::size)
+      .def_rw("time", &RtdeLayout::time)
+      .def_rw("q", &RtdeLayout::q)
+      .def_rw("qd", &RtdeLayout::qd)
+      .def_rw("tau", &RtdeLayout::tau)
+      .def_rw("wrench", &RtdeLayout::wrench)
+      .def_rw("measured", &RtdeLayout::measured)
+      .def_rw("frequency", &RtdeLayout::frequency)
+      .def_rw("first", &RtdeLayout::first);
+  nb::class_<RtdeReader>(m, "RtdeReader")
+      .def(
+          "__init__",
+          [](RtdeReader* self, Runner& runner, int socket, const RtdeLayout& layout,
+             const nb::bytes& begun) {
+            new (self) RtdeReader(runner, socket, layout, std::string(begun.c_str(), begun.size()));
+          },
+          "runner"_a, "socket"_a, "layout"_a, "begun"_a, nb::keep_alive<1, 2>())
+      .def_prop_ro("fault", &RtdeReader::fault)
+      .def("stop", &RtdeReader::stop, nb::call_guard<nb::gil_scoped_release>());
+#endif
+}
+
+}  // namespace live

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A running robot on a page: how it stands, what it feels, and how its streams are."""
+
+import html
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from touchline.health import Health
+from touchline.live.session import Session
+from touchline.live.streams import StreamState
+from touchline.view.contacts import ContactScene
+from touchline.view.scene import RobotScene, dress
+from touchline.view.server import PageServer
+
+FRAME = 0.05  # s between two pictures: a browser gets no more, however fast the robot is
+READOUT = 0.25  # s between two of them
+COLOURS = {StreamState.OK: "#009e73", StreamState.SLOW: "#e69f00"}
+BAD = "#d55e00"
+
+
+class RobotPage:
+    """The page of `touchline live --view`; nothing on it commands the robot.
+
+    Args:
+        server: without anything on its page.
+        session: that is shown.
+        allow_control: whether visitors may let the pipeline start anew.
+    """
+
+    def __init__(self, server: PageServer, session: Session, allow_control: bool = False) -> None:
+        self._session, self._page = session, server.page
+        dress(self._page)
+        self._robot = RobotScene(self._page.scene, session.robot)
+        self._contacts = ContactScene(self._page.scene, self._robot)
+        self._readout = self._page.gui.add_html("")
+        self._asked: list[Callable[[], object]] = []
+        if allow_control:
+            button = self._page.gui.add_button("Reset the pipeline")
+            button.on_click(lambda _: self._asked.append(session.reset))
+        self._drawn, self._written = -np.inf, -np.inf
+
+    def update(self) -> None:
+        """Shows what is new, if a picture is due; called between two reads."""
+        now = time.monotonic()
+        if now - self._drawn < FRAME:
+            return
+        self._drawn = now
+        while self._asked:
+            self._asked.pop()()
+        session = self._session
+        if not self._page.get_clients() or session.sample is None:
+            return
+        result, q = session.result, np.nan_to_num(session.sample.q)
+        with self._page.atomic():
+            self._robot.place(q)
+            self._contacts.show([] if result is None else result.contacts, [], q)
+        if now - self._written >= READOUT:
+            self._written = now
+            self._readout.content = self._text(now)
+
+    def _text(self, now: float) -> str:
+        lines = []
+        for stream in self._session.connection.streams:
+            colour = COLOURS.get(stream.state(now), BAD)
+            told = html.escape(stream.describe(now))
+            lines.append(f'<span style="color:{colour}">&#9679;</span> {told}')
+        result = self._session.result
+        if result is None:
+            lines.append("<b>no honest estimate now: it is withheld</b>")
+        else:
+            bits = [bit.name for bit in Health if result.health & bit and bit.name]
+            lines.append(f"health: {', '.join(bits).lower() or 'all is well'}")
+            for contact in result.contacts:
+                where = contact.link or contact.likely_link or contact.segment
+                lines.append(f"<b>{html.escape(where)}</b>: {contact.size:.1f} N, {contact.status}")
+        return f'<div style="font-size:12px;padding:0 0.75em">{"<br>".join(lines)}</div>'
