@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from touchline.reaction.reactor import Command as Command
     from touchline.reaction.reactor import Reactor as Reactor
     from touchline.reaction.state import State as State
+    from touchline.report.results import analyze as analyze
 
 __version__: str = core.VERSION
 
@@ -63,6 +64,7 @@ LATER = {  # loaded when they are asked for: from which module
     "Region": "touchline.localizer.region",
     "Skin": "touchline.localizer.skin",
     "State": "touchline.reaction.state",
+    "analyze": "touchline.report.results",
     "read_log": "touchline.logs",
 }
 

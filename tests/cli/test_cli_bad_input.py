@@ -167,6 +167,8 @@ def test_bad_options(capsys, log, tmp_path, options, words):
 
 def test_missing_options(capsys):
     assert main(["analyze", "log.csv"]) == 2
+    assert "--out" in capsys.readouterr().err
+    assert main(["analyze", "log.csv", "--out", "r"]) == 2
     assert "--robot" in capsys.readouterr().err
 
 

@@ -2,21 +2,27 @@
 """`touchline analyze`."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from tyro.conf import Positional, arg
 
+from touchline.errors import InputError
+
 
 def analyze(
-    log: Annotated[Positional[Path], arg(metavar="LOG")],
+    logs: Annotated[Positional[tuple[str, ...]], arg(metavar="LOG [LOG ...]")],
     /,
-    robot: Annotated[str, arg(metavar="ROBOT")],
     out: Annotated[Path, arg(metavar="DIR")],
+    robot: Annotated[str | None, arg(metavar="ROBOT")] = None,
     bandwidth: Annotated[float | None, arg(metavar="K")] = None,
     method: Literal["segment", "paper"] = "segment",
     report: Literal["full", "summary", "none"] = "full",
+    dry_run: bool = False,
+    workers: Annotated[int, arg(metavar="N")] = 0,
+    time_limit: Annotated[float | None, arg(metavar="S")] = None,
+    memory_limit: Annotated[float | None, arg(metavar="MB")] = None,
 ) -> int:
-    """Estimates external torques and wrenches in a recording and finds the contacts in it.
+    """Estimates external torques and wrenches in recordings and finds the contacts in them.
 
     Example: touchline analyze run1.parquet --robot robot.yaml --out results
 
@@ -29,19 +35,60 @@ def analyze(
     folder touchline.unfinished: events.json, and estimates.parts and contacts.parts with Parquet
     files.
 
+    Several recordings, a folder, a pattern ("runs/*.mcap") or a CSV list with the columns log and
+    robot are analyzed by all cores, each into a folder of its own below DIR. manifest.jsonl there
+    tells what became of each: ok, partial (something in it could not be read), failed or skipped,
+    why, and hashes of input, configuration and results. The same command goes on where it was
+    stopped, and leaves alone what is unchanged. Without --robot the robot.yaml in the recording's
+    folder, or the nearest above it, is taken. Exit status then: 0 all ok, 3 some are not, 1 none.
+
     Args:
-        log: The recording: a table (.parquet, .csv, .csv.gz) or a rosbag2 (.mcap, .db3, or its
+        logs: The recordings: tables (.parquet, .csv, .csv.gz) or rosbag2 (.mcap, .db3, or its
             folder). Foreign column names are given in the robot description, key `log`.
-        robot: Its robot.yaml, or the name of a robot that ships with Touchline (sara).
         out: Directory for the results.
+        robot: Its robot.yaml, or the name of a robot that ships with Touchline (sara).
         bandwidth: Of the observer [rad/s]: higher is faster and noisier. Default: as described.
         method: segment: each segment's own momentum, no ghost contacts in motion; paper: each
             residual in its sensor's frame, as published.
         report: full; summary: without pictures and curves of each event; none: no report.html.
+        dry_run: Print what would be done.
+        workers: Processes for several recordings. Default: one per core.
+        time_limit: For each of several recordings [s].
+        memory_limit: For each process of several recordings [MB].
     """
+    from touchline.fleet.plan import is_single, make_plan
+    from touchline.fleet.run import plan_text
+
+    if not logs:
+        raise InputError("LOG: name at least one recording, folder, pattern or list")
+    if dry_run:
+        print(plan_text(make_plan(logs, robot)))
+        return 0
+    options = {"bandwidth": bandwidth, "method": method, "report": report}
+    if is_single(logs):
+        if robot is None:
+            raise InputError(f"--robot: {logs[0]}: name the robot of this recording")
+        return _one(Path(logs[0]), robot, out, options)
+    from touchline.fleet.run import Limits
+
+    return _several(logs, robot, out, options, Limits(workers, time_limit, memory_limit))
+
+
+def _one(log: Path, robot: str, out: Path, options: dict[str, Any]) -> int:
     from touchline.report.analysis import analyze as run
     from touchline.report.summary import summary_text
 
-    analysis = run(log, robot, out, bandwidth, method, report)
-    print(summary_text(analysis))
+    print(summary_text(run(log, robot, out, **options)))
     return 0
+
+
+def _several(
+    logs: tuple[str, ...], robot: str | None, out: Path, options: dict[str, Any], limits: Any
+) -> int:
+    from touchline.fleet.run import analyze_all, outcome_text
+    from touchline.report.analysis import check_options
+
+    check_options(options["bandwidth"], options["method"])
+    outcome = analyze_all(logs, robot, out, options, limits)
+    print(outcome_text(outcome, out))
+    return outcome.status

@@ -42,6 +42,7 @@ class Bag:
         counts: topic -> number of messages.
         duration: between the first and the last message received [s].
         warnings: grows while reading.
+        losses: those of them that tell of what could not be read.
         done: number of messages handed out by the last call of `messages`.
     """
 
@@ -53,6 +54,7 @@ class Bag:
         """
         self.path = path
         self.warnings: list[str] = []
+        self.losses: list[str] = []
         self.done = 0
         self._files: list[_File] = []
         self._place = 0
@@ -130,16 +132,16 @@ class Bag:
             file: _File = McapFile(path) if path.suffix == ".mcap" else SqliteFile(path)
         except (ValueError, OSError, sqlite3.Error, RecursionError) as error:
             text = f"{path}: not a readable recording, or damaged: {first_line(error)}"
-            self.warnings.append(text)
+            self._warn(text)
             return
         count = sum(file.counts.values())
         if file.damage is not None and not count:
             text = f"{path}: not a readable recording, or damaged: {file.damage}"
-            self.warnings.append(text)
+            self._warn(text)
             file.close()
             return
         if file.damage is not None:
-            self.warnings.append(
+            self._warn(
                 f"{path}: the file is cut off or damaged after {count} messages ({file.damage}); "
                 "all that can be read is used"
             )
@@ -148,7 +150,7 @@ class Bag:
     def _warn_of_journal(self, file: Path) -> None:
         journal = file.with_name(file.name + "-wal")
         if journal.exists() and journal.stat().st_size:
-            self.warnings.append(
+            self._warn(
                 f"{file}: the recorder did not finish; its last messages are still in "
                 f"{journal.name} and are not read (opening the file once with sqlite3 "
                 "brings them in)"
@@ -195,6 +197,7 @@ class Bag:
     def _warn(self, text: str) -> None:
         if text not in self.warnings:
             self.warnings.append(text)
+            self.losses.append(text)
 
     def close(self) -> None:
         """Release the files."""

@@ -65,6 +65,7 @@ class CsvSource:
         self.topics: dict[str, str] = {}
         self.metadata: dict[str, Any] = {}
         self.warnings: list[str] = []
+        self.losses = self.warnings  # there is nothing else to warn of
         self.delayed_wrenches = True
         self._stream: WholeLines | None = None
 

@@ -52,6 +52,11 @@ class Log:
         return self._preparation.warnings + self._source.warnings
 
     @property
+    def losses(self) -> list[str]:
+        """The warnings that tell of parts of the log that could not be read."""
+        return self._source.losses
+
+    @property
     def progress(self) -> float:
         """Fraction of the log that has been read, 0 to 1."""
         return min(self._source.progress(), 1.0)

@@ -283,7 +283,8 @@ class McapFile:
         self._count(found, self._data[begin : begin + 22])
         start = begin - _HEAD.size
         last = found.spans[-1] if found.spans else None
-        if last is not None and last.end == start and start - last.start < _LONE_BYTES:
+        lone = last is not None and not last.size and last.end == start  # a chunk has a size
+        if last is not None and lone and start - last.start < _LONE_BYTES:
             found.spans[-1] = replace(last, end=end)
         else:
             received = int.from_bytes(self._data[begin + 6 : begin + 14], "little")

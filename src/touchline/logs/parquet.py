@@ -47,6 +47,7 @@ class ParquetSource:
         self.columns = tuple(self._file.schema_arrow.names)
         self.topics: dict[str, str] = {}
         self.warnings: list[str] = []
+        self.losses: list[str] = []
         self.delayed_wrenches = True
         try:
             self._selection = select_columns(description, naming, list(self.columns), str(path))

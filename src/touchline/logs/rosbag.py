@@ -74,6 +74,12 @@ class RosbagSource:
         found = [w for channel in (self._joints, *self._wrenches) for w in channel.warnings()]
         return self._bag.warnings + [f"{self.path}: {warning}" for warning in found]
 
+    @property
+    def losses(self) -> list[str]:
+        """What could not be read."""
+        bad = [w for channel in (self._joints, *self._wrenches) for w in channel.losses()]
+        return self._bag.losses + [f"{self.path}: {loss}" for loss in bad]
+
     def head(self) -> Block:
         """The first rows, without wrenches."""
         return self._head

@@ -19,6 +19,7 @@ class Source(Protocol):
         topics: topic -> message type, of a rosbag2.
         metadata: what the writer left.
         warnings: grows while reading.
+        losses: those of them that tell of parts that could not be read.
         without_velocity: indices of the joints whose `qd` is not in the log.
         delayed_wrenches: True where `blocks` leaves the sensors' delays to the reader.
     """
@@ -37,6 +38,9 @@ class Source(Protocol):
 
     @property
     def warnings(self) -> list[str]: ...  # noqa: D102
+
+    @property
+    def losses(self) -> list[str]: ...  # noqa: D102
 
     def head(self) -> Block:
         """The first rows, at most `HEAD_ROWS`."""

@@ -44,9 +44,12 @@ class Channel:
 
     def warnings(self) -> list[str]:
         """What there is to say of this topic."""
+        return self.notes + self.losses()
+
+    def losses(self) -> list[str]:
+        """What of it could not be read."""
         count = self.decoder.undecodable
-        bad = [f"{self.topic}: {count} messages cannot be decoded"] if count else []
-        return self.notes + bad
+        return [f"{self.topic}: {count} messages cannot be decoded"] if count else []
 
     def look(self, messages: Messages) -> dict[str, np.ndarray]:
         """Decode the first messages and learn clock and period from them."""

@@ -133,22 +133,26 @@ class TableWriter:
         ):
             self._close_part()
         elif self._waiting_rows >= _GROUP_ROWS:
-            self._write_group()
+            self._write_groups(rest=False)
 
-    def _write_group(self) -> None:
+    def _write_groups(self, rest: bool) -> None:
+        """Write what waits in groups of one size, which does not depend on time; or all of it."""
         import pyarrow as pa
 
         if self._writer is None:
             self.parts.mkdir(exist_ok=True)
             self._writer = _parquet_writer(self._part(self._count, False), self._schema)
-        self._writer.write_table(pa.Table.from_batches(self._waiting), row_group_size=_GROUP_ROWS)
-        self._waiting, self._waiting_rows = [], 0
+        table = pa.Table.from_batches(self._waiting).combine_chunks()
+        whole = table.num_rows if rest else table.num_rows // _GROUP_ROWS * _GROUP_ROWS
+        self._writer.write_table(table.slice(0, whole), row_group_size=_GROUP_ROWS)
+        self._waiting = table.slice(whole).to_batches()
+        self._waiting_rows = table.num_rows - whole
 
     def _close_part(self) -> None:
         if not self._part_rows:
             return
         if self._waiting:
-            self._write_group()
+            self._write_groups(rest=True)
         self._writer.close()
         self._writer, self._part_rows = None, 0
         self._part(self._count, False).rename(self._part(self._count, True))
@@ -170,11 +174,15 @@ class TableWriter:
             held: list[Any] = []
             for group in self._groups():
                 held.append(group)
-                if sum(table.num_rows for table in held) >= _GROUP_ROWS:
-                    writer.write_table(pa.concat_tables(held), row_group_size=_GROUP_ROWS)
-                    held = []
-            if held:
-                writer.write_table(pa.concat_tables(held), row_group_size=_GROUP_ROWS)
+                rows = sum(table.num_rows for table in held)
+                if rows >= _GROUP_ROWS:
+                    table = pa.concat_tables(held).combine_chunks()
+                    whole = rows // _GROUP_ROWS * _GROUP_ROWS
+                    writer.write_table(table.slice(0, whole), row_group_size=_GROUP_ROWS)
+                    held = [table.slice(whole)]
+            rest = pa.concat_tables(held).combine_chunks() if held else None
+            if rest is not None and rest.num_rows:
+                writer.write_table(rest, row_group_size=_GROUP_ROWS)
         _unfinished(self.path).rename(self.path)
 
     def _groups(self) -> Iterator[Any]:

@@ -60,6 +60,7 @@ class Analysis:
         windows: the curves around them.
         comparisons: of the events with the truth of a simulated log.
         warnings: what the user should know.
+        losses: those that tell of parts of the recording that could not be read.
     """
 
     robot: Robot
@@ -76,6 +77,7 @@ class Analysis:
     windows: EventWindows
     comparisons: list[Comparison]
     warnings: list[str]
+    losses: list[str]
 
     @property
     def origin(self) -> float:
@@ -109,7 +111,7 @@ def analyze(
     """
     import pyarrow.parquet  # noqa: F401  the results need it: told before the work begins
 
-    _check_options(bandwidth, method)
+    check_options(bandwidth, method)
     log, out, model = Path(log), Path(out), load_robot(robot)
     check_inputs(out, log, Path(robot))
     with open_log(log, model.description) as recording:
@@ -124,7 +126,7 @@ def analyze(
                 run.add(part)
             warnings = bandwidth_warnings(bandwidths(model, bandwidth), run.period)
             warnings += [*recording.warnings, *model.warnings, *run.pipeline.skin.lost]
-            analysis = run.finish(log, out, method, bandwidth, warnings)
+            analysis = run.finish(log, out, method, bandwidth, warnings, recording.losses)
             write_origin(folder.draft / ANALYSIS, log, robot, _origin(analysis))
             if report != "none":
                 from touchline.report.page import page_text
@@ -140,7 +142,12 @@ def _origin(analysis: Analysis) -> dict[str, Any]:
     return facts | {"start": clock.first, "end": clock.last, "samples": clock.rows}
 
 
-def _check_options(bandwidth: float | None, method: str) -> None:
+def check_options(bandwidth: float | None, method: str) -> None:
+    """Make sure that options of an analysis make sense.
+
+    Raises:
+        InputError: they do not.
+    """
     if bandwidth is not None and not (np.isfinite(bandwidth) and bandwidth > 0):
         raise InputError(f"--bandwidth {bandwidth}: must be a positive number [rad/s]")
     if method not in METHODS:
@@ -179,7 +186,13 @@ class _Run:
         self._poses.add(time, part.q, self.pipeline.events)
 
     def finish(
-        self, log: Path, out: Path, method: str, bandwidth: float | None, warnings: list[str]
+        self,
+        log: Path,
+        out: Path,
+        method: str,
+        bandwidth: float | None,
+        warnings: list[str],
+        losses: list[str],
     ) -> Analysis:
         """Close the files; returns what there is to tell."""
         events = self.pipeline.events
@@ -199,6 +212,7 @@ class _Run:
             windows=self._windows,
             comparisons=compare_log(events, log),
             warnings=warnings,
+            losses=losses,
         )
 
 

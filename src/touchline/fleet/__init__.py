@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Many recordings, analyzed by all cores, each accounted for once."""

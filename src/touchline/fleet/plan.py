@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which recordings are to be analyzed, with which robots, and where their results go."""
+
+import csv
+import glob
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from touchline.errors import InputError
+from touchline.logs.log import BAGS, TABLES
+from touchline.report.outputs import ANALYSIS, NAMES
+
+ROBOT_FILE = "robot.yaml"
+LOG_COLUMN, ROBOT_COLUMN = "log", "robot"
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One recording to analyze.
+
+    Attributes:
+        log: its file, or the folder of a rosbag2.
+        robot: name or description of the robot; empty where none is known.
+        name: of its results, a path below the folder of all.
+        size: of its files [bytes].
+        problem: why it is not analyzed, or empty.
+    """
+
+    log: Path
+    robot: str
+    name: str
+    size: int
+    problem: str = ""
+
+
+def is_single(logs: Sequence[str]) -> bool:
+    """Whether what was named is one recording, and neither a folder of several nor a list."""
+    if len(logs) != 1 or glob.has_magic(logs[0]) and not Path(logs[0]).exists():
+        return False
+    path = Path(logs[0])
+    return _is_bag_folder(path) or not path.is_dir() and not _is_list(path)
+
+
+def make_plan(logs: Sequence[str], robot: str | None) -> list[Recording]:
+    """All recordings that were named, in a fixed order, each once.
+
+    Args:
+        logs: files, folders, patterns such as `runs/*.mcap`, or CSV lists with the columns `log`
+            and `robot`; paths in a list count from where it is.
+        robot: of all; default: what a list says, else the `robot.yaml` in the recording's folder
+            or the nearest above it.
+
+    Raises:
+        InputError: something does not exist, or nothing was found.
+    """
+    found: dict[Path, tuple[str, str]] = {}  # log -> robot, problem
+    for word in logs:
+        for log, own in _named(word):
+            chosen = robot or own or _nearest_robot(log)
+            problem = "" if chosen else f"no robot: give --robot, or put a {ROBOT_FILE} beside it"
+            found.setdefault(log.resolve(), (chosen, problem))
+    if not found:
+        raise InputError(f"{', '.join(logs)}: no recordings there")
+    names = _names(list(found))
+    plan = []
+    for log, (chosen, problem) in found.items():
+        if not problem and not log.exists():
+            problem = "no such file"
+        plan.append(Recording(log, chosen, names[log], _size(log), problem))
+    return sorted(plan, key=lambda recording: recording.name)
+
+
+def _named(word: str) -> Iterator[tuple[Path, str]]:
+    """Recordings that one word of the command line names, and their robots."""
+    path = Path(word)
+    if not path.exists():
+        matches = sorted(glob.glob(word, recursive=True)) if glob.has_magic(word) else []
+        if not matches:
+            raise InputError(f"{word}: no such file" + (" matches" if glob.has_magic(word) else ""))
+        for match in matches:
+            if Path(match).is_dir() or _is_log(Path(match)):
+                yield from _named(match)
+    elif path.is_dir() and not _is_bag_folder(path):
+        for log in _below(path):
+            yield log, ""
+    elif _is_list(path):
+        yield from _listed(path)
+    else:
+        yield path, ""
+
+
+def _below(folder: Path) -> Iterator[Path]:
+    """Recordings in a folder and the folders in it, without results of earlier analyses."""
+    if (folder / ANALYSIS).exists():
+        return
+    for path in sorted(folder.iterdir()):
+        if path.name.startswith(".") or path.name.endswith(".parts"):
+            continue
+        if path.is_dir():
+            if _is_bag_folder(path):
+                yield path
+            else:
+                yield from _below(path)
+        elif _is_log(path) and path.name not in NAMES and not _is_list(path):
+            yield path
+
+
+def _is_log(path: Path) -> bool:
+    return path.name.lower().endswith((*TABLES, *BAGS))
+
+
+def _is_bag_folder(path: Path) -> bool:
+    return path.is_dir() and (path / "metadata.yaml").is_file()
+
+
+def _is_list(path: Path) -> bool:
+    """Whether a CSV file is a list of recordings and not one itself."""
+    if path.suffix.lower() != ".csv" or not path.is_file():
+        return False
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            head = next(csv.reader([file.readline(1 << 16)]), [])
+    except (OSError, UnicodeDecodeError, csv.Error):
+        return False
+    return LOG_COLUMN in [name.strip() for name in head]
+
+
+def _listed(path: Path) -> Iterator[tuple[Path, str]]:
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        for number, row in enumerate(csv.DictReader(file, skipinitialspace=True), 2):
+            log = (row.get(LOG_COLUMN) or "").strip()
+            if not log:
+                raise InputError(f"{path}: line {number}: names no {LOG_COLUMN}")
+            robot = (row.get(ROBOT_COLUMN) or "").strip()
+            beside = path.parent / robot
+            yield path.parent / log, str(beside) if robot and beside.is_file() else robot
+
+
+def _nearest_robot(log: Path) -> str:
+    for folder in log.resolve().parents:
+        if (folder / ROBOT_FILE).is_file():
+            return str(folder / ROBOT_FILE)
+    return ""
+
+
+def _names(logs: list[Path]) -> dict[Path, str]:
+    """Names for the results: paths below what all recordings share, no two the same."""
+    shared = logs[0].parent
+    while not all(log.is_relative_to(shared) for log in logs):
+        shared = shared.parent
+    names: dict[Path, str] = {}
+    taken: set[str] = set()
+    for log in sorted(logs):
+        relative = log.relative_to(shared)
+        short = relative.as_posix()
+        for ending in sorted((*TABLES, *BAGS), key=len, reverse=True):
+            short = short.removesuffix(ending)
+        name = short if short and short not in taken else relative.as_posix().replace(".", "_")
+        while name in taken:
+            name += "_"
+        taken.add(name)
+        names[log] = name
+    return names
+
+
+def _size(log: Path) -> int:
+    if log.is_dir():
+        return sum(file.stat().st_size for file in log.iterdir() if file.is_file())
+    return log.stat().st_size if log.exists() else 0

@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Analyzes many recordings: plan, processes, manifest, and what came of it."""
+
+import json
+import os
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from touchline.errors import InputError
+from touchline.fleet.manifest import Manifest, Row, configuration_hash
+from touchline.fleet.plan import Recording, make_plan
+from touchline.fleet.pool import Pool
+from touchline.fleet.work import Job, blank
+from touchline.folder import ResultsFolder
+
+LOG = "log.jsonl"
+DONE = ("ok", "partial")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What processes may take.
+
+    Attributes:
+        workers: number of processes; 0: one per core.
+        seconds: for one recording, or None.
+        megabytes: of memory for one process, or None.
+    """
+
+    workers: int = 0
+    seconds: float | None = None
+    megabytes: float | None = None
+
+    def check(self) -> None:
+        """Raise an InputError where a limit makes no sense."""
+        if self.workers < 0:
+            raise InputError(f"--workers {self.workers}: must not be negative")
+        for name, value in (("time-limit", self.seconds), ("memory-limit", self.megabytes)):
+            if value is not None and not value > 0:
+                raise InputError(f"--{name} {value:g}: must be positive")
+
+
+@dataclass
+class Outcome:
+    """What became of all recordings.
+
+    Attributes:
+        rows: one per recording, in the order of the plan.
+        unchanged: names of those whose results stood already.
+        stopped: whether it was interrupted.
+    """
+
+    rows: list[Row] = field(default_factory=list)
+    unchanged: set[str] = field(default_factory=set)
+    stopped: bool = False
+
+    @property
+    def status(self) -> int:
+        """Exit status: 0 all ok, 3 some lost or partial, 1 nothing done, 130 interrupted."""
+        if self.stopped:
+            return 130
+        told = Counter(row["status"] for row in self.rows)
+        if not any(told[status] for status in DONE):
+            return 1
+        return 0 if told["ok"] == len(self.rows) else 3
+
+
+def analyze_all(
+    logs: Sequence[str],
+    robot: str | None,
+    out: Path,
+    options: dict[str, Any],
+    limits: Limits,
+) -> Outcome:
+    """Analyze recordings into folders below `out`; what is unchanged there is left alone.
+
+    Args:
+        logs: as of `make_plan`.
+        robot: of all, or None.
+        out: folder of the results, the manifest and the log.
+        options: of `touchline.report.analysis.analyze`.
+        limits: of the processes.
+
+    Raises:
+        InputError: what was named cannot be used at all, or another process writes into `out`.
+    """
+    limits.check()
+    plan = make_plan(logs, robot)
+    with ResultsFolder(out, ()) as folder:  # its lock: one such run at a time
+        folder.draft.rmdir()
+        manifest = Manifest(out)
+        with (out / LOG).open("a", encoding="utf-8") as journal:
+            outcome = _run(plan, manifest, journal, out, options, limits)
+        manifest.close(recording.name for recording in plan)
+    outcome.rows = [manifest.rows[r.name] for r in plan if r.name in manifest.rows]
+    return outcome
+
+
+def _run(
+    plan: list[Recording],
+    manifest: Manifest,
+    journal: Any,
+    out: Path,
+    options: dict[str, Any],
+    limits: Limits,
+) -> Outcome:
+    outcome = Outcome()
+    jobs, refused = _jobs(plan, manifest, out, options)
+    for row in refused:
+        manifest.add(row)
+        _note(journal, row)
+    memory = None if limits.megabytes is None else int(limits.megabytes * 2**20)
+    workers = limits.workers or os.cpu_count() or 1
+    try:
+        with (
+            Pool(min(workers, max(len(jobs), 1)), limits.seconds, memory) as pool,
+            _bar(jobs) as bar,
+        ):
+            for row in pool.rows(jobs):
+                if row.pop("unchanged", False):
+                    outcome.unchanged.add(row["name"])
+                else:
+                    manifest.add(row)
+                    _note(journal, row)
+                bar.update(row["bytes"])
+    except KeyboardInterrupt:
+        outcome.stopped = True
+    return outcome
+
+
+def _jobs(
+    plan: list[Recording], manifest: Manifest, out: Path, options: dict[str, Any]
+) -> tuple[list[Job], list[Row]]:
+    """What there is to do, the largest first so that no core waits at the end; and what is not."""
+    hashes: dict[str, str] = {}
+    problems: dict[str, str] = {}
+    for robot in {recording.robot for recording in plan if not recording.problem}:
+        try:
+            hashes[robot] = configuration_hash(robot, options)
+        except InputError as error:
+            problems[robot] = error.problems[0]
+    jobs, refused = [], []
+    for recording in plan:
+        known = manifest.rows.get(recording.name)
+        job = Job(recording, out, hashes.get(recording.robot, ""), options, known)
+        problem = recording.problem or problems.get(recording.robot, "")
+        if problem:
+            refused.append(blank(job, "skipped", problem))
+        else:
+            jobs.append(job)
+    return sorted(jobs, key=lambda job: -job.recording.size), refused
+
+
+def _note(journal: Any, row: Row) -> None:
+    line = {"time": round(time.time(), 3)} | {k: row[k] for k in ("name", "status", "reason")}
+    journal.write(json.dumps(line) + "\n")
+    journal.flush()
+
+
+def _bar(jobs: list[Job]) -> Any:
+    from tqdm import tqdm
+
+    total = sum(job.recording.size for job in jobs)
+    form = "{desc} {percentage:3.0f} %|{bar}| {elapsed} (about {remaining} left)"
+    return tqdm(total=total, desc="recordings", bar_format=form, disable=None, leave=False)
+
+
+def plan_text(plan: Sequence[Recording]) -> str:
+    """What a run would do."""
+    lines = [
+        f"{'skip' if r.problem else 'analyze':8}{r.size / 1e6:9.1f} MB  {r.name}"
+        + (f"  ({r.problem})" if r.problem else f"  with {r.robot}")
+        for r in plan
+    ]
+    todo = [r for r in plan if not r.problem]
+    size = sum(r.size for r in todo) / 1e6
+    lines.append(f"{len(todo)} of {len(plan)} recordings, {size:.1f} MB; nothing was done")
+    return "\n".join(lines)
+
+
+def outcome_text(outcome: Outcome, out: Path) -> str:
+    """What became of the recordings: each that is not ok, and a line of sums."""
+    lines = [
+        f"{row['status']:8} {row['name']}: {row['reason']}"
+        for row in outcome.rows
+        if row["status"] != "ok"
+    ]
+    told = Counter(row["status"] for row in outcome.rows)
+    sums = ", ".join(f"{told[s]} {s}" for s in (*DONE, "failed", "skipped") if told[s])
+    hours = sum(row["duration"] for row in outcome.rows) / 3600
+    events = sum(row["events"] for row in outcome.rows)
+    if outcome.stopped:
+        lines.append("stopped; the same command goes on")
+    lines.append(
+        f"{len(outcome.rows)} recordings ({sums or 'none done'}), {hours:.2f} hours, "
+        f"{events} events; "
+        f"{len(outcome.unchanged)} were unchanged; {out}/manifest.jsonl tells of each"
+    )
+    return "\n".join(lines)

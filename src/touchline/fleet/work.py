@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One recording in a process of its own: whatever happens to it becomes a row."""
+
+import os
+import resource
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from touchline import __version__
+from touchline.errors import InputError
+from touchline.fleet.manifest import Row, file_hash, stands
+from touchline.fleet.plan import Recording
+from touchline.logs.bagfile import first_line
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a worker is asked for.
+
+    Attributes:
+        recording: to analyze.
+        out: folder of all results.
+        configuration: hash of robot and options.
+        options: of `analyze`.
+        known: the row of an earlier run.
+    """
+
+    recording: Recording
+    out: Path
+    configuration: str
+    options: dict[str, Any]
+    known: Row | None = None
+
+
+def serve(pipe: Any, memory: int | None) -> None:
+    """Take jobs from a pipe and answer with rows, until it is closed.
+
+    Args:
+        pipe: end of a `multiprocessing.Pipe`.
+        memory: that the process may take [bytes].
+    """
+    os.environ["TQDM_DISABLE"] = "1"
+    if memory is not None:
+        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    try:
+        while (job := pipe.recv()) is not None:
+            pipe.send(done(job))
+    except (EOFError, OSError, KeyboardInterrupt):  # the one who asks is gone, or has enough
+        return
+
+
+def done(job: Job) -> Row:
+    """Analyze a recording; its row. Nothing is raised but what ends the process."""
+    began, cpu = time.monotonic(), time.process_time()
+    row = blank(job, "failed", "")
+    try:
+        row["content"] = file_hash(job.recording.log)
+        known = job.known
+        if known is not None and known.get("status") in ("ok", "partial"):
+            same = all(known.get(key) == row[key] for key in ("content", "configuration", "robot"))
+            if same and stands(known, job.out):
+                return known | {"unchanged": True}
+        row |= _analyzed(job)
+    except InputError as error:
+        row["reason"] = error.problems[0]
+    except MemoryError:
+        row["reason"] = "not enough memory"
+    except OSError as error:
+        row["reason"] = f"{error.filename or job.recording.log}: {error.strerror or error}"
+    except Exception as error:  # a recording never stops the others
+        row["reason"] = f"{type(error).__name__}: {first_line(error)}"
+    row["seconds"] = round(time.monotonic() - began, 3)
+    row["cpu_seconds"] = round(time.process_time() - cpu, 3)
+    row["memory_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+    return row
+
+
+def blank(job: Job, status: str, reason: str) -> Row:
+    """The row of a recording that was not analyzed."""
+    recording = job.recording
+    return {
+        "name": recording.name,
+        "log": str(recording.log),
+        "robot": recording.robot,
+        "status": status,
+        "reason": reason,
+        "content": None,
+        "configuration": job.configuration,
+        "touchline": __version__,
+        "bytes": recording.size,
+        "samples": 0,
+        "flagged": 0,
+        "duration": 0.0,
+        "events": 0,
+        "collisions": 0,
+        "outputs": {},
+    }
+
+
+def _analyzed(job: Job) -> Row:
+    from touchline.report.analysis import analyze
+    from touchline.report.outputs import NAMES
+
+    out = job.out / job.recording.name
+    analysis = analyze(job.recording.log, job.recording.robot, out, **job.options)
+    clock = analysis.statistics.clock
+    files = [out / name for name in NAMES if (out / name).is_file()]
+    return {
+        "status": "partial" if analysis.losses else "ok",
+        "reason": analysis.losses[0] if analysis.losses else "",
+        "samples": clock.rows,
+        "flagged": clock.rows - analysis.statistics.healthy,
+        "duration": round(clock.duration, 6),
+        "events": len(analysis.events),
+        "collisions": sum(event.level == "collision" for event in analysis.events),
+        "outputs": {file.name: file_hash(file) for file in files},
+    }

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The results of an analysis in memory."""
+
+import json
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from touchline.report.analysis import analyze as analyze_files
+from touchline.report.outputs import CONTACTS, ESTIMATES, EVENTS
+
+
+@dataclass(frozen=True)
+class Results:
+    """What came out of a recording, with the columns and keys of the files.
+
+    Attributes:
+        estimates: Arrow table, a row per sample.
+        contacts: Arrow table, a row per contact and sample.
+        events: a dictionary per event, as in `events.json`.
+        warnings: what the user should know.
+    """
+
+    estimates: Any
+    contacts: Any
+    events: list[dict[str, Any]]
+    warnings: list[str]
+
+    def to_arrow(self) -> dict[str, Any]:
+        """The tables `estimates`, `contacts` and `events`, as Arrow tables."""
+        import pyarrow as pa
+
+        events = pa.Table.from_pylist(self.events)
+        return {"estimates": self.estimates, "contacts": self.contacts, "events": events}
+
+    def to_pandas(self) -> dict[str, Any]:
+        """The tables `estimates`, `contacts` and `events`, as frames of pandas.
+
+        Raises:
+            ModuleNotFoundError: pandas is not installed.
+        """
+        return {name: table.to_pandas() for name, table in self.to_arrow().items()}
+
+
+def analyze(
+    log: Path | str,
+    robot: Path | str,
+    out: Path | str | None = None,
+    bandwidth: float | None = None,
+    method: str = "segment",
+) -> Results:
+    """Analyze a recording: estimates, contacts and events.
+
+    Args:
+        log: the recording.
+        robot: path of its `robot.yaml`, or the name of a robot that ships with Touchline.
+        out: directory that keeps the files of `touchline analyze`; default: none.
+        bandwidth: K [rad/s] of all rows; default: the description's.
+        method: of the observer, "segment" or "paper".
+
+    Raises:
+        InputError: an input cannot be used.
+    """
+    if out is None:
+        with tempfile.TemporaryDirectory(prefix="touchline-") as folder:
+            return analyze(log, robot, Path(folder) / "results", bandwidth, method)
+    import pyarrow.parquet as pq
+
+    analysis = analyze_files(log, robot, out, bandwidth, method, "none")
+    folder = Path(out)
+    # Not mapped into memory: the files may be gone before the tables.
+    estimates = pq.read_table(folder / ESTIMATES, memory_map=False)
+    contacts = pq.read_table(folder / CONTACTS, memory_map=False)
+    events = json.loads((folder / EVENTS).read_text(encoding="utf-8"))
+    return Results(estimates, contacts, events, analysis.warnings)

@@ -1,0 +1,236 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Many recordings: each is accounted for once, whatever is wrong with it or kills its process."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from free_motion import free_motion
+
+import touchline as tl
+from touchline.cli import main
+from touchline.errors import InputError
+from touchline.fleet.manifest import MANIFEST, Manifest
+from touchline.fleet.plan import is_single, make_plan
+from touchline.fleet.pool import Pool
+from touchline.fleet.work import Job, done
+from touchline.folder import ResultsFolder
+from touchline.logs import write_table
+
+OPTIONS = {"bandwidth": None, "method": "segment", "report": "none"}
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return tl.load_robot("sara")
+
+
+@pytest.fixture(scope="module")
+def made(robot, tmp_path_factory):
+    """Six recordings, of which two are whole, and a list of them."""
+    folder = tmp_path_factory.mktemp("logs")
+    samples = free_motion(robot, seconds=2.0, rate=200.0)
+    samples.wrench[200:300, 0, 0] -= 30.0
+    (folder / "a").mkdir()
+    write_table(folder / "a" / "whole.parquet", samples, robot.description)
+    write_table(folder / "b.csv.gz", samples, robot.description)
+    data = (folder / "b.csv.gz").read_bytes()
+    (folder / "cut.csv.gz").write_bytes(data[: int(0.7 * len(data))])
+    (folder / "empty.parquet").write_bytes(b"")
+    (folder / "foreign.mcap").write_bytes(b"no recording" * 99)
+    write_table(folder / "other.csv", samples, robot.description)
+    text = (folder / "other.csv").read_text().replace("q.joint1", "q.elsewhere", 1)
+    (folder / "other.csv").write_text(text)
+    (folder / "notes.txt").write_text("mine")
+    (folder / "list.csv").write_text("log, robot\na/whole.parquet, sara\nmissing.csv, sara\n")
+    return folder
+
+
+STATUS = {
+    "a/whole": "ok",
+    "b": "ok",
+    "cut": "partial",
+    "empty": "failed",
+    "foreign": "failed",
+    "other": "failed",
+}
+
+
+def rows(out):
+    lines = (out / MANIFEST).read_text().splitlines()
+    found = [json.loads(line) for line in lines]
+    assert len({row["name"] for row in found}) == len(found)
+    return {row["name"]: row for row in found}
+
+
+def run(*arguments):
+    return main(["analyze", *map(str, arguments), "--report", "none"])
+
+
+@pytest.fixture(scope="module")
+def results(made, tmp_path_factory):
+    out = tmp_path_factory.mktemp("out")
+    assert run(made, "--robot", "sara", "--out", out, "--workers", 2) == 3
+    return out
+
+
+def test_every_recording_has_its_row(made, results):
+    found = rows(results)
+    assert {name: row["status"] for name, row in found.items()} == STATUS
+    assert list(found) == sorted(found)
+    whole, cut = found["a/whole"], found["cut"]
+    assert whole["samples"] == 400 and whole["events"] == 1 and whole["reason"] == ""
+    assert 200 < cut["samples"] < 400 and "cut off" in cut["reason"]
+    assert "joint1" in found["other"]["reason"] and "empty" in found["empty"]["reason"]
+    for name, row in found.items():
+        assert set(row) >= {"content", "configuration", "touchline", "cpu_seconds", "memory_mb"}
+        folder = results / name
+        assert set(row["outputs"]) == {p.name for p in folder.glob("*") if row["outputs"]}
+    journal = [json.loads(line) for line in (results / "log.jsonl").read_text().splitlines()]
+    assert {line["name"] for line in journal} == set(STATUS)
+
+
+def test_what_is_unchanged_is_left_alone(made, results, tmp_path, capsys):
+    out = shutil.copytree(results, tmp_path / "out")
+    stamps = {p: p.stat().st_mtime_ns for p in out.rglob("*.parquet")}
+    assert run(made, "--robot", "sara", "--out", out, "--workers", 1) == 3
+    assert "3 were unchanged" in capsys.readouterr().out
+    assert {p: p.stat().st_mtime_ns for p in out.rglob("*.parquet")} == stamps
+    before = rows(out)
+    (out / "b" / "events.json").write_text("[]")
+    assert run(made / "b.csv.gz", made / "a", "--robot", "sara", "--out", out) == 0
+    assert rows(out)["b"]["outputs"] == before["b"]["outputs"]
+    # Another option is another result.
+    other = ["--robot", "sara", "--out", out, "--bandwidth", 50]
+    assert run(made / "b.csv.gz", made / "a", *other) == 0
+    assert rows(out)["b"]["configuration"] != before["b"]["configuration"]
+
+
+def test_results_do_not_depend_on_the_processes(made, results, tmp_path):
+    plan = make_plan([str(made)], "sara")
+    before = rows(results)
+    for recording in reversed(plan):
+        row = done(Job(recording, tmp_path, before["b"]["configuration"], OPTIONS))
+        assert row["outputs"] == before[recording.name]["outputs"]
+        assert row["status"] == before[recording.name]["status"]
+
+
+def test_the_plan_does_nothing(made, tmp_path, capsys):
+    assert run(made, "--robot", "sara", "--out", tmp_path / "r", "--dry-run") == 0
+    out = capsys.readouterr().out
+    assert "6 of 6 recordings" in out and "a/whole" in out and not (tmp_path / "r").exists()
+    assert run(made, "--out", tmp_path / "r", "--dry-run") == 0
+    assert "no robot: give --robot" in capsys.readouterr().out
+
+
+def test_lists_patterns_and_robots_beside_the_recordings(made, tmp_path):
+    plan = {r.name: r for r in make_plan([str(made / "list.csv")], None)}
+    assert plan["a/whole"].robot == "sara" and plan["missing"].problem == "no such file"
+    assert [r.name for r in make_plan([str(made / "*.gz")], "sara")] == ["b", "cut"]
+    assert len(make_plan([str(made), str(made / "b.csv.gz")], "sara")) == 6
+    with pytest.raises(InputError, match="no such file matches"):
+        make_plan([str(made / "*.db3")], "sara")
+    copy = shutil.copytree(made, tmp_path / "copy")
+    (copy / "robot.yaml").write_text("name: x\nmodel: robot:sara\n")
+    (found,) = make_plan([str(copy / "a")], None)
+    assert found.robot == str(copy / "robot.yaml")
+    assert is_single([str(made / "b.csv.gz")]) and not is_single([str(made)])
+    assert not is_single([str(made / "list.csv")]) and not is_single([str(made / "*.gz")])
+
+
+def test_bad_arguments_and_nothing_done(made, tmp_path, capsys):
+    assert run("--robot", "sara", "--out", tmp_path) == 2
+    assert run(tmp_path / "none", made, "--robot", "sara", "--out", tmp_path / "r") == 2
+    assert run(made, "--robot", "sara", "--out", tmp_path / "r", "--workers", -1) == 2
+    assert run(made, "--robot", "sara", "--out", tmp_path / "r", "--time-limit", 0) == 2
+    assert "--time-limit" in capsys.readouterr().err
+    bad = [made / "foreign.mcap", made / "empty.parquet"]
+    assert run(*bad, "--robot", "sara", "--out", tmp_path / "r") == 1
+    assert run(made, "--robot", "nobody", "--out", tmp_path / "r") == 1
+    assert {row["status"] for row in rows(tmp_path / "r").values()} == {"skipped"}
+    with ResultsFolder(tmp_path / "r", ()):
+        assert run(made, "--robot", "sara", "--out", tmp_path / "r") == 2
+
+
+def test_a_manifest_that_was_cut_off_is_read(tmp_path):
+    manifest = Manifest(tmp_path)
+    manifest.add({"name": "a", "status": "ok"})
+    with manifest.path.open("a") as file:
+        file.write('{"name": "b", "sta')
+    Manifest(tmp_path).add({"name": "c", "status": "ok"})
+    assert set(Manifest(tmp_path).rows) == {"a", "c"}
+
+
+def jobs(made, out, count):
+    (recording,) = make_plan([str(made / "a" / "whole.parquet")], "sara")
+    return [Job(replace(recording, name=f"n{i}"), out, "", OPTIONS) for i in range(count)]
+
+
+def test_a_killed_process_costs_a_second_try(made, tmp_path):
+    with Pool(2, None, None) as pool:
+        todo = jobs(made, tmp_path, 8)
+        found = []
+        for row in pool.rows(todo):
+            found.append(row)
+            if len(found) in (1, 3):
+                pool._workers[0].process.kill()
+        assert sorted(row["name"] for row in found) == sorted(job.recording.name for job in todo)
+        assert {row["status"] for row in found} == {"ok"}
+        assert len({json.dumps(row["outputs"]) for row in found}) == 1
+
+
+def test_limits_of_time_and_memory(made, tmp_path):
+    with Pool(1, 0.01, None) as pool:
+        (row,) = pool.rows(jobs(made, tmp_path, 1))
+    assert row["status"] == "failed" and "took longer than 0.01 s" in row["reason"]
+
+
+def test_a_killed_run_goes_on_where_it_was(made, tmp_path):
+    logs, out = tmp_path / "logs", tmp_path / "out"
+    logs.mkdir()
+    for i in range(6):
+        shutil.copy(made / "a" / "whole.parquet", logs / f"n{i}.parquet")
+    command = [sys.executable, "-m", "touchline", "analyze", str(logs), "--robot", "sara"]
+    command += ["--out", str(out), "--report", "none", "--workers", "1"]
+    environment = os.environ | {"PYTHONPATH": str(Path(tl.__file__).parents[1])}
+    for stop in (signal.SIGKILL, signal.SIGINT):
+        process = subprocess.Popen(
+            command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        before = len(Manifest(out).rows)
+        deadline = time.monotonic() + 120
+        while len(Manifest(out).rows) < before + 2 and time.monotonic() < deadline:
+            time.sleep(0.02)
+        process.send_signal(stop)
+        status = process.wait()
+        assert status == (-signal.SIGKILL if stop == signal.SIGKILL else 130)
+    finished = {n: row["outputs"] for n, row in Manifest(out).rows.items()}
+    assert len(finished) >= 4
+    deadline = time.monotonic() + 60  # the killed run's worker ends when its pipe is closed
+    while main(command[3:]) == 2 and time.monotonic() < deadline:
+        time.sleep(0.5)
+    found = rows(out)
+    assert [row["status"] for row in found.values()] == ["ok"] * 6
+    assert finished.items() <= {n: row["outputs"] for n, row in found.items()}.items()
+
+
+def test_results_in_python(made, tmp_path):
+    results = tl.analyze(made / "a" / "whole.parquet", "sara")
+    assert results.estimates.num_rows == 400 and len(results.events) == 1
+    tables = results.to_arrow()
+    assert set(tables) == {"estimates", "contacts", "events"}
+    assert tables["events"]["segment"].to_pylist() == [results.events[0]["segment"]]
+    np.testing.assert_array_equal(np.diff(results.estimates["time"].to_numpy()) > 0, True)
+    kept = tl.analyze(made / "a" / "whole.parquet", "sara", tmp_path / "kept")
+    assert kept.estimates.equals(results.estimates)
+    assert (tmp_path / "kept" / "events.json").is_file()
+    with pytest.raises(InputError):
+        tl.analyze(made / "empty.parquet", "sara")
