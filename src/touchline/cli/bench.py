@@ -199,8 +199,30 @@ def identify(*, data: Directory = None) -> int:
     return main(data)
 
 
+def logs(*, samples: int = 100_000, minutes: float = 6.0) -> int:
+    """What reading and analyzing recordings costs, beside pyarrow, rosbags and mcap.
+
+    Example: touchline bench logs --minutes 60
+
+    Prints CPU time of one process: MCAP (zstd, lz4, plain, without a summary), rosbag2 sqlite3 and
+    CSV as samples, what the other packages take to hand out the bytes alone, and an analysis with
+    and without the report.
+
+    Args:
+        samples: Of the recordings that are read; each has a joint state and three wrenches.
+        minutes: Of the recording that is analyzed, at 1 kHz, touched every ten seconds; 0: none.
+    """
+    from touchline.bench.logs.run import main
+    from touchline.numbers import check_least
+
+    check_least(1000, samples=samples)
+    check_least(0, minutes=minutes)
+    return main(samples, minutes)
+
+
 BENCHMARKS: dict[str, Callable[..., int]] = {
     "observer": observer,
+    "logs": logs,
     "localization": localization,
     "classification": classification,
     "reaction": reaction,

@@ -35,6 +35,10 @@ _PIECE = 1 << 17  # bytes that are decompressed at a time: a block of zstd
 _HELD = 1 << 20  # messages that wait for earlier ones of another chunk, at most
 
 
+_ALL = np.ones(1 << 16, np.uint8)  # channels
+_NO_INDEX = np.empty(0, np.int64)
+
+
 class DamagedFile(ValueError):
     """A file of which nothing can be read, or a record that cannot be understood."""
 
@@ -257,38 +261,36 @@ class McapFile:
     def _scan(self) -> _Contents:
         """Walk the records from the beginning, as far as they are whole."""
         found, at, ended = _Contents(), len(MAGIC), False
-        for code, begin, end in self._records(len(MAGIC), len(self._data)):
+        while (record := next(self._records(at, len(self._data)), None)) is not None:
+            code, begin, end = record
             if code in (0, _DATA_END, _FOOTER):
                 ended = code != 0
                 break
-            try:
-                if code == _MESSAGE:
-                    self._note_message(found, begin, end)
-                elif code in (_SCHEMA, _CHANNEL):
+            if code == _MESSAGE:
+                at = self._note_messages(found, at, end)
+                continue
+            with suppress(DamagedFile):
+                if code in (_SCHEMA, _CHANNEL):
                     self._note(found, code, self._data[begin:end])
                 elif code == _CHUNK:
                     found.spans.append(self._opened(found, self._chunk(begin, end), end))
                 elif code == _INDEX and found.spans:
                     self._note_index(found, begin, end)
-            except DamagedFile:
-                continue
             at = end
         if not ended:
             self.damage = self.damage or "its records make no sense from some place on"
             self._note_rest(found, at)
         return found
 
-    def _note_message(self, found: _Contents, begin: int, end: int) -> None:
-        """A message outside of chunks; those that follow each other make a span."""
-        self._count(found, self._data[begin : begin + 22])
-        start = begin - _HEAD.size
-        last = found.spans[-1] if found.spans else None
-        lone = last is not None and not last.size and last.end == start  # a chunk has a size
-        if last is not None and lone and start - last.start < _LONE_BYTES:
-            found.spans[-1] = replace(last, end=end)
-        else:
-            received = int.from_bytes(self._data[begin + 6 : begin + 14], "little")
-            found.spans.append(_Span(start, end, received))
+    def _note_messages(self, found: _Contents, start: int, end: int) -> int:
+        """Messages outside of chunks that follow each other; returns where they end."""
+        piece = self._data[start : max(start + _LONE_BYTES, end)]
+        _, received, begin, size, _ = _logs.chunk_messages(piece, _ALL, _NO_INDEX)
+        end = start + int(begin[-1] + size[-1]) if len(begin) else end
+        self._count(found, piece[: end - start])
+        first = int(received.min()) if len(begin) else 0
+        found.spans.append(_Span(start, end, first))
+        return end
 
     def _note_rest(self, found: _Contents, at: int) -> None:
         """A chunk that was being written when the file was cut off."""
@@ -302,19 +304,25 @@ class McapFile:
         span = replace(span, indexes=end, index_end=end)
         with_index = self._data[end : end + 1] == bytes([_INDEX])
         largest = max(_LARGEST, _RATIO * len(self._data))
-        known = bool(found.channels)
-        if with_index and known or span.size > largest:
+        if with_index and found.channels or span.size > largest:
             return span
-        try:
-            records = self._bytes(span, largest)
-        except DamagedFile:
-            return span
-        for code, begin, stop in _records_of(records):
-            if code in (_SCHEMA, _CHANNEL):
-                self._note(found, code, records[begin:stop])
-            elif code == _MESSAGE and not with_index:
-                self._count(found, records[begin : begin + 22])
+        with suppress(DamagedFile):
+            self._count(found, self._bytes(span, largest), not with_index)
         return span
+
+    def _count(self, found: _Contents, records: bytes, counted: bool = True) -> None:
+        """Note the channels that some records bring, and how many messages each has."""
+        channel, received, *_ = _logs.chunk_messages(records, _ALL, _NO_INDEX)
+        numbers, counts = np.unique(channel, return_counts=True)
+        if not set(numbers.tolist()) <= found.channels.keys() or not len(numbers):
+            for code, begin, end in _records_of(records):
+                if code in (_SCHEMA, _CHANNEL):
+                    self._note(found, code, records[begin:end])
+        if not counted or not len(numbers):
+            return
+        for number, count in zip(numbers.tolist(), counts.tolist(), strict=True):
+            found.counts[number] = found.counts.get(number, 0) + count
+        self._stretch(found, int(received.min()), int(received.max()))
 
     def _note_index(self, found: _Contents, begin: int, end: int) -> None:
         """Count what the message index of a channel tells."""
@@ -325,12 +333,6 @@ class McapFile:
         if len(times):
             found.counts[channel] = found.counts.get(channel, 0) + len(times)
             self._stretch(found, int(times.min()), int(times.max()))
-
-    def _count(self, found: _Contents, head: bytes) -> None:
-        channel = int.from_bytes(head[:2], "little")
-        found.counts[channel] = found.counts.get(channel, 0) + 1
-        received = int.from_bytes(head[6:14], "little")
-        self._stretch(found, received, received)
 
     def _stretch(self, found: _Contents, first: int, last: int) -> None:
         found.first = min(found.first, first) if found.last else first
