@@ -98,13 +98,13 @@ def write_sqlite(path: Path, messages: Serialized) -> None:
 
 
 def write_mcap(path: Path, messages: Serialized, compression: str, summary: bool) -> None:
-    """Write an MCAP file in chunks with message indexes, compressed with "zstd", "lz4" or not ("")."""
+    """Write an MCAP file in chunks with indexes, compressed with "zstd", "lz4" or not ("")."""
     rows = np.hstack(
         [_records(n, messages.received, t) for n, t in enumerate(messages.tables.values(), 1)]
     )
     head = _channels(messages.kinds)
     together = max(CHUNK // rows.shape[1], 1)
-    sizes = [31 + table.shape[1] for table in messages.tables.values()]
+    sizes = [31 + table.shape[1] for table in tables]
     places = np.cumsum(sizes) - sizes  # of a sample's records
     chunks = []
     with path.open("wb") as file:

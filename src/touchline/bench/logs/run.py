@@ -7,6 +7,7 @@ import resource
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -95,7 +96,7 @@ def _least(work: Callable[[], int]) -> float:
     return best
 
 
-def _readers(folder: Path, robot: Robot, samples: Samples) -> str:
+def _readers(folder: Path, robot: Robot, samples: Any) -> str:
     messages = serialized(robot, samples)
     files: dict[str, Path] = {}
     for compression in ("zstd", "lz4", ""):
@@ -160,12 +161,9 @@ def _peers(files: dict[str, Path], count: int) -> list[Row]:
 
     rows = []
     for name in ("MCAP zstd", "rosbag2 sqlite3"):
-        rows.append(
-            ("rosbags, bytes alone", name, f"{1e-6 * _least(lambda: raw(files[name])):.3f}")
-        )
-        rows.append(
-            ("rosbags, decoded", name, f"{1e-6 * _least(lambda: decoded(files[name])):.3f}")
-        )
+        for words, read in (("bytes alone", raw), ("decoded", decoded)):
+            rate = _least(partial(read, files[name]))
+            rows.append((f"rosbags, {words}", name, f"{1e-6 * rate:.3f}"))
     if find_spec("mcap") is not None:
         rate = _least(lambda: mcap(files["MCAP zstd"]))
         rows.append(("mcap, bytes alone", "MCAP zstd", f"{1e-6 * rate:.3f}"))
@@ -173,7 +171,7 @@ def _peers(files: dict[str, Path], count: int) -> list[Row]:
 
 
 def _analysis(folder: Path, robot: Robot, minutes: float) -> str:
-    samples = motion(robot, int(60 * minutes * RATE), touched=True)
+    samples: Any = motion(robot, int(60 * minutes * RATE), touched=True)
     log = folder / "long.parquet"
     write_table(log, samples, robot.description)
     hours = len(samples) / RATE / 3600
