@@ -99,9 +99,8 @@ def write_sqlite(path: Path, messages: Serialized) -> None:
 
 def write_mcap(path: Path, messages: Serialized, compression: str, summary: bool) -> None:
     """Write an MCAP file in chunks with indexes, compressed with "zstd", "lz4" or not ("")."""
-    rows = np.hstack(
-        [_records(n, messages.received, t) for n, t in enumerate(messages.tables.values(), 1)]
-    )
+    tables = list(messages.tables.values())
+    rows = np.hstack([_records(n, messages.received, t) for n, t in enumerate(tables, 1)])
     head = _channels(messages.kinds)
     together = max(CHUNK // rows.shape[1], 1)
     sizes = [31 + table.shape[1] for table in tables]
