@@ -50,6 +50,9 @@ def main():
             kind, topic, hear(topic), QoSProfile(depth=100, durability=durability)
         )
     print("ready", flush=True)
+    patience = time.monotonic() + 60.0  # until the node is there, on a busy machine
+    while not heard["/touchline/contacts"] and time.monotonic() < patience:
+        rclpy.spin_once(node, timeout_sec=0.1)
     end = time.monotonic() + float(sys.argv[1])
     while time.monotonic() < end:
         rclpy.spin_once(node, timeout_sec=0.1)

@@ -14,7 +14,7 @@ from touchline.live.messages import wrench_topic
 @needs_ros
 def test_what_is_felt_is_published_and_services_answer():
     env = environment(76)
-    listener = [sys.executable, str(HERE / "ros_listener.py"), "14"]
+    listener = [sys.executable, str(HERE / "ros_listener.py"), "10"]
     parameters = ["-p", "robot:=sara", "-p", "source:=sim://?motion=0", "-p", "publish_rate:=100.0"]
     command = [sys.executable, "-m", "touchline.live.node", "--ros-args", *parameters]
     with (
@@ -22,7 +22,7 @@ def test_what_is_felt_is_published_and_services_answer():
         subprocess.Popen(command, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as node,
     ):
         try:
-            out, _ = ear.communicate(timeout=90)
+            out, _ = ear.communicate(timeout=120)
         finally:
             node.terminate()
             node.communicate(timeout=30)
