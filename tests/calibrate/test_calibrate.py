@@ -15,7 +15,6 @@ from touchline.bench.detection.free_motion import (
     random_trajectory,
 )
 from touchline.calibrate.noise import NoiseMeter
-from touchline.calibrate.robot_file import write_description
 from touchline.calibrate.run import _check_tails, calibrate
 from touchline.cli.main import main
 from touchline.detector.calibration import fit_growth
@@ -24,6 +23,7 @@ from touchline.detector.tail import Tail
 from touchline.detector.thresholds import make_thresholds, row_name
 from touchline.errors import InputError
 from touchline.logs import write_table
+from touchline.model.robot_file import write_description
 from touchline.model.values import METHODS
 from touchline.model.yaml_file import read_yaml
 

@@ -12,6 +12,7 @@ from free_motion import free_motion
 
 import touchline as tl
 from touchline.check.run import check
+from touchline.cli.main import main
 from touchline.logs import write_table
 from touchline.model.robot import Robot
 
@@ -178,6 +179,19 @@ def test_a_load_that_the_model_lacks(tmp_path, robot, recording):
     mass = re.match(r"(\S+) \+- \S+ kg are missing at tool", found)
     assert mass is not None and abs(float(mass[1]) - 0.6) < 0.03
     assert "loads: [{link: tool, mass: 0.6" in found
+
+
+def test_a_fixed_description_has_no_more_findings(tmp_path, robot):
+    path, fixed = tmp_path / "robot.yaml", tmp_path / "fixed.yaml"
+    text = robot.description.path.read_text()
+    path.write_text(text + "loads:\n  - {link: tool, mass: 0.6, com: [0, 0, 0.05]}\n")
+    log = tmp_path / "log.parquet"
+    write_table(log, free_motion(tl.load_robot(path), rate=100.0), robot.description)
+    assert main(["check", "sara-full", str(log), "--fix", str(fixed)]) == 1
+    assert main(["check", str(fixed), str(log)]) == 0
+    before = fixed.read_bytes()
+    assert main(["check", str(fixed), str(log), "--fix", str(tmp_path / "no.yaml")]) == 0
+    assert fixed.read_bytes() == before and not (tmp_path / "no.yaml").exists()
 
 
 def test_a_tool_that_is_modelled_but_not_mounted(tmp_path, robot, recording):

@@ -13,7 +13,6 @@ from touchline.calibrate.held_out import HeldOut, judge, split
 from touchline.calibrate.noise import measure_noise, noise_keys
 from touchline.calibrate.quiet import LISTED, Suspicion, find_contacts
 from touchline.calibrate.recordings import Recordings
-from touchline.calibrate.robot_file import write_description
 from touchline.detector.calibration import (
     Statistics,
     collect_residuals,
@@ -31,6 +30,7 @@ from touchline.identify.evidence import gather
 from touchline.identify.identification import Identification, identify
 from touchline.model.description import CalibrationDescription, Noise, RowCalibration
 from touchline.model.robot import Robot, load_robot
+from touchline.model.robot_file import write_description
 from touchline.model.values import METHODS
 from touchline.model.yaml_file import read_yaml
 

@@ -2,6 +2,7 @@
 """What a check says: sections of facts, and findings that ask for something to be done."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 
 @dataclass
@@ -11,10 +12,12 @@ class Findings:
     Attributes:
         findings: what should be mended, one clear line each.
         notes: by section, what was seen.
+        fixes: top-level keys of `robot.yaml` with the values that would mend findings.
     """
 
     findings: list[str] = field(default_factory=list)
     notes: dict[str, list[str]] = field(default_factory=dict)
+    fixes: dict[str, Any] = field(default_factory=dict)
 
     def find(self, line: str) -> None:
         """Add a finding, once."""

@@ -3,6 +3,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,11 +42,13 @@ class Explanation:
         words: of the finding.
         share: of the squares that it explains.
         mended: the robot with it.
+        fix: key and value of `robot.yaml` that mend it; a list is added to what stands there.
     """
 
     words: str
     share: float
     mended: Robot
+    fix: dict[str, Any]
 
 
 def explain_weights(robot: Robot, parts: Iterable[Samples], findings: Findings) -> Robot:
@@ -63,6 +66,9 @@ def explain_weights(robot: Robot, parts: Iterable[Samples], findings: Findings) 
         if best is None or best.share < EXPLAINED:
             break
         findings.find(best.words)
+        for key, value in best.fix.items():
+            old = findings.fixes.get(key, [])
+            findings.fixes[key] = [*old, *value] if isinstance(value, list) else value
         robot = best.mended
     return robot
 
@@ -124,12 +130,15 @@ def _payload(
             f"{what} are missing at {name} ({100 * share:.0f} % of what is off{pose}): a hand or "
             f"tool that the model lacks? loads: [{{link: {name}, mass: {mass:.2f}, com: [{com}]}}]"
         )
-        return Explanation(words, share, _loaded(robot, Load(name, mass, tuple(place[:3]))))
+        load = Load(name, round(mass, 3), tuple(float(round(x, 4)) for x in place[:3]))
+        six = [round(1e-3 * mass, 6) * (i in (0, 3, 5)) for i in range(6)]
+        entry = {"link": name, "mass": load.mass, "com": list(load.com), "inertia": six}
+        return Explanation(words, share, _loaded(robot, load), {"loads": [entry]})
     words = (
         f"{what} too many at {name} ({100 * share:.0f} % of what is off{pose}): a hand that is "
         f"modelled but not mounted? links: {{LINK: {{mass: 0.0}}}} for what is not there"
     )
-    return Explanation(words, share, _lighter(robot, node, -mass))
+    return Explanation(words, share, _lighter(robot, node, -mass), {})
 
 
 def _tilt(evidence: Evidence, robot: Robot, left: Array, sigma: Array) -> Explanation | None:
@@ -156,7 +165,8 @@ def _tilt(evidence: Evidence, robot: Robot, left: Array, sigma: Array) -> Explan
         f"degrees ({100 * share:.0f} % of what is off): gravity: [{numbers}]"
     )
     mechanism = replace(robot.mechanism, gravity=new)
-    return Explanation(words, share, Robot(robot.description, mechanism))
+    fix = {"gravity": [round(float(x), 4) for x in new]}
+    return Explanation(words, share, Robot(robot.description, mechanism), fix)
 
 
 def _turned(evidence: Evidence, robot: Robot, change: Array) -> Array:

@@ -7,6 +7,7 @@ from touchline.check.findings import Findings
 from touchline.check.parity import parity_of
 from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
+from touchline.model.surface import mechanism_surfaces
 from touchline.model.transforms import combine_inertias, move_inertia
 
 LIGHTEST, HEAVIEST = 0.01, 500.0  # kg; an arm outside has its masses in other units
@@ -27,6 +28,8 @@ def check_model(robot: Robot, findings: Findings) -> None:
     _parity(robot, findings)
     for warning in robot.warnings:
         findings.find(warning)
+    for line in mechanism_surfaces(robot.mechanism).lost:
+        findings.find(line)
     _surfaces(robot, findings)
 
 

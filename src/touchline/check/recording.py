@@ -58,6 +58,7 @@ def check_recording(robot: Robot, path: Path, findings: Findings) -> None:
     if mended is not robot:
         plain = Findings()
         _judge_recording(mended, path, plain)
+    findings.fixes.update(explained.fixes)
     for line in (*explained.findings, *plain.findings):
         findings.find(line)
     for section, lines in plain.notes.items():

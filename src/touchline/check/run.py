@@ -5,7 +5,10 @@ from pathlib import Path
 
 from touchline.check.findings import Findings
 from touchline.check.model import check_model
+from touchline.errors import InputError
 from touchline.model.robot import load_robot
+from touchline.model.robot_file import write_description
+from touchline.model.yaml_file import read_yaml
 
 
 def check(robot: str | Path, log: str | Path | None = None) -> Findings:
@@ -22,3 +25,21 @@ def check(robot: str | Path, log: str | Path | None = None) -> Findings:
 
         check_recording(model, Path(log), findings)
     return findings
+
+
+def write_fixes(robot: str | Path, found: Findings, out: Path) -> str:
+    """Writes the description with what would mend findings; returns what was done.
+
+    Raises:
+        InputError: the file cannot be written, or there is none to start from.
+    """
+    source = load_robot(robot).description.path
+    if source is None or out.suffix not in (".yaml", ".yml"):
+        raise InputError(f"--fix {out}: needs a robot.yaml to start from, and to end in .yaml")
+    if not found.fixes:
+        return "nothing that could be mended by itself: nothing written"
+    fixes = dict(found.fixes)
+    if "loads" in fixes:
+        fixes["loads"] = [*(read_yaml(source).get("loads") or []), *fixes["loads"]]
+    write_description(source, out, fixes)
+    return f"written: {out}, with {', '.join(found.fixes)} mended"

@@ -11,6 +11,7 @@ def check(
     robot: Annotated[Positional[str], arg(metavar="ROBOT")],
     log: Annotated[Positional[Path | None], arg(metavar="[LOG]")] = None,
     /,
+    fix: Annotated[Path | None, arg(metavar="ROBOT")] = None,
 ) -> int:
     """Tells whether a robot description is consistent with itself and with a recording of it.
 
@@ -26,9 +27,14 @@ def check(
     Args:
         robot: A robot.yaml, or the name of a robot that ships with Touchline (sara).
         log: A recording: a table (.parquet, .csv, .csv.gz) or a rosbag2 (.mcap, .db3).
+        fix: Writes a copy of the description in which a missing load or a tilted base is mended.
     """
     from touchline.check.run import check as run
 
     result = run(robot, log)
     print(result.text())
+    if fix is not None:
+        from touchline.check.run import write_fixes
+
+        print("\n" + write_fixes(robot, result, fix))
     return 1 if result.findings else 0
