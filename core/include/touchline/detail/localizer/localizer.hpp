@@ -88,7 +88,7 @@ class Localizer {
     said_ = 1;
     last_ = &single_.answer();
     if (!measurement_.read(g, row, normalized)) return single_.clear();
-    return single_.locate(g, lag, measurement_);
+    return single_.locate(g, lag, measurement_, false, true);
   }
 
   // Takes a sample of segment g at `time` [s]: what is said of each contact on it is in `reports()`,

@@ -44,7 +44,7 @@ class Tracks {
       return;
     }
     if (!measurement_.can_be_followed() || settings_.first_entry) {
-      report(s.first, single_.locate(g, 0.0, measurement_, again(s)));
+      report(s.first, single_.locate(g, 0.0, measurement_, again(s), true));
       return;
     }
     now_.lag = s.age.follow(measurement_.load(), bandwidth, time) / bandwidth;

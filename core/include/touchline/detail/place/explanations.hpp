@@ -25,6 +25,7 @@ class Explanations {
   Explanations(const Observer& observer, const Posture& posture,
                const LocalizerSettings& settings, std::vector<LinkSurface> surfaces)
       : posture_(posture),
+        settings_(settings),
         fitter_(settings),
         surfaces_(observer, posture_, std::move(surfaces)),
         refinement_(surfaces_, fitter_) {
@@ -42,9 +43,11 @@ class Explanations {
 
   // Finds all that may explain segment g; `measurement` has read it. `mean(node)`: where a body was
   // when it felt what the wrench speaks of, and `doubt`: what is not known of that.
-  // `again`: what was found by a search a moment ago serves once more.
+  // `again`: what was found by a search a moment ago serves once more. `whole`: also where no point
+  // of any body can explain, all that comes nearest to it is found.
   template <class MeanOf>
-  void find(int g, MeanOf&& mean, const Doubt& doubt, Measurement& measurement, bool again) {
+  void find(int g, MeanOf&& mean, const Doubt& doubt, Measurement& measurement, bool again,
+            bool whole) {
     count_ = used_ = 0;
     found_ = &starts_[g];
     again_ = again;
@@ -67,10 +70,11 @@ class Explanations {
       std::sort(views_.begin(), views_.begin() + used_,
                 [](const View& a, const View& b) { return a.least < b.least; });
     }
+    if (!whole && !possible(measurement.size())) return;
     for (int i = 0; i < used_; ++i) {
       View& view = views_[i];
       if (!(view.least < best_ + kWindow)) continue;
-      if (view.line) view.find_line();
+      if (view.line && !view.found) view.find_line();
       if (view.line && view.floor < best_ + kWindow) enter(view);
     }
     // What must be searched for costs more, so it comes last and only where it may matter.
@@ -116,6 +120,20 @@ class Explanations {
   static constexpr double kFine = 1e-3;    // what a place is worth knowing to [m]
   static constexpr double kSigmas = 4.0;   // of a place, within which faces are looked for
   static constexpr double kApart = 0.015;  // faces farther apart are looked at for themselves [m]
+
+  // Can any point explain, by the bounds that each body sets: the misfit of the best wrench at all,
+  // and of the best one of a pure force?
+  bool possible(int rows) {
+    const double limit = chi2_limit(std::max(1, rows - 5), settings_.pitch_limit);
+    for (int i = 0; i < used_; ++i) {
+      View& view = views_[i];
+      if (!(view.least < limit)) continue;
+      if (!view.line) return true;
+      view.find_line();
+      if (view.floor < limit && std::fabs(view.pitch) < settings_.pitch_limit) return true;
+    }
+    return false;
+  }
 
   // All entries of the line into the body.
   void enter(View& view) {
@@ -305,6 +323,7 @@ class Explanations {
   }
 
   const Posture& posture_;
+  const LocalizerSettings& settings_;
   ForceFitter fitter_;
   LinkSurfaces surfaces_;
   Refinement refinement_;

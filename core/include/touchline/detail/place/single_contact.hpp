@@ -26,17 +26,20 @@ class SingleContact {
         lasting_(observer.row_layout().segments, 0.0) {}
 
   // The contact on segment g, which `measurement` has read; its wrench is `lag` [s] old. `again`: it
-  // was looked for a moment ago, and the same places are looked at.
-  const Answer& locate(int g, double lag, Measurement& measurement, bool again = false) {
+  // was looked for a moment ago, and the same places are looked at. `whole`: what comes nearest to an
+  // explanation is named also where no point explains.
+  const Answer& locate(int g, double lag, Measurement& measurement, bool again = false,
+                       bool whole = false) {
     const auto mean = [&](int node) {
       return steady_mean(posture_.pose(node), posture_.twist(node), lag);
     };
-    return locate(g, mean, kDoubt, measurement, again);
+    return locate(g, mean, kDoubt, measurement, again, whole);
   }
 
   // The same, if it is known where the bodies were when they felt it.
   const Answer& locate(int g, const Past& past, Measurement& measurement, bool again) {
-    return locate(g, [&](int node) { return past.mean(node); }, kRemembered, measurement, again);
+    return locate(g, [&](int node) { return past.mean(node); }, kRemembered, measurement, again,
+                  false);
   }
 
   // The same, where forces of other contacts are free.
@@ -69,7 +72,8 @@ class SingleContact {
   static constexpr Doubt kDoubt{0.1, 0.0}, kRemembered{0.0, 0.1};
 
   template <class MeanOf>
-  const Answer& locate(int g, MeanOf&& mean, const Doubt& doubt, Measurement& measurement, bool again) {
+  const Answer& locate(int g, MeanOf&& mean, const Doubt& doubt, Measurement& measurement,
+                       bool again, bool whole) {
     clear();
     if (measurement.has_wrench()) {
       const double* w = measurement.wrench();
@@ -80,7 +84,7 @@ class SingleContact {
     } else if (measurement.has_wrench() && weak(measurement)) {
       answer_.status = Status::wrench_only;
     } else {
-      found_.find(g, mean, doubt, measurement, again);
+      found_.find(g, mean, doubt, measurement, again, whole);
       weigh();
       conclude(g, measurement);
       if (!measurement.lasts()) lasting_[g] = 0.0;

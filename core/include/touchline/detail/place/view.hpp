@@ -35,6 +35,7 @@ struct View {
   const std::vector<int>* surfaces = nullptr;
   Quadratic q;
   bool line = false;   // is there a line of force action?
+  bool found = false;  // has it been worked out?
   double least = 0.0;  // chi2 of the best wrench, forces and moments
   double floor = 0.0;  // chi2 that no point of the body goes below
   double pitch = 0.0;
@@ -100,6 +101,7 @@ struct View {
       for (int i = 0; i < 6; ++i) w[i] -= power / variance * step[i];
       if (power * power < kExact * kExact * variance) break;
     }
+    found = true;
     floor = std::max(0.0, q(w));
     wrench = {{w[0], w[1], w[2]}, {w[3], w[4], w[5]}};
     line = dot(wrench.linear, wrench.linear) > 1e-12;
