@@ -34,6 +34,31 @@ def observer(
     return main(output, rounds)
 
 
+def deadline(
+    *,
+    updates: int = 10000,
+    robots: tuple[Literal["panda", "panda-torques", "sara", "sara-full", "ur10"], ...] = (
+        "sara",
+        "panda",
+    ),
+    seed: int = 0,
+) -> int:
+    """How long single updates take, by number of contacts: how many are late?
+
+    Example: touchline bench deadline --robots sara --updates 1000000
+
+    Args:
+        updates: Of each line of the table; three times as many are run. 10,000 take some seconds a
+            line.
+        robots: The arms; the pandas and ur10 need the package example-robot-data.
+        seed: Of all that is random.
+    """
+    from touchline.bench.deadline.run import main
+
+    main(updates, robots, seed)
+    return 0
+
+
 def localization(
     *,
     robots: tuple[Literal["panda", "panda-torques", "sara", "sara-full", "ur10"], ...] = ("panda",),
@@ -223,6 +248,7 @@ def logs(*, samples: int = 100_000, minutes: float = 6.0) -> int:
 BENCHMARKS: dict[str, Callable[..., int]] = {
     "observer": observer,
     "logs": logs,
+    "deadline": deadline,
     "localization": localization,
     "classification": classification,
     "reaction": reaction,

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`touchline bench deadline`: how long single updates take, by number of contacts.
+
+Every update of random touches is timed by the CPU time of its thread, from the first sample on. The
+same input goes three times through a new pipeline, and of each update the least time counts: what the
+machine does to one of them it rarely does to all, while what the update itself needs comes back.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import count
+from time import thread_time_ns
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.bench.localization.arm import TIERS
+from touchline.bench.localization.cell import Begin, Cell
+from touchline.bench.localization.scene import arm_and_skin, make_scene
+from touchline.bench.localization.trial import make_pipeline
+from touchline.bench.tables import Row, aligned
+from touchline.bench.touches import Signals, resting_signals
+from touchline.localizer.skin import Skin
+from touchline.model.robot import Robot
+from touchline.numbers import check_least
+
+Array = NDArray[np.float64]
+
+BUDGET = 125.0  # us: the observer runs at 8 kHz on the robot (Iskandar et al., ICRA 2021)
+REPEATS = 3
+TIER = 1  # of noise
+IDLE = 1.0  # s of a run without contact
+HEAD: Row = (
+    "arm", "contacts", "begin", "updates", "median", "p99", "p99.9", "p99.99", "max",
+    f"over {BUDGET:g} us", "first update",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Line:
+    """Times [us] of all updates of one line, and of the first ones of its runs."""
+
+    arm: str
+    contacts: int
+    begin: str
+    times: Array
+    first: Array
+
+    @property
+    def over(self) -> float:
+        """Share of the updates that take longer than `BUDGET`."""
+        return float((self.times > BUDGET).mean())
+
+    def row(self) -> Row:
+        """Of the table."""
+        marks = np.percentile(self.times, [50, 99, 99.9, 99.99])
+        return (
+            self.arm, str(self.contacts), self.begin, str(len(self.times)),
+            *(f"{mark:.1f}" for mark in marks), f"{self.times.max():.1f}",
+            f"{100 * self.over:.3f} %", f"{self.first.max():.1f}",
+        )  # fmt: skip
+
+
+def update_times(robot: Robot, skin: Skin, signals: Signals, repeats: int = REPEATS) -> Array:
+    """Least CPU time [us] of each update (N,), over repeats of the same signals.
+
+    Args:
+        robot: the robot.
+        skin: its surfaces.
+        signals: N samples.
+        repeats: how often they go through a new pipeline.
+    """
+    s = signals
+    samples = list(zip(s.time.tolist(), s.q, s.qd, s.tau, s.wrench, strict=True))
+    least = np.full(len(samples), np.inf)
+    for _ in range(repeats):
+        update = make_pipeline(robot, skin).update
+        for i, sample in enumerate(samples):
+            begin = thread_time_ns()
+            update(*sample)
+            spent = (thread_time_ns() - begin) * 1e-3
+            least[i] = min(least[i], spent)
+    return least
+
+
+def lines(arms: tuple[str, ...], updates: int, seed: int = 0) -> Iterator[Line]:
+    """Every arm with 0 to 4 contacts, one by one or at the same instant.
+
+    Args:
+        arms: names of arms of the localization benchmark.
+        updates: of each line, at least.
+        seed: of all that is random.
+    """
+    kinds: list[tuple[int, Begin]] = [(0, "apart"), (1, "apart")]
+    kinds += [(n, begin) for n in (2, 3, 4) for begin in ("apart", "together")]
+    for arm in arms:
+        for contacts, begin in kinds:
+            yield _line(Cell(arm, contacts, TIER, begin=begin), updates, seed)
+
+
+def _line(cell: Cell, updates: int, seed: int) -> Line:
+    robot, skin = arm_and_skin(cell.arm, cell.tier)
+    times: list[Array] = []
+    for run in count():
+        times.append(update_times(robot, skin, _signals(cell, robot, run, seed)))
+        if sum(len(part) for part in times) >= updates:
+            break
+    begin = cell.timing if cell.contacts > 1 else ""
+    first = np.array([part[0] for part in times])
+    return Line(cell.arm, cell.contacts, begin, np.concatenate(times), first)
+
+
+def _signals(cell: Cell, robot: Robot, run: int, seed: int) -> Signals:
+    if cell.contacts:
+        return make_scene(cell, run, seed).signals
+    chance = np.random.default_rng([seed, run])
+    return resting_signals(robot, chance.uniform(*robot.ranges), [], IDLE, chance)
+
+
+def main(updates: int, arms: tuple[str, ...], seed: int = 0) -> None:
+    """Runs the benchmark and prints its table."""
+    check_least(1, updates=updates)
+    check_least(0, seed=seed)
+    from tqdm import tqdm
+
+    rows: list[Row] = [HEAD]
+    done = tqdm(lines(arms, updates, seed), total=8 * len(arms), desc="deadline", disable=None)
+    rows += [line.row() for line in done]
+    print(aligned(rows, text_columns=(0, 2)))
+    print(
+        f"CPU time of the thread in Pipeline.update [us], of each update the least of {REPEATS} repeats "
+        f"of the same input;\nnoise {TIERS[TIER]}, 20 N each, 1 kHz; first update: the slowest one"
+    )
