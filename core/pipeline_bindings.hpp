@@ -39,7 +39,8 @@ struct Pipeline {
 };
 
 // Where the parts of a snapshot stand: the observer's row with the health of the pipeline, what the
-// detector says, how many contacts and changes of events follow.
+// detector says, the sample's time and joint positions, how many contacts and changes of events
+// follow.
 struct Snapshot {
   explicit Snapshot(const tl::Pipeline& p)
       : width(p.row_layout().width()),
@@ -49,11 +50,13 @@ struct Snapshot {
         normalized(levels + segments),
         drift(normalized + rows),
         quiet(drift + rows),
-        contacts(quiet + segments),
+        time(quiet + segments),
+        q(time + 1),
+        contacts(q + p.row_layout().joints),
         changes(contacts + 1),
         end(changes + 1) {}
   std::size_t width, segments, rows;
-  std::size_t levels, normalized, drift, quiet, contacts, changes, end;
+  std::size_t levels, normalized, drift, quiet, time, q, contacts, changes, end;
 };
 
 inline void write_row(const tl::Result& result, const tl::RowLayout& layout, double* out) {
@@ -71,8 +74,8 @@ inline void keep_ended(Pipeline& p, const tl::Result& result) {
   }
 }
 
-inline void take_snapshot(const tl::Pipeline& p, const tl::Result& result,
-                          std::vector<double>& out) {
+inline void take_snapshot(const tl::Pipeline& p, const tl::Sample& sample,
+                          const tl::Result& result, std::vector<double>& out) {
   const Snapshot at(p);
   const std::size_t contact = fields::width<tl::Contact>(), event = fields::width<tl::Event>() + 1;
   out.resize(at.end + result.contacts.size() * contact + result.events.size() * event);
@@ -81,6 +84,8 @@ inline void take_snapshot(const tl::Pipeline& p, const tl::Result& result,
   std::copy(result.normalized.begin(), result.normalized.end(), out.data() + at.normalized);
   std::copy(result.drift.begin(), result.drift.end(), out.data() + at.drift);
   std::copy(result.quiet.begin(), result.quiet.end(), out.data() + at.quiet);
+  out[at.time] = sample.time;
+  std::copy_n(sample.q, at.contacts - at.q, out.data() + at.q);
   out[at.contacts] = static_cast<double>(result.contacts.size());
   out[at.changes] = static_cast<double>(result.events.size());
   double* to = out.data() + at.end;
@@ -104,7 +109,7 @@ inline nb::object update(Pipeline& p, double time, nb::handle q, nb::handle qd, 
     const guard::Turn turn(p.turn);
     const tl::Result result = p.value.update(sample);
     keep_ended(p, result);
-    take_snapshot(p.value, result, p.snapshot);
+    take_snapshot(p.value, sample, result, p.snapshot);
     numbers.swap(p.snapshot);
   }
   const nb::object out = arrays::line(numbers);
@@ -173,7 +178,9 @@ inline nb::dict slices(const Pipeline& p) {
   add("levels", at.levels, at.normalized);
   add("normalized", at.normalized, at.drift);
   add("drift", at.drift, at.quiet);
-  add("quiet", at.quiet, at.contacts);
+  add("quiet", at.quiet, at.time);
+  add("time", at.time, at.q);
+  add("q", at.q, at.contacts);
   add("counts", at.contacts, at.end);
   add("contact", 0, fields::width<tl::Contact>());
   add("event", 0, fields::width<tl::Event>());

@@ -25,6 +25,7 @@ from touchline.result.kinds import ContactLevel, Happened, Status, Zone
 
 if TYPE_CHECKING:
     from touchline import live as live
+    from touchline import touch as touch
     from touchline.localizer.region import Region as Region
     from touchline.localizer.skin import Skin as Skin
     from touchline.logs import read_log as read_log
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from touchline.reaction.reactor import Reactor as Reactor
     from touchline.reaction.state import State as State
     from touchline.report.results import analyze as analyze
+    from touchline.touch.touch import Touch as Touch
 
 __version__: str = core.VERSION
 
@@ -59,6 +61,8 @@ __all__ = [
 
 LATER = {  # loaded when they are asked for: from which module
     "live": "touchline.live",
+    "touch": "touchline.touch",
+    "Touch": "touchline.touch",
     "Command": "touchline.reaction.reactor",
     "Reactor": "touchline.reaction.reactor",
     "Region": "touchline.localizer.region",
@@ -70,7 +74,7 @@ LATER = {  # loaded when they are asked for: from which module
 
 
 def __getattr__(name: str) -> Any:
-    """Recordings, running robots and reactions are loaded when they are asked for."""
+    """What follows from contacts is loaded when it is asked for."""
     if name not in LATER:
         raise AttributeError(f"module 'touchline' has no attribute '{name}'")
     module = import_module(LATER[name])

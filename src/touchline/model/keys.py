@@ -5,6 +5,7 @@ from typing import Any
 
 from touchline.model import values
 from touchline.model.description import (
+    WIDGETS,
     ZONES,
     BaselineDescription,
     CalibrationDescription,
@@ -20,6 +21,8 @@ from touchline.model.description import (
     RetractDescription,
     RowCalibration,
     TailDescription,
+    TaughtTouch,
+    WidgetDescription,
 )
 from touchline.model.entries import JointEntry, ObserverEntry, PoseEntry, RobotFile, SensorEntry
 from touchline.model.values import Hook
@@ -117,6 +120,21 @@ HOOKS: dict[type, dict[str, Hook]] = {
         "transient": values.positive,
         "quasi_static": values.positive,
         "reaction": values.reaction,
+    },
+    TaughtTouch: {"q": values.list_of(values.number), "step": values.list_of(values.number)},
+    WidgetDescription: {
+        "kind": values.one_of(*WIDGETS),
+        "link": values.text,
+        "at": _VECTOR3,
+        "radius": values.positive,
+        "path": values.list_of(_VECTOR3),
+        "width": values.positive,
+        "normal": _VECTOR3,
+        "up": _VECTOR3,
+        "size": values.list_of(values.positive, 2),
+        "force": values.positive,
+        "most": values.positive,
+        "range": values.list_of(values.number, 2),
     },
     RetractDescription: {"way": values.positive, "speed": values.positive},
     PolicyDescription: {"zones": _zones, "transient_time": values.positive},

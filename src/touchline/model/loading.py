@@ -10,6 +10,7 @@ from touchline.model.corrections import apply_corrections
 from touchline.model.description import JointDescription, RobotDescription, SensorDescription
 from touchline.model.entries import JointEntry, RobotFile, SensorEntry
 from touchline.model.expand import Expander
+from touchline.model.interface_names import check_interface
 from touchline.model.mechanism import Mechanism
 from touchline.model.names import Names, check_names, joint_entries, names_in, sensor_entries
 from touchline.model.packages import resolve, resolve_robot
@@ -132,6 +133,7 @@ class _Draft:
         self.problems = [
             *check_names(file, names, mechanism),
             *check_policy(file, names, mechanism),
+            *check_interface(file, mechanism, count),
             *self.expander.problems,
         ]
 
@@ -169,6 +171,7 @@ class _Draft:
             graspable=tuple(file.graspable),
             detection=self.detection,
             policy=file.policy,
+            interface=file.interface,
             log=file.log,
             path=self.path,
         )

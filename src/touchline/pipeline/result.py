@@ -36,6 +36,7 @@ class Layout:
         self.normalized, self.drift, self.quiet = (
             slices[name] for name in ("normalized", "drift", "quiet")
         )
+        self.time, self.q = slices["time"].start, slices["q"]
         self.health = estimate["health"].start
         self.contacts, self.changes = slices["counts"].start, slices["counts"].start + 1
         self.end = slices["counts"].stop
@@ -47,6 +48,8 @@ class Result(Value):
     """What one sample brought; worked out when it is asked for.
 
     Attributes:
+        time: of the sample [s].
+        q: (n,) its joint positions [rad or m].
         estimate: torques and wrenches.
         contacts: at least one per segment that is touched.
         detection: levels per segment.
@@ -54,11 +57,21 @@ class Result(Value):
         events: those that began, changed or ended with this sample.
     """
 
+    time: float
+    q: Array
     estimate: Estimate
     contacts: list[Contact]
     detection: Detection
     health: int
     events: tuple[EventChange, ...] = ()
+
+
+def _time(row: Array, at: Layout) -> float:
+    return row.item(at.time)
+
+
+def _q(row: Array, at: Layout) -> Array:
+    return row[at.q]
 
 
 def _estimate(row: Array, at: Layout) -> Estimate:
@@ -95,6 +108,8 @@ def _events(row: Array, at: Layout) -> tuple[EventChange, ...]:
 lazily(
     Result,
     {
+        "time": _time,
+        "q": _q,
         "estimate": _estimate,
         "contacts": _contacts,
         "detection": _detection,

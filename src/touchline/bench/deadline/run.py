@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """`touchline bench deadline`: how long single updates take, by number of contacts.
 
-Every update of random touches is timed by the CPU time of its thread, from the first sample on. The
-same input goes three times through a new pipeline, and of each update the least time counts: what the
-machine does to one of them it rarely does to all, while what the update itself needs comes back.
+Every update of random touches is timed by the CPU time of its thread, from the first sample on.
+The same input goes three times through a new pipeline, and of each update the least time counts:
+what the machine does to one of them it rarely does to all, while what the update itself needs
+comes back.
 """
 
 from collections.abc import Iterator
@@ -128,6 +129,6 @@ def main(updates: int, arms: tuple[str, ...], seed: int = 0) -> None:
     rows += [line.row() for line in done]
     print(aligned(rows, text_columns=(0, 2)))
     print(
-        f"CPU time of the thread in Pipeline.update [us], of each update the least of {REPEATS} repeats "
-        f"of the same input;\nnoise {TIERS[TIER]}, 20 N each, 1 kHz; first update: the slowest one"
+        f"CPU time of the thread in Pipeline.update [us], of each update the least of {REPEATS} "
+        f"repeats of the same input;\nnoise {TIERS[TIER]}, 20 N each, 1 kHz; first update: the slowest one"
     )

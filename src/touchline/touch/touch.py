@@ -1,0 +1,351 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The arm as an interface: widgets, gestures and strokes from the contacts of a pipeline."""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.localizer.skin import Skin, in_link
+from touchline.model.interface_names import GESTURES
+from touchline.model.robot import Robot
+from touchline.pipeline.result import Result
+from touchline.result.contact import Contact
+from touchline.suggest import unknown
+from touchline.touch.gesture import PRESS, Finger, GestureReader
+from touchline.touch.spot import TorqueSpots
+from touchline.touch.stroke import Stroke
+from touchline.touch.widget import Widget
+
+Array = NDArray[np.float64]
+
+DWELL = 0.03  # s; by then 99 % of the collisions are called so (docs/reaction.md), and no command
+TORQUE_DWELL = 0.1  # s; a torque step has its direction once the force no longer rises
+LATEST = 0.25  # s; a finger that is not on a widget by then only passes over it
+SURE = 0.9  # probability of being on a widget, or of a taught spot, from which it counts
+GESTURE_MOST = 60.0  # N; what presses harder means no gesture
+BEFORE = 0.3, 0.03  # s: from when to when before a touch its torques are taken as those at rest
+AVERAGE = 0.03  # s, over which the place of a press is averaged
+STROKE_LEAST = 0.01  # m; a shorter way on a pad is a press, no stroke
+KEPT = 1000  # events and strokes that are kept; the oldest go
+
+
+@dataclass(frozen=True)
+class TouchEvent:
+    """Something that a person did with the arm.
+
+    Attributes:
+        kind: "press", "release", "toggle", "change", "stroke", or a gesture.
+        widget: its name; None for a gesture beside all widgets.
+        time: at which it was decided [s].
+        link: touched link; None where that is not told.
+        position: (3,) [m] in the link's frame, or None.
+        value: of a toggle (bool), slider or dial (float), or the `Stroke`.
+        probability: 0 to 1, that it is so.
+        direction: (3,) of a swipe in the link's frame, or None.
+        contact: number of the contact's event.
+    """
+
+    kind: str
+    widget: str | None
+    time: float
+    link: str | None = None
+    position: Array | None = None
+    value: Any = None
+    probability: float = 1.0
+    direction: Array | None = None
+    contact: int | None = None
+
+
+Callback = Callable[[TouchEvent], Any]
+
+
+@dataclass
+class _Press:
+    """A finger, and what a widget needs of it."""
+
+    finger: Finger
+    resting: Array  # torques (n,) before it
+    places: deque[tuple[float, Array, float]] = field(default_factory=deque)
+    steps: list[Array] = field(default_factory=list)
+    widget: Widget | None = None
+    trace: list[tuple[float, float, float, float]] = field(default_factory=list)
+    value: float | None = None
+    turned: float = 0.0
+
+
+class Touch:
+    """Follows a pipeline's results and tells what people do with the arm.
+
+    Args:
+        robot: whose `interface` has the widgets.
+        skin: its surfaces, if already at hand.
+
+    Attributes:
+        events: the last `TouchEvent`s.
+        strokes: the last finished ones, as felt; `Stroke.cleaned` is what a `Recognizer` likes.
+        values: of toggles (bool), sliders and dials (float), by name.
+    """
+
+    def __init__(self, robot: Robot, skin: Skin | None = None) -> None:
+        self.robot = robot
+        skin = skin or Skin(robot)
+        self._patches = {patch.link: patch for patch in skin.patches}
+        given = robot.description.interface
+        self.widgets = {name: _widget(name, given[name], self._patches) for name in given}
+        taught = {name: entry.taught for name, entry in given.items() if entry.taught}
+        self._spots = TorqueSpots(taught, skin) if taught else None
+        self.values: dict[str, Any] = {
+            w.name: False for w in self.widgets.values() if w.kind == "toggle"
+        }
+        self.events: deque[TouchEvent] = deque(maxlen=KEPT)
+        self.strokes: deque[Stroke] = deque(maxlen=KEPT)
+        self._callbacks: dict[str, list[Callback]] = {}
+        self._gestures = GestureReader()
+        self._presses: dict[int, _Press] = {}
+        self._rest: deque[tuple[float, Array]] = deque()
+
+    def on(self, name: str, callback: Callback | None = None) -> Any:
+        """Calls `callback(event)` for a widget or a gesture; without one a decorator.
+
+        Raises:
+            ValueError: there is no such widget or gesture.
+        """
+        known = (*self.widgets, *GESTURES)
+        if name not in known:
+            raise ValueError(unknown(name, "widget or gesture", known))
+        if callback is None:
+            return lambda function: self.on(name, function) or function
+        self._callbacks.setdefault(name, []).append(callback)
+        return None
+
+    def update(self, result: Result) -> list[TouchEvent]:
+        """Takes the result of one `Pipeline.update`; what was decided with it.
+
+        Callbacks are called before it returns, in the order of the events.
+        """
+        time, q = result.time, np.asarray(result.q, float)
+        found: list[TouchEvent] = []
+        torque = result.estimate.tau_ext
+        if not result.contacts and not self._presses:
+            self._rest.append((time, torque))
+            while self._rest[0][0] < time - BEFORE[0]:
+                self._rest.popleft()
+        poses = self.robot.poses(q) if result.contacts else None
+        seen = set()
+        for contact in result.contacts:
+            seen.add(contact.event)
+            found += self._follow(contact, time, q, torque, poses)
+        for number in [n for n in self._presses if n not in seen]:
+            found += self._lift(self._presses[number], time)
+        fingers = [press.finger for press in self._presses.values()]
+        found += [self._gesture_event(g) for g in self._gestures.follow(fingers, time)]
+        for number in [n for n, p in self._presses.items() if p.finger.lifted is not None]:
+            if number not in seen:
+                del self._presses[number]
+        for event in found:
+            self.events.append(event)
+            for callback in (
+                *self._callbacks.get(event.widget or "", ()),
+                *self._callbacks.get(event.kind, ()),
+            ):
+                callback(event)
+        return found
+
+    def widget_at(self, link: str | None, position_link: Array | None) -> str | None:
+        """Name of the widget at a place (3,) [m] in a link's frame, or None."""
+        if link is None or position_link is None:
+            return None
+        inside = [
+            (widget.read(position_link).beyond, widget.name)
+            for widget in self.widgets.values()
+            if widget.link == link and not widget.given.taught
+        ]
+        return min(inside)[1] if inside and min(inside)[0] <= 0.0 else None
+
+    def _follow(self, contact: Contact, time, q, torque, poses) -> list[TouchEvent]:
+        press = self._presses.get(contact.event)
+        size = contact.size
+        if press is None:
+            press = self._begin(contact, time, torque)
+        finger = press.finger
+        if size == 0.0:  # joint torques alone: their step stands for the force
+            size = float(np.linalg.norm(np.nan_to_num(torque - press.resting)))
+        if finger.lifted is not None:
+            if size < PRESS * finger.peak or "again" in finger.told:
+                return []
+            if size < 1.5 * finger.now:  # still falling, or resting on the surface
+                finger.now = min(finger.now, size)
+                return []
+            press = self._begin(contact, time, press.resting, keep=True)
+            finger = press.finger
+        finger.now = size
+        finger.peak = max(finger.peak, size)
+        finger.collision |= contact.level == "collision" or (
+            contact.force is not None and size > GESTURE_MOST
+        )
+        finger.clamped |= bool(contact.clamped)
+        finger.force = contact.force
+        if size < PRESS * finger.peak:
+            return self._lift(press, time)
+        press.steps.append(torque - press.resting)
+        self._place(press, contact, time, poses)
+        if press.widget is not None:
+            return self._use(press, time, torque)
+        return self._choose(press, contact, time, q)
+
+    def _begin(self, contact: Contact, time: float, torque: Array, keep: bool = False) -> _Press:
+        resting = torque
+        if not keep:
+            last = self._rest[-1][0] if self._rest else time
+            early = [t for at, t in self._rest if at <= last - BEFORE[1]]
+            resting = np.mean(early, axis=0) if early else np.zeros_like(torque)
+        finger = Finger(contact.event, time, segment=contact.segment)
+        press = _Press(finger, np.asarray(resting))
+        self._presses[contact.event] = press
+        return press
+
+    def _place(self, press: _Press, contact: Contact, time: float, poses) -> None:
+        finger = press.finger
+        if contact.position is None or contact.link not in self._patches or poses is None:
+            return
+        patch = self._patches[contact.link]
+        point = in_link(patch, poses[patch.node], contact.position)
+        if contact.link != finger.link:
+            press.places.clear()
+            finger.link, finger.first, finger.far = contact.link, None, 0.0
+        press.places.append((time, point, contact.position_std or 0.0))
+        while press.places[0][0] < time - AVERAGE:
+            press.places.popleft()
+        if time - finger.begun >= DWELL / 2:
+            here: Array = np.mean([place for _, place, _ in press.places], axis=0)
+            finger.last = here
+            if finger.first is None:
+                finger.first = here
+            finger.far = max(finger.far, float(np.linalg.norm(here - finger.first)))
+
+    def _choose(self, press: _Press, contact: Contact, time, q) -> list[TouchEvent]:
+        finger = press.finger
+        age = time - finger.begun
+        if finger.collision or not DWELL <= age <= LATEST:
+            return []
+        widget, probability = self._on_widget(press, q, time)
+        if widget is None or probability < SURE:
+            return []
+        if contact.force is not None and not widget.force <= finger.now <= widget.most:
+            return []
+        press.widget, finger.widget = widget, widget.name
+        found = [self._event("press", press, time, probability=probability)]
+        if widget.kind == "toggle":
+            self.values[widget.name] = not self.values[widget.name]
+            value = self.values[widget.name]
+            found.append(self._event("toggle", press, time, value, probability))
+        return found + self._use(press, time, None)
+
+    def _on_widget(self, press: _Press, q: Array, time: float) -> tuple[Widget | None, float]:
+        finger = press.finger
+        if press.places and finger.link is not None:
+            point = np.mean([place for _, place, _ in press.places], axis=0)
+            std = float(np.mean([s for _, _, s in press.places]))
+            chances = [
+                (widget.probability(point, std), -widget.read(point).beyond, widget)
+                for widget in self.widgets.values()
+                if widget.link == finger.link and not widget.given.taught
+            ]
+            if chances:
+                best = max(chances, key=lambda chance: chance[:2])
+                return best[2], best[0]
+        if self._spots is not None and time - finger.begun >= TORQUE_DWELL:
+            recent = np.mean(press.steps[-max(1, len(press.steps) // 2) :], axis=0)
+            name, probability = self._spots.read(q, recent)[0]
+            if name is not None:
+                return self.widgets[name], probability
+        return None, 0.0
+
+    def _use(self, press: _Press, time: float, torque: Array | None) -> list[TouchEvent]:
+        """What a pressed slider, dial or pad reports."""
+        widget, finger = press.widget, press.finger
+        if widget is None or finger.last is None or not press.places:
+            return []
+        if finger.collision or finger.now > widget.most:
+            return self._lift(press, time)
+        reading = widget.read(press.places[-1][1])
+        if widget.kind == "pad" and isinstance(reading.value, tuple):
+            press.trace.append((time, *reading.value, finger.now))
+            return []
+        mean = widget.read(finger.last).value
+        if widget.kind == "slider" and isinstance(mean, float):
+            value = widget.scaled(mean)
+        elif widget.kind == "dial" and isinstance(mean, float):
+            before = mean if press.value is None else press.value
+            press.turned += (mean - before + np.pi) % (2 * np.pi) - np.pi
+            press.value = mean
+            value = press.turned
+        else:
+            return []
+        if self.values.get(widget.name) == value:
+            return []
+        self.values[widget.name] = value
+        return [self._event("change", press, time, value)]
+
+    def _lift(self, press: _Press, time: float) -> list[TouchEvent]:
+        finger, widget = press.finger, press.widget
+        if finger.lifted is not None:
+            return []
+        finger.lifted = time
+        if widget is None:
+            return []
+        found = [self._event("release", press, time, self.values.get(widget.name))]
+        if widget.kind == "pad" and len(press.trace) > 2 and not finger.collision:
+            trace = np.array(press.trace)
+            stroke = Stroke(widget.name, widget.link, trace[:, :3], trace[:, 3])
+            if stroke.cleaned().length >= STROKE_LEAST:
+                self.strokes.append(stroke)
+                found.append(self._event("stroke", press, time, stroke))
+        return found
+
+    def _event(self, kind, press: _Press, time, value=None, probability=1.0) -> TouchEvent:
+        finger = press.finger
+        name = press.widget.name if press.widget is not None else None
+        return TouchEvent(
+            kind, name, time, finger.link, finger.last, value, probability, None, finger.event
+        )
+
+    def _gesture_event(self, gesture) -> TouchEvent:
+        finger = gesture.finger
+        return TouchEvent(
+            gesture.kind,
+            finger.widget,
+            gesture.time,
+            finger.link,
+            finger.last,
+            None,
+            gesture.probability,
+            finger.direction if gesture.kind == "swipe" else None,
+            finger.event,
+        )
+
+
+def _widget(name: str, given, patches) -> Widget:
+    normal = None
+    if given.kind == "pad" and given.normal is None and given.link in patches:
+        normal = mean_normal(patches[given.link], np.array(given.at), max(given.size) / 2)
+    return Widget(name, given, normal)
+
+
+def mean_normal(patch, at: Array, radius: float) -> Array:
+    """The outward normal (3,) of a link's surface around a place, in the link's frame.
+
+    Mean over the triangles within `radius` [m] that look the same way as the nearest one.
+    """
+    surface = patch.surface
+    middles = surface.vertices[surface.faces].mean(axis=1)
+    distance = np.linalg.norm(middles - at, axis=1)
+    nearest = surface.normals[int(np.argmin(distance))]
+    near = (distance < radius) & (surface.normals @ nearest > 0.5)
+    total = (surface.normals[near] * surface.areas[near, None]).sum(axis=0)
+    length = float(np.linalg.norm(total))
+    return total / length if length > 0.0 else nearest
