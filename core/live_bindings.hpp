@@ -80,14 +80,15 @@ class Runner {
  private:
   void take(const tl::Arrived& arrived) {
     const std::lock_guard<std::mutex> turn(pipeline_.turn);  // no interpreter is held here
-    const tl::Result result = pipeline_.value.update(arrived.sample(joints_));
+    const tl::Sample sample = arrived.sample(joints_);
+    const tl::Result result = pipeline_.value.update(sample);
     pipelines::keep_ended(pipeline_, result);
     std::vector<double>* out = results_.vacant();
     if (out == nullptr) {
       unseen_.fetch_add(1);
       return;
     }
-    pipelines::take_snapshot(pipeline_.value, result, snapshot_);
+    pipelines::take_snapshot(pipeline_.value, sample, result, snapshot_);
     out->clear();
     out->push_back(arrived.arrival);
     out->push_back(static_cast<double>(arrived.sequence));
