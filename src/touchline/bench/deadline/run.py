@@ -130,5 +130,6 @@ def main(updates: int, arms: tuple[str, ...], seed: int = 0) -> None:
     print(aligned(rows, text_columns=(0, 2)))
     print(
         f"CPU time of the thread in Pipeline.update [us], of each update the least of {REPEATS} "
-        f"repeats of the same input;\nnoise {TIERS[TIER]}, 20 N each, 1 kHz; first update: the slowest one"
+        f"repeats of the same input;\nnoise {TIERS[TIER]}, 20 N each, 1 kHz; "
+        "first update: the slowest one"
     )
