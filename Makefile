@@ -3,7 +3,7 @@
 PYTHON := .venv/bin/python
 CORE := $(shell find core -name '*.hpp' -o -name '*.cpp' -o -name 'CMakeLists.txt')
 
-.PHONY: demo test check format clean
+.PHONY: demo test check format docs clean
 
 demo: .venv/demo
 	.venv/bin/touchline demo $(ARGS)
@@ -21,11 +21,19 @@ format: .venv/ready
 	.venv/bin/ruff check --fix .
 	.venv/bin/ruff format .
 
+docs: .venv/docs
+	$(PYTHON) scripts/make_reference.py
+	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict --quiet
+
 clean:
-	rm -rf .venv build
+	rm -rf .venv build site
 
 .venv/demo: pyproject.toml scripts/setup.sh $(CORE)
 	scripts/setup.sh demo
+
+.venv/docs: .venv/ready
+	$(PYTHON) -m pip install --quiet --disable-pip-version-check --group docs
+	touch $@
 
 .venv/ready: pyproject.toml scripts/setup.sh $(CORE)
 	scripts/setup.sh

@@ -42,12 +42,12 @@ echo "touchline: setting up .venv, which takes a minute or two" >&2
 pip() { .venv/bin/python -m pip install --quiet --disable-pip-version-check "$@"; }
 pip --upgrade "pip>=25.1"
 if [ "${1:-all}" = demo ]; then
-  pip --editable ".[logs,report,view]"
+  pip --editable ".[all]"
   touch .venv/demo
   exit
 fi
 
 obtain chromium sh -c 'command -v chromium || command -v google-chrome' || echo \
   "touchline: no Chromium, so pages are not tested; on Debian: apt-get install chromium" >&2
-pip --editable ".[logs,report,view]" --group test --group check
+pip --editable ".[all]" --group test --group check
 touch .venv/demo .venv/ready

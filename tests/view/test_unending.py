@@ -230,3 +230,22 @@ async def _send(page, live, uuids, seed, actions) -> None:
 async def _read(client) -> None:
     async for _ in client:
         pass
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10"])
+def test_another_arm_is_pushed_and_feels_it_by_every_method(name):
+    pytest.importorskip("pinocchio", reason="comes with example-robot-data, the arms' models")
+    with PageServer("test", port=0) as server:
+        live = LivePage(server, robot=name)
+        assert live._controls._fault.options == ("none",)
+        felt = 0
+        for method in live._controls._method.options:
+            live._controls._method.value = method
+            for _ in range(3):
+                live.post(lambda: live.arm.push_anywhere(40.0))
+                for _ in range(15):
+                    live.frame(20)
+                felt += any(v.level for v in live.verdicts)
+                live.post(live.arm.hands.release_all)
+                live.frame(20)
+        assert felt >= 3

@@ -3,6 +3,8 @@
 
 from pathlib import Path
 
+from touchline.check.assumptions import check_assumptions
+from touchline.check.felt import note_felt
 from touchline.check.findings import Findings
 from touchline.check.model import check_model
 from touchline.errors import InputError
@@ -19,7 +21,9 @@ def check(robot: str | Path, log: str | Path | None = None) -> Findings:
     """
     model = load_robot(robot)
     findings = Findings()
+    check_assumptions(model, findings)
     check_model(model, findings)
+    note_felt(model, findings)
     if log is not None:
         from touchline.check.recording import check_recording
 

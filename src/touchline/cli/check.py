@@ -25,7 +25,7 @@ def check(
     Exit status: 0 nothing found, 1 findings, 2 bad input.
 
     Args:
-        robot: A robot.yaml, or the name of a robot that ships with Touchline (sara).
+        robot: A robot.yaml, a URDF or MJCF, or the name of a robot (sara).
         log: A recording: a table (.parquet, .csv, .csv.gz) or a rosbag2 (.mcap, .db3).
         fix: Writes a copy of the description in which a missing load or a tilted base is mended.
     """

@@ -7,6 +7,7 @@ from typing import Annotated
 from tyro.conf import arg
 
 from touchline.errors import InputError
+from touchline.extras import need
 from touchline.numbers import check_least, check_positive
 
 HEADLESS_DURATION = 12.0  # s
@@ -17,11 +18,12 @@ def demo(
     duration: Annotated[float | None, arg(metavar="S")] = None,
     out: Annotated[Path, arg(metavar="DIR")] = Path("out/demo"),
     seed: int = 1,
+    robot: Annotated[str, arg(metavar="ROBOT")] = "sara",
     host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1",
     port: int = 8080,
     browser: bool = True,
 ) -> int:
-    """Opens a page with the SARA-class arm, simulated live: push it, and see what it feels.
+    """Opens a page with an arm, simulated live: push it, and see what it feels.
 
     Example: touchline demo
 
@@ -39,6 +41,7 @@ def demo(
             Ctrl-C.
         out: Directory for the log and the results of --headless.
         seed: Of the motion, the places and the noise.
+        robot: A robot.yaml, a URDF or MJCF, or the name of a robot.
         host: Address at which the page is served. Another than 127.0.0.1 lets other machines see
             and push the arm: it needs the token that is then printed.
         port: The first port that is tried.
@@ -46,20 +49,22 @@ def demo(
     """
     check_least(0, seed=seed)
     if headless:
-        return _print(HEADLESS_DURATION if duration is None else duration, out, seed)
+        return _print(HEADLESS_DURATION if duration is None else duration, out, seed, robot)
     if duration is not None:
         check_positive(duration=duration)
-    return _show(host, port, seed, browser, duration)
+    return _show(host, port, seed, robot, browser, duration)
 
 
-def _show(host: str, port: int, seed: int, browser: bool, duration: float | None) -> int:
+def _show(
+    host: str, port: int, seed: int, robot: str, browser: bool, duration: float | None
+) -> int:
     from touchline.view.server import PageServer, open_page
 
     with PageServer("Touchline", host, port) as server:
         from touchline.view.live import LivePage
 
         print("preparing the arm ...", flush=True)
-        page = LivePage(server, seed)
+        page = LivePage(server, seed, robot)
         print(f"the arm is at {server.url}\nCtrl-C ends it.", flush=True)
         if browser:
             open_page(server.url)
@@ -70,7 +75,7 @@ def _show(host: str, port: int, seed: int, browser: bool, duration: float | None
     return 0
 
 
-def _print(duration: float, out: Path, seed: int) -> int:
+def _print(duration: float, out: Path, seed: int, name: str) -> int:
     from touchline.logs import write_table
     from touchline.model.robot import load_robot
     from touchline.report.analysis import analyze
@@ -81,12 +86,14 @@ def _print(duration: float, out: Path, seed: int) -> int:
 
     if not 4.0 <= duration <= 600.0:
         raise InputError(f"--duration {duration}: allowed: 4 to 600 s")
-    robot = load_robot("sara")
+    for module in ("mujoco", "pyarrow"):  # told before the work begins
+        need(module)
+    robot = load_robot(name)
     print(f"simulating {duration:g} s of the arm being touched (as long on a slow machine) ...")
     log = out / "demo.parquet"
     settings = Run(seed, noise=SensorNoise())
     simulate_to_log("demo", robot, log, write_table, settings, {"seconds": duration})
-    analysis = analyze(log, "sara", out)
+    analysis = analyze(log, name, out)
     print(comparison_text(analysis.comparisons, analysis.events))
     print(f"report: {out / 'report.html'}")
     return 0

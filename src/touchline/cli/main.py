@@ -13,12 +13,14 @@ from touchline.cli.calibrate import calibrate
 from touchline.cli.check import check
 from touchline.cli.demo import demo
 from touchline.cli.export import export
+from touchline.cli.init import init
 from touchline.cli.live import live
 from touchline.cli.reproduce import reproduce
 from touchline.cli.simulate import simulate
 from touchline.cli.teach import teach
 from touchline.cli.view import view
 from touchline.errors import InputError
+from touchline.extras import missing
 from touchline.suggest import did_you_mean
 
 USAGE = """\
@@ -34,6 +36,7 @@ Exit status: 0 done, 1 failure (check: findings), 2 bad input."""
 
 COMMANDS: dict[str, Callable[..., int]] = {
     "demo": demo,
+    "init": init,
     "simulate": simulate,
     "analyze": analyze,
     "view": view,
@@ -55,19 +58,6 @@ usage: touchline bench [NAME] [OPTIONS], or several names; without a name: all o
 
 `touchline bench NAME --help` explains one and its options."""
 
-EXTRAS = {
-    "pyarrow": "logs",
-    "rosbags": "logs",
-    "lz4": "logs",
-    "backports": "logs",
-    "collada": "meshes",
-    "matplotlib": "report",
-    "viser": "view",
-    "websockets": "view",
-    "pinocchio": "bench",
-    "idyntree": "bench",
-    "example_robot_data": "bench",
-}
 INTERRUPTED = 130
 
 
@@ -85,10 +75,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     except InputError as error:
         return _complain(str(error), 2)
     except ModuleNotFoundError as error:
-        extra = EXTRAS.get((error.name or "").partition(".")[0])
-        if extra is None:
+        told = missing(error.name or "")
+        if told is None:
             raise
-        return _complain(f"{error.name} is not installed: pip install 'touchline[{extra}]'", 1)
+        return _complain(told, 1)
     except KeyboardInterrupt:
         return _complain("stopped", INTERRUPTED)
     except BrokenPipeError:  # the reader of our output has seen enough

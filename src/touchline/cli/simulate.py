@@ -28,17 +28,32 @@ def simulate(
 
     Example: touchline simulate three_touches --out touches.parquet --speed 0.5
 
-    Scenarios: free_motion, three_touches, base_touch, singular_push, colliding_pushers,
-    random_pushes, demo. The log can be analyzed like that of a real robot: the columns truth.* are
-    never read by the estimator.
+    Scenarios, each with the options it has and their defaults:
+
+    free_motion (--seconds 10 --speed 1): the arm moves and nothing touches it.
+
+    three_touches (--speed 0 --force 20 --seconds 1): every segment is touched at the same time.
+
+    base_touch (--speed 0 --force 20 --seconds 1): the innermost link, which no joint torque shows.
+
+    singular_push (--force 20 --seconds 1): along a direction in which no joint can move the arm.
+
+    colliding_pushers (--speed 0 --force 20): balls pressed against each segment in turn.
+
+    random_pushes (--force 20): one push after the other, the arm moved in between.
+
+    demo (--seconds 20): slow motion with several touches, as in `touchline demo`.
+
+    The log can be analyzed like that of a real robot: the columns truth.* are never read by the
+    estimator.
 
     Args:
-        scenario: What happens.
+        scenario: What happens; see above.
         out: The log: .parquet, .csv or .csv.gz.
-        robot: A robot that ships with Touchline, or a robot.yaml.
-        seconds: Duration.
-        speed: Of the fastest joint [rad/s]; 0: the arm is held.
-        force: Of each touch [N].
+        robot: A robot.yaml, a URDF or MJCF, or the name of a robot.
+        seconds: Duration; default: the scenario's.
+        speed: Of the fastest joint [rad/s]; 0: the arm is held; default: the scenario's.
+        force: Of each touch [N]; default: the scenario's.
         seed: Of motions, places and noise.
         rate: Of the log [Hz]; divides physics.
         physics: Rate of the physics [Hz].

@@ -26,7 +26,7 @@ def view(
 
     Args:
         recording: Directory with results of `touchline analyze`, or a log as it takes them.
-        robot: Its robot.yaml, or the name of a robot that ships with Touchline (sara). Results
+        robot: A robot.yaml, a URDF or MJCF, or the name of a robot (sara). Results
             know the robot they were made with; a log needs it.
         out: Where the results of a log are kept; without it they are thrown away at the end.
         host: Address at which the page is served. Another than 127.0.0.1 lets other machines see

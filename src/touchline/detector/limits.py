@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Limits of a statistic for a false-alarm rate: from theory, and from the tail that was seen."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.detector.chi_square import chi_square_limit, normal_limit
 from touchline.model.description import DetectionDescription, TailDescription
 
 Array = NDArray[np.float64]
@@ -41,23 +44,19 @@ def theoretical(
     method: str, counts: NDArray[np.int64], rate: float, period: float, d: DetectionDescription
 ) -> Array:
     """Limits (m,) if noise were all: every sample is taken for a test of its own."""
-    from scipy.special import chdtri, ndtri
-
     if method == "rows":
         return np.ones(len(counts))
     alarm = min(rate * period / 3600.0, 0.1)
     rows = np.maximum(counts, 1)
     if method == "scaled":
-        return -ndtri(0.5 * alarm / rows)
+        return normal_limit(0.5 * alarm / rows)
     if method == "cusum":
         return np.array([siegmund(2 * n / alarm, CUSUM_SHIFT) for n in rows])
     tests = len(d.windows) if method == "glrt" else 1
-    return np.sqrt(chdtri(rows, alarm / tests))
+    return np.sqrt(chi_square_limit(rows, alarm / tests))
 
 
 def sum_limits(counts: NDArray[np.int64], sigmas: float) -> Array:
     """Limits (m,) of the sum of squared rows, as rare as one row beyond `sigmas`."""
-    from scipy.special import chdtri, erfc
-
-    alarm = erfc(sigmas / np.sqrt(2))  # of one row: a normal variable beyond +-sigmas
-    return chdtri(np.maximum(counts, 1), alarm) / sigmas**2
+    alarm = math.erfc(sigmas / math.sqrt(2))  # of one row: a normal variable beyond +-sigmas
+    return chi_square_limit(np.maximum(counts, 1), alarm) / sigmas**2

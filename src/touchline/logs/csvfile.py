@@ -140,3 +140,16 @@ class CsvSource:
         """Release the file."""
         if self._stream is not None and not self._stream.closed:
             self._stream.close()
+
+
+def read_head(path: Path, rows: int) -> tuple[list[str], list[list[str]]]:
+    """Column names and the cells of the first rows, as they stand.
+
+    Raises:
+        InputError: the file is empty, is no text, or has no header.
+    """
+    names, delimiter = _header(path)
+    with WholeLines(path) as stream:
+        text = io.TextIOWrapper(io.BufferedReader(stream), "utf-8-sig", errors="replace")
+        lines = [line for _, line in zip(range(rows + 1), text, strict=False)]
+    return names, list(csv.reader(lines[1:], delimiter=delimiter))

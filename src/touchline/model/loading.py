@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from touchline.errors import InputError
+from touchline.model import guess as guesses
 from touchline.model.corrections import apply_corrections
 from touchline.model.description import JointDescription, RobotDescription, SensorDescription
 from touchline.model.entries import JointEntry, RobotFile, SensorEntry
@@ -32,7 +33,22 @@ def read_robot_file(path: Path | str) -> tuple[RobotDescription, Mechanism]:
         InputError: everything that is wrong with both files, one line each.
     """
     path = Path(path)
-    data = read_yaml(path)
+    return read_robot_data(read_yaml(path), path)
+
+
+def read_model(path: Path | str) -> tuple[RobotDescription, Mechanism, guesses.Guess]:
+    """Read a URDF, MJCF or xacro without a description, which is guessed.
+
+    Raises:
+        InputError: what is wrong with the model.
+    """
+    path = Path(path)
+    guess = guesses.guess_description(load_mechanism(path), path)
+    return *read_robot_data(guess.data(), path), guess
+
+
+def read_robot_data(data: dict[Any, Any], path: Path) -> tuple[RobotDescription, Mechanism]:
+    """Read what a `robot.yaml` at `path` holds, or would hold; see `read_robot_file`."""
     file, problems = structure(data)
     problems += _missing_keys(file, problems)
     folders, folder_problems = _package_folders(file, path.parent)
@@ -57,7 +73,7 @@ def load_description(path: Path | str) -> RobotDescription:
 
 
 def load_mechanism(path: Path | str, package_dirs: Sequence[Path] = ()) -> Mechanism:
-    """Read a model file: URDF or MJCF, told apart by the root element.
+    """Read a model file: URDF or MJCF, told apart by the root element; a xacro is expanded.
 
     Raises:
         InputError: the file is neither, or what is wrong with it.

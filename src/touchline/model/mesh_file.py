@@ -13,6 +13,9 @@ from touchline.model.mechanism import Array
 FORMATS = (".stl", ".obj", ".dae", ".ply", ".off", ".glb")
 STL_HEADER, STL_FACET = 84, 50  # bytes of a binary STL
 NEED_COLLADA = "a .dae file needs the package pycollada: pip install 'touchline[meshes]'"
+NEED_TRIMESH = "a {} file needs the package trimesh: pip install 'touchline[meshes]'"
+
+_FACET = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribute", "<u2")])
 
 Triangles = tuple[Array, NDArray[np.int64]]
 
@@ -39,6 +42,8 @@ def mesh_problem(path: Path) -> str | None:
         return "the file is empty"
     if suffix == ".stl":
         return _stl_problem(start, size)
+    if find_spec("trimesh") is None:
+        return NEED_TRIMESH.format(suffix)
     if suffix == ".dae":
         if b"<COLLADA" not in start:
             return "no COLLADA document"
@@ -70,6 +75,8 @@ def read_mesh(path: Path) -> Triangles:
     problem = mesh_problem(path)
     if problem:
         raise MeshError(problem)
+    if path.suffix.lower() == ".stl":
+        return _finite(*_read_stl(path))
     import trimesh
 
     options: dict[str, Any] = {"skip_materials": True} if path.suffix.lower() == ".obj" else {}
@@ -78,11 +85,35 @@ def read_mesh(path: Path) -> Triangles:
         vertices, faces = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)  # type: ignore[union-attr]
     except Exception as error:  # trimesh and its parsers raise anything on a broken file
         raise MeshError(f"cannot be read: {error or type(error).__name__}") from None
+    return _finite(vertices * _unit(path), faces)
+
+
+def _finite(vertices: Array, faces: NDArray[np.int64]) -> Triangles:
     if len(faces) == 0:
         raise MeshError("holds no triangle")
     if not np.isfinite(vertices).all():
         raise MeshError("holds vertices that are not finite")
-    return vertices * _unit(path), faces
+    return vertices, faces
+
+
+def _read_stl(path: Path) -> Triangles:
+    """Return the facets of a binary or an ASCII STL, each with vertices of its own."""
+    data = path.read_bytes()
+    if data.lstrip()[:5].lower() == b"solid" and b"facet" in data[:4096].lower():
+        words = data.lower().split()
+        places = [i for i, word in enumerate(words) if word == b"vertex"]
+        try:
+            numbers = [[float(x) for x in words[i + 1 : i + 4]] for i in places]
+            vertices = np.array(numbers, float).reshape(-1, 3)
+        except ValueError:
+            raise MeshError("cannot be read: a vertex is not three numbers") from None
+        if len(vertices) % 3:
+            raise MeshError("cannot be read: a facet has not three vertices")
+    else:
+        count = int.from_bytes(data[80:84], "little")
+        facets = np.frombuffer(data, _FACET, count, STL_HEADER)
+        vertices = facets["vertices"].astype(float).reshape(-1, 3)
+    return vertices, np.arange(len(vertices)).reshape(-1, 3)
 
 
 def _unit(path: Path) -> float:

@@ -2,11 +2,11 @@
 """Compiling an MJCF that may name meshes which are not there."""
 
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from touchline.errors import InputError
+from touchline.extras import need
 from touchline.model.mesh_file import mesh_problem
 
 
@@ -25,7 +25,7 @@ def compile_mjcf(path: Path) -> tuple[Any, list[LostMesh]]:
     Raises:
         InputError: MuJoCo's own message; or the mass of a body comes from a lost mesh.
     """
-    mujoco: Any = import_module("mujoco")  # its stubs lack most names
+    mujoco: Any = need("mujoco")
     try:
         return mujoco.MjModel.from_xml_path(str(path)), []
     except ValueError as error:

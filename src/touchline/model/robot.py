@@ -4,18 +4,17 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from html import escape
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.errors import InputError
 from touchline.model.description import RobotDescription
 from touchline.model.kernel import native_observer
 from touchline.model.mechanism import Mechanism
 from touchline.model.tree import Node, Place, TreeBuilder
 from touchline.native import core
-from touchline.suggest import did_you_mean
 
 Array = NDArray[np.float64]
 
@@ -38,10 +37,19 @@ class Robot:
 
     Arrays follow `joint_names` (n), `sensor_names` (k) and `segment_names` (m): one segment per
     six-axis sensor in their order, then `root` if the robot's root is not on such a sensor.
+
+    Attributes:
+        assumed: a sentence for each guess, where the robot was read from a model alone.
     """
 
-    def __init__(self, description: RobotDescription, mechanism: Mechanism) -> None:
+    def __init__(
+        self,
+        description: RobotDescription,
+        mechanism: Mechanism,
+        assumed: Sequence[str] = (),
+    ) -> None:
         self.description = description
+        self.assumed = tuple(assumed)
         self.mechanism = mechanism
         self.name = description.name
         self.gravity = np.asarray(mechanism.gravity, dtype=float)
@@ -49,6 +57,24 @@ class Robot:
         builder = TreeBuilder(mechanism, coordinates, description.locked, description.sensors)
         self.nodes: tuple[Node, ...] = tuple(builder.nodes)
         self.places: dict[str, Place] = builder.places
+
+    def __repr__(self) -> str:
+        sensors = ", ".join(self.sensor_names) or "none"
+        measured = sum(joint.measured for joint in self.description.joints)
+        return (
+            f"<Robot {self.name}: {len(self.joint_names)} joints, {measured} with torques; "
+            f"force-torque sensors: {sensors}; segments: {', '.join(self.segment_names)}>"
+        )
+
+    def _repr_html_(self) -> str:
+        """The robot as a notebook shows it: its bodies with masses, segments and joints."""
+        rows = "".join(
+            f"<tr><td>{escape(', '.join(body.links))}</td><td>{escape(body.segment)}</td>"
+            f"<td>{self.nodes[body.node].inertia.mass:.3g}</td></tr>"
+            for body in self.bodies
+        )
+        head = "<tr><th>links of a body</th><th>segment</th><th>mass [kg]</th></tr>"
+        return f"<p>{escape(repr(self))}</p><table>{head}{rows}</table>"
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -201,21 +227,20 @@ def load_robot(robot: str | Path) -> Robot:
     """Reads a robot.
 
     Args:
-        robot: path of a `robot.yaml`, or the name of a robot that ships with Touchline ("sara").
+        robot: path of a `robot.yaml`, a URDF, an MJCF or a xacro; or the name of a robot that ships
+            with Touchline ("sara"), of a model of the installed package example-robot-data
+            ("panda"), or of one in the cache of robot_descriptions ("ur5e_mj").
+
+    Without a `robot.yaml` the rest is guessed; `Robot.assumed` says what.
 
     Raises:
         InputError: with every problem of the file at once.
     """
-    from touchline.model.loading import read_robot_file
-    from touchline.model.packages import shipped_descriptions
+    from touchline.model.loading import read_model, read_robot_file
+    from touchline.model.sources import find_robot
 
-    shipped = shipped_descriptions()
-    if not Path(robot).suffix and not Path(robot).exists():
-        if str(robot) not in shipped:
-            known = ", ".join(shipped)
-            raise InputError(
-                f"{robot}: no such file, and no robot of this name ships with Touchline; "
-                f"there are: {known}{did_you_mean(str(robot), shipped)}"
-            )
-        robot = shipped[str(robot)]
-    return Robot(*read_robot_file(robot))
+    source = find_robot(robot)
+    if source.kind == "description":
+        return Robot(*read_robot_file(source.path))
+    description, mechanism, guess = read_model(source.path)
+    return Robot(description, mechanism, guess.statements())

@@ -6,7 +6,9 @@ Reference: http://wiki.ros.org/urdf/XML. Materials, transmissions, sensors and t
 
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -41,7 +43,7 @@ def load_urdf(path: Path | str, package_dirs: Sequence[Path] = ()) -> Mechanism:
     if robot.tag != "robot":
         raise InputError(f"{path}: the root element is <{robot.tag}>; a URDF's is <robot>")
     if any("xacro" in element.tag for element in robot.iter()):
-        raise InputError(f"{path}: holds xacro macros; run xacro first: xacro IN > OUT.urdf")
+        raise InputError(f"{path}: holds xacro macros; name the file .xacro, and they are expanded")
     links = {
         name: _link(reader, name, element)
         for name, element in named(robot.findall("link"), "link", reader.fault)
@@ -54,17 +56,30 @@ def load_urdf(path: Path | str, package_dirs: Sequence[Path] = ()) -> Mechanism:
 
 
 def parse_xml(path: Path) -> Element:
-    """Return the root element of an XML file.
+    """Return the root element of an XML file; a `.xacro` is expanded by the package xacro.
 
     Raises:
         InputError: the file cannot be read, or line and column of the first error in it.
     """
+    text = read_bytes(path)
     try:
-        return ElementTree.fromstring(read_bytes(path))
+        return ElementTree.fromstring(_expanded(path) if path.suffix == ".xacro" else text)
     except ElementTree.ParseError as error:
         line, column = error.position
         what = str(error).split(":")[0]
         raise InputError(f"{path}:{line}:{column + 1}: not well-formed XML: {what}") from None
+
+
+def _expanded(path: Path) -> str:
+    try:
+        xacro: Any = import_module("xacro")
+    except ModuleNotFoundError:
+        raise InputError(f"{path}: a xacro needs the package xacro: pip install xacro") from None
+    try:
+        return xacro.process_file(str(path)).toxml()
+    except Exception as error:  # the package raises many kinds
+        what = " ".join(str(error).split())
+        raise InputError(f"{path}: xacro cannot expand it: {what}") from None
 
 
 def _mechanism(

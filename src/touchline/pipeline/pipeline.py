@@ -17,7 +17,7 @@ from touchline.localizer.localizer import (
 )
 from touchline.localizer.region import Region
 from touchline.localizer.skin import Skin
-from touchline.model.robot import Robot
+from touchline.model.robot import Robot, load_robot
 from touchline.native import core
 from touchline.observer.observer import Estimate, Observer
 from touchline.pipeline.native_robot import native_robot, write_robot
@@ -36,7 +36,7 @@ class Pipeline:
     pipeline wait for each other; `run` lets other Python threads go on.
 
     Args:
-        robot: the robot.
+        robot: the robot, or what `load_robot` takes.
         bandwidth: of the observer [rad/s]; default: the description's.
         method: of the observer, "segment" or "paper".
         period: time between samples [s], for thresholds and weights that follow from the noise.
@@ -62,7 +62,7 @@ class Pipeline:
 
     def __init__(
         self,
-        robot: Robot,
+        robot: Robot | str | Path,
         bandwidth: float | None = None,
         method: str = "segment",
         period: float = 1e-3,
@@ -76,6 +76,7 @@ class Pipeline:
     ) -> None:
         if not (np.isfinite(period) and period > 0.0):
             raise ValueError(f"period is {period}, but must be a positive number [s]")
+        robot = robot if isinstance(robot, Robot) else load_robot(robot)
         self.robot = robot
         self._observer = Observer(robot, bandwidth, method)  # names and checks, no samples
         if thresholds is None:

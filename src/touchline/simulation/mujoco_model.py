@@ -7,13 +7,13 @@ between any two of them exists in the simulation.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from touchline.errors import InputError
+from touchline.extras import need
 from touchline.model.mechanism import Inertia, Joint, Mechanism
 from touchline.model.robot import Robot
 from touchline.model.transforms import joint_motion, pose_rpy
@@ -38,7 +38,7 @@ class PlantModel:
 
 
 def _mujoco() -> Any:  # its stubs lack most names
-    return import_module("mujoco")
+    return need("mujoco")
 
 
 def build_model(

@@ -9,12 +9,12 @@ before and after an input has changed.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.extras import need
 from touchline.model.mechanism import Mechanism
 from touchline.model.robot import Robot
 from touchline.simulation.mujoco_model import Addition, build_model
@@ -65,7 +65,7 @@ class Plant:
         armature: Mapping[str, float] | None = None,
         addition: Addition | None = None,
     ) -> None:
-        self._mj: Any = import_module("mujoco")  # its stubs lack most names
+        self._mj: Any = need("mujoco")  # its stubs lack most names
         self.robot, self.rate = robot, rate
         joints = robot.description.joints
         motors = {j.name: j.rotor_inertia for j in joints if j.torque == "motor"}

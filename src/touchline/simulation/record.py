@@ -18,6 +18,15 @@ from touchline.suggest import did_you_mean
 Write = Callable[..., None]  # as `touchline.logs.tables.write_table`
 
 
+OPTIONS = ("seconds", "speed", "force")  # that a scenario may have; further ones are Python's
+
+
+def scenario_options(scenario: str) -> dict[str, float]:
+    """The options of a scenario with their defaults [s, rad/s, N]."""
+    parameters = inspect.signature(find_scenario(scenario)).parameters
+    return {name: p.default for name, p in parameters.items() if name in OPTIONS}
+
+
 def simulate_to_log(
     scenario: str,
     robot: Robot,
@@ -41,14 +50,12 @@ def simulate_to_log(
     """
     run = find_scenario(scenario)
     options = dict(options or {})
-    known = [
-        name for name in inspect.signature(run).parameters if name not in ("robot", "settings")
-    ]
+    known = list(scenario_options(scenario))
     unknown = [name for name in options if name not in known]
     if unknown:
         raise InputError(
-            f"scenario {scenario}: unknown option '{name}'{did_you_mean(name, known)}; "
-            f"allowed: {', '.join(known)}"
+            f"scenario {scenario} has no option --{name}; it has: "
+            + (", ".join(f"--{option}" for option in known) or "none")
             for name in unknown
         )
     _prepare(Path(out))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
+from touchline.observer.dynamics import mass_matrix
 from touchline.observer.samples import Samples
 from touchline.result.contact import Contact
 from touchline.simulation.control import JointImpedance
@@ -16,7 +17,7 @@ from touchline.simulation.noise import SensorNoise
 from touchline.simulation.plant import Plant
 from touchline.simulation.scene import wandering
 from touchline.simulation.sensing import sense
-from touchline.simulation.setup import read_setup
+from touchline.simulation.setup import Setup, read_setup
 from touchline.simulation.simulator import Rates, Simulation
 from touchline.simulation.touchable import TouchableSurface, structure_links, touchable_links
 from touchline.simulation.truth import Truth
@@ -32,6 +33,8 @@ SPEED = 0.4  # rad/s of the fastest joint
 PULL_LENGTH = 0.15  # m at which a pull reaches its limit
 DEEPEST = 0.08  # m below the surface, where a pull takes hold
 TRIES = 200
+FREQUENCY = 20.0  # rad/s of an arm that is held without gains of its own
+LEAST_INERTIA = 1e-3  # kg m2
 
 
 @dataclass
@@ -55,6 +58,18 @@ class Conditions:
     reaction: str = "ignore"
 
 
+def gains(robot: Robot, setup: Setup) -> tuple[Array, Array]:
+    """Stiffness (n,) [Nm/rad] and damping (n,) [Nm s/rad] of the arm's impedance.
+
+    Where none are given, each joint swings at FREQUENCY with the inertia that it moves, damped
+    just enough not to overshoot.
+    """
+    if setup.stiffness is not None and setup.damping is not None:
+        return setup.stiffness, setup.damping
+    inertia = np.maximum(np.diag(mass_matrix(robot, setup.home)[0]), LEAST_INERTIA)
+    return FREQUENCY**2 * inertia, 2.0 * FREQUENCY * inertia
+
+
 class LiveArm:
     """Simulates the arm and its sensors part by part.
 
@@ -69,6 +84,8 @@ class LiveArm:
         self.hands = Hands()
         self._rng = np.random.default_rng(seed)
         self._setup = read_setup(robot)
+        self._gains = gains(robot, self._setup)
+        self._outermost = "tool" if "tool" in robot.places else robot.bodies[-1].links[0]
         moving = wandering(self._setup, SPEED, self._rng, reach=0.5)
         self._trajectory = Switched(self._setup.home, moving)
         self._plant = Plant(robot, PHYSICS)
@@ -84,8 +101,7 @@ class LiveArm:
         self.set(Conditions())
 
     def _impedance(self, share: float) -> JointImpedance:
-        stiffness, damping = self._setup.stiffness, self._setup.damping
-        assert stiffness is not None and damping is not None, "the shipped arm has gains"
+        stiffness, damping = self._gains
         return JointImpedance(self._trajectory, share * stiffness, np.sqrt(share) * damping)
 
     @property
@@ -115,7 +131,7 @@ class LiveArm:
         self._controller.reaction = conditions.reaction
         self._noise = SensorNoise() if conditions.noise else None
         if before is None or before.payload != conditions.payload:
-            self._plant.load("tool", conditions.payload)
+            self._plant.load(self._outermost, conditions.payload)
         if before is None or before.fault != conditions.fault:
             self._fault = SensorFault(self.robot, conditions.fault, self._rng)
 

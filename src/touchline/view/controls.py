@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The live page's panel: what to do, what is felt, and what can be switched."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import viser
 
@@ -28,10 +28,17 @@ class Controls:
         gui: of a viser server.
         push: makes a random push.
         release: takes all pushes away.
+        methods: to choose from, of `METHODS`.
+        faults: to choose from, of `FAULTS`.
     """
 
     def __init__(
-        self, gui: viser.GuiApi, push: Callable[[], None], release: Callable[[], None]
+        self,
+        gui: viser.GuiApi,
+        push: Callable[[], None],
+        release: Callable[[], None],
+        methods: Sequence[str] = tuple(METHODS),
+        faults: Sequence[str] = tuple(FAULTS),
     ) -> None:
         gui.add_markdown(ADVICE)
         self.notice = gui.add_html("")
@@ -46,9 +53,9 @@ class Controls:
         self._motion = gui.add_dropdown("Arm", tuple(MOTIONS))
         self._reaction = gui.add_dropdown("When touched", tuple(REACTIONS))
         self._stiffness = gui.add_slider("Stiffness [%]", 5, 100, 5, 20)
-        self._method = gui.add_dropdown("Method", tuple(METHODS))
+        self._method = gui.add_dropdown("Method", tuple(methods))
         self._noise = gui.add_checkbox("Sensor noise", True)
-        self._fault = gui.add_dropdown("Sensor fault", tuple(FAULTS))
+        self._fault = gui.add_dropdown("Sensor fault", tuple(faults))
         self._payload = gui.add_slider(
             "Unknown load [kg]", 0.0, 1.0, 0.05, 0.0, hint="At the tool; the model lacks it."
         )

@@ -92,3 +92,10 @@ FAULTS: dict[str, Callable[[SensorFault, Array, Array, Array], None]] = {
     "joint 3: 3 Nm offset": SensorFault.torque_offset,
     "joint 3: silent": SensorFault.torque_silent,
 }
+
+
+def faults_of(robot: Robot) -> tuple[str, ...]:
+    """The faults that a robot's sensors and joints can have."""
+    sensors = {f"{name} sensor" for name in robot.sensor_names}
+    known = sensors | ({"joint 3"} if "joint3" in robot.joint_names else set())
+    return tuple(name for name in FAULTS if name == "none" or name.partition(":")[0] in known)

@@ -19,10 +19,11 @@ from touchline.simulation.hands import Hand
 from touchline.view.arm import RATE, LiveArm
 from touchline.view.contacts import ContactScene
 from touchline.view.controls import Controls
+from touchline.view.faults import faults_of
 from touchline.view.grasp import let_touch
 from touchline.view.history import History
 from touchline.view.judge import Judge, Touched, Verdict, touched
-from touchline.view.methods import METHODS, Felt, Method
+from touchline.view.methods import METHODS, Felt, Method, fully_measured, methods_of
 from touchline.view.plots import WrenchPlots
 from touchline.view.readout import Speed, readout
 from touchline.view.scene import RobotScene, dress
@@ -45,6 +46,7 @@ class LivePage:
     Args:
         server: without anything on its page.
         seed: of the motion, the noise and random pushes.
+        robot: what `load_robot` takes.
 
     Attributes:
         arm: that is simulated.
@@ -53,29 +55,32 @@ class LivePage:
         restarts: how often a frame failed and the arm began anew.
     """
 
-    def __init__(self, server: PageServer, seed: int = 1) -> None:
-        # The sensors of `sara`, and a torque sensor in every joint for the methods that need one.
-        self._sara, self._full = load_robot("sara"), load_robot("sara-full")
-        self._skin = Skin(self._sara)
+    def __init__(self, server: PageServer, seed: int = 1, robot: str = "sara") -> None:
+        # The robot's own sensors, and a torque sensor in every joint for the methods that need one.
+        self._own = load_robot(robot)
+        self._full = load_robot("sara-full") if robot == "sara" else fully_measured(self._own)
+        self._skin = Skin(self._own)
         self._seed, self.restarts = seed, 0
         self.arm = LiveArm(self._full, self._skin, seed)
         self._todo: queue.SimpleQueue[Callable[[], object]] = queue.SimpleQueue()
         self._pulls: dict[int, Hand] = {}
         self._page = server.page
         dress(self._page)
-        self._robot = RobotScene(self._page.scene, self._sara)
+        self._robot = RobotScene(self._page.scene, self._own)
         self._robot.place(self.arm.q)
         self._contacts = ContactScene(self._page.scene, self._robot)
         self._controls = Controls(
             self._page.gui,
             lambda: self.post(lambda: self.arm.push_anywhere(self._controls.force)),
             lambda: self.post(self.arm.hands.release_all),
+            methods_of(self._own),
+            faults_of(self._full),
         )
-        self._history = History(self._sara.segment_names)
+        self._history = History(self._own.segment_names)
         self._plots = _in_panel_of_their_own(self._page, self._history)
         let_touch(self._robot, self, self.post)
-        self._method = _Chosen(self._sara, self._full, self._skin)
-        self._judge = Judge(self._sara)
+        self._method = _Chosen(self._own, self._full, self._skin)
+        self._judge = Judge(self._own)
         self.felt: Felt | None = None
         self.verdicts: list[Verdict] = []
         self._speed = Speed()
@@ -156,8 +161,8 @@ class LivePage:
         self._history.clear()
         self.felt, self.verdicts = None, []
         self.arm = LiveArm(self._full, self._skin, self._seed + self.restarts)
-        self._method = _Chosen(self._sara, self._full, self._skin)
-        self._judge = Judge(self._sara)
+        self._method = _Chosen(self._own, self._full, self._skin)
+        self._judge = Judge(self._own)
         self._controls.notice.content = notice(error)
         self._notice_ends = time.monotonic() + NOTICE
 
@@ -225,8 +230,8 @@ def notice(error: Exception) -> str:
 class _Chosen:
     """The method that is chosen; one that takes long to make starts when it is ready."""
 
-    def __init__(self, sara: Robot, full: Robot, skin: Skin) -> None:
-        self._parts = (sara, full, skin)
+    def __init__(self, own: Robot, full: Robot, skin: Skin) -> None:
+        self._parts = (own, full, skin)
         self._maker = ThreadPoolExecutor(1)
         self._name = next(iter(METHODS))
         self._method: Method = METHODS[self._name](*self._parts)

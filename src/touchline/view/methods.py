@@ -14,6 +14,7 @@ from touchline.detector.thresholds import make_thresholds
 from touchline.errors import InputError
 from touchline.localizer.localizer import Localizer
 from touchline.localizer.skin import Skin
+from touchline.model.description import Friction
 from touchline.model.robot import Robot
 from touchline.observer.classical import ClassicalObserver
 from touchline.observer.observer import Observer
@@ -222,8 +223,23 @@ class Classical:
 
 
 METHODS: dict[str, Callable[[Robot, Robot, Skin], Method]] = {
-    "segment": lambda sara, full, skin: Observed(sara, skin, "segment"),
-    "paper": lambda sara, full, skin: Observed(sara, skin, "paper"),
-    "classical": lambda sara, full, skin: Classical(full, skin),
-    "joint torques only": lambda sara, full, skin: JointsOnly(full),
+    "segment": lambda own, full, skin: Observed(own, skin, "segment"),
+    "paper": lambda own, full, skin: Observed(own, skin, "paper"),
+    "classical": lambda own, full, skin: Classical(full, skin),
+    "joint torques only": lambda own, full, skin: JointsOnly(full),
 }
+
+
+def methods_of(robot: Robot) -> tuple[str, ...]:
+    """The methods that suit a robot: the classical one compares with force-torque sensors."""
+    six_axis = [sensor for sensor in robot.description.sensors if len(sensor.axes) == 6]
+    return tuple(name for name in METHODS if name != "classical" or six_axis)
+
+
+def fully_measured(robot: Robot) -> Robot:
+    """The same robot with a torque sensor in every joint."""
+    joints = tuple(
+        replace(joint, torque="sensor", sources=(), rotor_inertia=0.0, friction=Friction())
+        for joint in robot.description.joints
+    )
+    return Robot(replace(robot.description, joints=joints), robot.mechanism)

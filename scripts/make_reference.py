@@ -1,0 +1,318 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Writes docs/reference from the code: robot.yaml, logs, results and the command line.
+
+    python scripts/make_reference.py [--check]
+
+With --check nothing is written; the exit status is 1 if a page is old.
+"""
+
+import inspect
+import re
+import sys
+from collections.abc import Iterable
+from dataclasses import fields
+from pathlib import Path
+
+from touchline.cli.bench import BENCHMARKS
+from touchline.cli.main import COMMANDS
+from touchline.health import Health
+from touchline.model.meanings import MEANINGS, accepted_keys
+from touchline.report.outputs import CONTACT_SCHEMA
+from touchline.result.contact import Candidate, Contact
+from touchline.result.event import Event
+from touchline.result.native import CONTACT
+
+FOLDER = Path(__file__).parents[1] / "docs" / "reference"
+NOTE = "<!-- Written by scripts/make_reference.py; changes by hand are lost. -->\n\n"
+TYPES = {
+    "f8": "number",
+    "i8": "whole number",
+    "u4": "whole number",
+    "str": "text",
+}
+OWN = {  # columns that are no field of a contact
+    "time": ("number", "s", "Time stamp of the sample."),
+    "health": ("whole number", "", "Sum of the health bits below; 0 when all is well."),
+}
+LOG_COLUMNS = [
+    ("time", "number", "s", "required", "Time stamp; it need not begin at 0."),
+    ("q.JOINT", "number", "rad or m", "required", "Position of an observed joint."),
+    ("qd.JOINT", "number", "rad/s or m/s", "estimated from q", "Velocity."),
+    ("tau.JOINT", "number", "Nm or N", "NaN: not measured", "Torque, as `joints[].torque` says."),
+    ("SENSOR.fx, .fy, .fz", "number", "N", "NaN: not measured", "Force, in the sensor's frame."),
+    ("SENSOR.mx, .my, .mz", "number", "Nm", "NaN: not measured", "Moment about its origin."),
+    ("truth.contact.K.link", "whole number", "", "none", "Link in `truth.links`; of a simulation."),
+    ("truth.contact.K.x, .y, .z", "number", "m", "none", "Place in world; of a simulation."),
+    ("truth.contact.K.fx, .fy, .fz", "number", "N", "none", "Force in world; of a simulation."),
+]
+ESTIMATES = [
+    ("time", "number", "s", "Time stamp of the sample."),
+    ("health", "whole number", "", "Sum of the health bits below."),
+    ("tau_ext.JOINT", "number", "Nm or N", "External torque of a joint; null where not known."),
+    ("SENSOR.ext.fx, .fy, .fz", "number", "N", "External force on all outboard, sensor's frame."),
+    ("SENSOR.ext.mx, .my, .mz", "number", "Nm", "External moment about the sensor's origin."),
+    ("SEGMENT.seg.fx, .fy, .fz", "number", "N", "External force on the segment alone, in world."),
+    ("SEGMENT.seg.mx, .my, .mz", "number", "Nm", "External moment about the world's origin."),
+]
+
+
+FURTHER = {  # that a docstring tells in passing
+    "body": "the rigid body that the link belongs to",
+    "position_std": "square root of the covariance's trace [m]",
+    "unknowns": "to which `rank` belongs: two for each place and three for each force",
+    "degrees": "of freedom of `chi2`",
+}
+
+
+def attributes(cls: type) -> dict[str, str]:
+    """What the docstring of a class says of each attribute."""
+    text = inspect.cleandoc(cls.__doc__ or "").partition("Attributes:\n")[2]
+    found: dict[str, str] = {}
+    name = ""
+    for line in text.splitlines():
+        match = re.match(r"^    (\w+): (.*)$", line)
+        if match:
+            name = match[1]
+            found[name] = match[2]
+        elif line.strip() and name:
+            found[name] += " " + line.strip()
+    return found
+
+
+def unit_of(meaning: str) -> str:
+    """The unit in brackets."""
+    match = re.search(r"\[([^\]]+)\]", meaning)
+    return match[1] if match else ""
+
+
+def plain(meaning: str) -> str:
+    """The meaning without its unit and shape, as a sentence."""
+    text = re.sub(r"\s*\[[^\]]+\]", "", meaning)
+    text = re.sub(r"^\((\d+(, \d+)?),?\)\s*", "", text).strip()
+    text = text.rstrip(".")
+    return text[:1].upper() + text[1:] + "."
+
+
+def table(head: str, rows: Iterable[Iterable[str]]) -> str:
+    """A table in Markdown; a bar within a cell is escaped."""
+    names = head.split("|")
+    lines = [f"| {' | '.join(names)} |", f"|{'---|' * len(names)}"]
+    lines += ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def robot_yaml() -> str:
+    """Every key of robot.yaml."""
+    rows, defaults = [], {key.place: key.default for key in accepted_keys()}
+    for place, (kind, unit, meaning) in MEANINGS.items():
+        default = defaults.get(place, "-")
+        rows.append([f"`{place}`", kind, unit, "required" if default is None else default, meaning])
+    return (
+        "# robot.yaml\n\n"
+        + NOTE
+        + "A robot description is a YAML file. `model` is required, and so is a `name`. "
+        "Unknown keys are refused; all errors of a file are told at once. `[]` stands for an item "
+        "of a list, NAME for a name. `-` means: not given.\n\n"
+        "`touchline init MODEL LOG --out robot.yaml` writes a first one with comments.\n\n"
+        + table("key|type|unit|default|meaning", rows)
+    )
+
+
+def logs() -> str:
+    """Columns and topics of logs."""
+    return (
+        "# Logs\n\n"
+        + NOTE
+        + "A table is Parquet, CSV or CSV.gz, with one row per sample. Other column names are "
+        "given under `log` in [robot.yaml](robot_yaml.md).\n\n"
+        + table(
+            "column|type|unit|if missing|meaning", ([f"`{c}`", *rest] for c, *rest in LOG_COLUMNS)
+        )
+        + "\nA rosbag2 recording (MCAP or sqlite3) has these topics:\n\n"
+        + table(
+            "type|holds",
+            [
+                ["`sensor_msgs/msg/JointState`", "position, velocity and effort, by joint name"],
+                ["`geometry_msgs/msg/WrenchStamped`", "one topic for each sensor"],
+            ],
+        )
+        + "\nTime is `header.stamp`; where that is 0 the receive time is used, with a warning. "
+        "Rates may differ, and clocks may jitter.\n"
+    )
+
+
+def meaning_of_fields() -> dict[str, tuple[str, str]]:
+    """Unit and meaning of each column of contacts.parquet, from the fields of `Contact`."""
+    known = FURTHER | attributes(Contact)
+    found = {}
+    for field in CONTACT:
+        meaning = known[field.name]
+        for column in field.columns:
+            if column in CONTACT_SCHEMA:
+                unit = unit_of(meaning)
+                if field.name == "wrench":
+                    unit = "Nm"
+                part = f"`{field.name}`: " if len(field.columns) > 1 else ""
+                found[column] = (unit, part + plain(meaning))
+    return found
+
+
+def results() -> str:
+    """Files that analyze writes."""
+    meanings = meaning_of_fields()
+    rows = []
+    for column, kind in CONTACT_SCHEMA.items():
+        if column in OWN:
+            rows.append([f"`{column}`", *OWN[column]])
+        else:
+            unit, meaning = meanings[column]
+            rows.append([f"`{column}`", TYPES[kind], unit, meaning])
+    event = FURTHER | attributes(Event)
+    events = [
+        [f"`{f.name}`", kind_of(f.type), unit_of(event[f.name]), plain(event[f.name])]
+        for f in fields(Event)
+    ]
+    candidate = [
+        ["`link`", "text", "", "Link of the place."],
+        ["`body`", "text", "", "Rigid body that the link belongs to."],
+        ["`probability`", "number", "", "Of this place, 0 to 1."],
+        ["`position`", "list of 3 numbers", "m", "In world."],
+        [
+            "`radius`",
+            "number",
+            "m",
+            "Of the part of the link that it stands for; missing for a place.",
+        ],
+    ]
+    assert {row[0].strip("`") for row in candidate} == {f.name for f in fields(Candidate)}
+    health = [[str(int(bit)), f"`{(bit.name or '').lower()}`", why] for bit, why in health_bits()]
+    return (
+        "# Results\n\n"
+        + NOTE
+        + "`touchline analyze LOG --robot ROBOT --out DIR` writes these files. What cannot be "
+        "computed is null in Parquet and JSON.\n\n"
+        "## estimates.parquet\n\nOne row per sample.\n\n"
+        + table("column|type|unit|meaning", ([f"`{c}`", *rest] for c, *rest in ESTIMATES))
+        + "\n## contacts.parquet\n\nOne row per contact and sample.\n\n"
+        + table("column|type|unit|meaning", rows)
+        + "\n## events.json\n\nA list, in the order of detection. Missing values are null.\n\n"
+        + table("key|type|unit|meaning", events)
+        + "\nEach of `candidates`:\n\n"
+        + table("key|type|unit|meaning", candidate)
+        + "\n## Health bits\n\n"
+        + table("bit|name|meaning", health)
+        + "\n## Other files\n\n"
+        + table(
+            "file|holds",
+            [
+                ["`report.html`", "the page with pictures and curves; it needs no network"],
+                [
+                    "`postures.parquet`",
+                    "`time` [s] and joint positions [rad or m], 100 a second at most",
+                ],
+                ["`analysis.json`", "what the results were made from, for `touchline view`"],
+            ],
+        )
+    )
+
+
+def kind_of(annotation: object) -> str:
+    """A Python type in words."""
+    text = str(annotation)
+    for part, word in (
+        ("ndarray", "list of 3 numbers"),
+        ("tuple", "list"),
+        ("bool", "true or false"),
+        ("float", "number"),
+        ("int", "whole number"),
+        ("str", "text"),
+    ):
+        if part in text:
+            return word
+    return "text"
+
+
+def health_bits() -> Iterable[tuple[Health, str]]:
+    """Each bit with the comment beside it in the code."""
+    source = inspect.getsource(Health)
+    for bit in Health:
+        match = re.search(rf"^    {bit.name} = \d+  # (.*)$", source, re.MULTILINE)
+        assert match is not None, f"{bit.name} has no comment"
+        yield bit, match[1][:1].upper() + match[1][1:] + "."
+
+
+def command_line() -> str:
+    """Every command with its arguments, from its docstring and signature."""
+    parts = [
+        "# Command line\n\n"
+        + NOTE
+        + "Every command takes a ROBOT as a robot.yaml, a URDF, an MJCF, a xacro, or a "
+        "name. Exit status: 0 done, 1 failure (`check`: findings), 2 bad input. "
+        "`touchline COMMAND --help` prints the same.\n"
+    ]
+    for name, command in COMMANDS.items():
+        parts.append(_command(name, command))
+        if name == "bench":
+            parts += [_command(f"bench {n}", benchmark) for n, benchmark in BENCHMARKS.items()]
+    return "\n".join(parts)
+
+
+def _command(name: str, command) -> str:
+    text = inspect.cleandoc(command.__doc__ or "")
+    about, _, arguments = text.partition("Args:\n")
+    meanings: dict[str, str] = {}
+    word = ""
+    for line in arguments.splitlines():
+        match = re.match(r"^    (\w+): (.*)$", line)
+        if match:
+            word = match[1]
+            meanings[word] = match[2]
+        elif line.strip() and word:
+            meanings[word] += " " + line.strip()
+    rows = []
+    for key, parameter in inspect.signature(command).parameters.items():
+        positional = parameter.kind is inspect.Parameter.POSITIONAL_ONLY
+        shown = key.upper() if positional else f"--{key.replace('_', '-')}"
+        empty = parameter.default is inspect.Parameter.empty
+        default = "required" if empty else _default(parameter.default)
+        rows.append([f"`{shown}`", default, meanings.get(key, "")])
+    about = re.sub(r"^Example: (.*)$", r"    \1", about.strip(), flags=re.MULTILINE)
+    listing = "\n" + table("argument|default|meaning", rows) if rows else ""
+    return f"## touchline {name}\n\n{about}\n{listing}"
+
+
+def _default(value: object) -> str:
+    if value is None or value == ():
+        return "-"
+    if isinstance(value, tuple):
+        return " ".join(map(str, value))
+    return str(value)
+
+
+PAGES = {
+    "robot_yaml.md": robot_yaml,
+    "logs.md": logs,
+    "results.md": results,
+    "command_line.md": command_line,
+}
+
+
+def main() -> int:
+    """Write the pages, or check them."""
+    old = 0
+    for name, page in PAGES.items():
+        path, text = FOLDER / name, page()
+        if path.exists() and path.read_text() == text:
+            continue
+        old += 1
+        if "--check" in sys.argv:
+            print(f"{path} is old: python scripts/make_reference.py")
+        else:
+            FOLDER.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
+            print(f"{path}: written")
+    return 1 if old and "--check" in sys.argv else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

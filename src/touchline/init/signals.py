@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which of a recording's columns or topics are a robot's signals."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from touchline.init.contents import Contents, JointStates
+from touchline.model.description import AXES
+from touchline.model.guess import force_torque_links
+from touchline.model.mechanism import Mechanism
+
+TIME = ("time", "timestamp", "stamp", "t", "seconds", "time_s", "timestamp_s")
+NAMES = {
+    "q": ("q", "pos", "position", "positions", "joint_position", "actual_q", "q_actual"),
+    "qd": ("qd", "dq", "vel", "velocity", "velocities", "joint_velocity", "actual_qd", "qdot"),
+    # The most telling first: a robot may log measured, commanded and estimated torques.
+    "tau": (
+        *("tau_j", "torquesm", "measured_torque", "joint_torque", "tau", "torque", "torques"),
+        *("effort", "efforts", "joint_effort", "actual_current", "current", "cur"),
+    ),
+}
+AXIS = re.compile(r"^(?P<name>.*?)[._/]?(?P<axis>f[xyz]|[mt][xyz]|force_[xyz]|torque_[xyz])$", re.I)
+PERIODS = {1.0: "s", 1e-3: "ms", 1e-6: "us", 1e-9: "ns"}
+SLOWEST, FASTEST = 10.0, 20_000.0  # Hz, of recordings that are of use
+
+
+@dataclass(frozen=True)
+class FoundSensor:
+    """A force-torque sensor that the recording shows.
+
+    Attributes:
+        name: in the description.
+        link: the first link that it carries, as far as is known.
+        source: the topic, or the columns' common name.
+        columns: by axis, of a table whose names are not the contract's.
+        why: how the link was chosen.
+    """
+
+    name: str
+    link: str
+    source: str
+    why: str
+    columns: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Signals:
+    """What a description has to say about a recording.
+
+    Attributes:
+        log: the key `log`.
+        sensors: the key `force_torque_sensors`.
+        has_torque: whether there are joint torques.
+        statements: each guess in a sentence.
+    """
+
+    log: dict[str, Any]
+    sensors: tuple[FoundSensor, ...]
+    has_torque: bool
+    statements: tuple[str, ...]
+
+
+def find_signals(contents: Contents, mechanism: Mechanism, joints: Sequence[str]) -> Signals:
+    """Find the signals of some joints, and the force-torque sensors."""
+    if contents.columns:
+        return _in_table(contents.columns, mechanism, joints)
+    return _in_bag(contents, mechanism, joints)
+
+
+def _in_bag(contents: Contents, mechanism: Mechanism, joints: Sequence[str]) -> Signals:
+    statements, topics = [], {}
+    states: dict[str, JointStates] = {
+        topic: found
+        for topic, found in contents.joint_states.items()
+        if set(joints) <= set(found.joints)
+    }
+    has_torque = False
+    if states:
+        topic = max(states, key=lambda name: (states[name].effort, states[name].velocity))
+        topics["joint_states"] = topic
+        has_torque = states[topic].effort
+        filled = [n for n in ("velocity", "effort") if getattr(states[topic], n)]
+        statements.append(
+            f"joints are in {topic}, with position{''.join(f', {n}' for n in filled)}"
+        )
+    else:
+        names = {n for found in contents.joint_states.values() for n in found.joints}
+        statements.append(
+            f"no topic of joint states has all joints; those recorded: {', '.join(sorted(names))}"
+        )
+    sensors = []
+    for topic, frame in contents.wrenches.items():
+        name = _sensor_name(topic, [s.name for s in sensors])
+        link, why = _sensor_link(mechanism, joints, name, frame)
+        sensors.append(FoundSensor(name, link, topic, why))
+    if sensors:
+        topics["wrench"] = {sensor.name: sensor.source for sensor in sensors}
+    statements += [_told(sensor) for sensor in sensors]
+    log = {"topics": topics} if topics else {}
+    return Signals(log, tuple(sensors), has_torque, tuple(statements))
+
+
+def _in_table(
+    columns: dict[str, np.ndarray], mechanism: Mechanism, joints: Sequence[str]
+) -> Signals:
+    log: dict[str, Any] = {}
+    statements: list[str] = []
+    _time(columns, log, statements)
+    found = {}
+    for signal in ("q", "qd", "tau"):
+        if all(f"{signal}.{joint}" in columns for joint in joints):
+            found[signal] = signal + ".{joint}"
+            continue
+        pattern = _pattern(columns, NAMES[signal], joints)
+        if pattern is not None:
+            found[signal] = log[signal] = pattern
+            statements.append(f"{signal} is in the columns {pattern}")
+        elif signal != "qd":
+            statements.append(f"no columns were recognized as {signal}")
+    if "qd" not in found:
+        statements.append("velocities are not in the recording; they are estimated from positions")
+    sensors = _sensor_columns(columns, mechanism, joints)
+    named = {s.name: s.columns for s in sensors if s.columns}
+    if named:
+        log["sensors"] = named
+    statements += [_told(sensor) for sensor in sensors]
+    return Signals(log, tuple(sensors), "tau" in found, tuple(statements))
+
+
+def _time(columns: dict[str, np.ndarray], log: dict[str, Any], statements: list[str]) -> None:
+    names = [name for name in columns if name.lower() in TIME]
+    if not names:
+        statements.append("no column was recognized as the time")
+        return
+    name = names[0]
+    steps = np.diff(columns[name])
+    steps = steps[np.isfinite(steps) & (steps > 0)]
+    period = float(np.median(steps)) if len(steps) else 1e-3
+    fitting = [f for f in PERIODS if SLOWEST <= 1.0 / (f * period) <= FASTEST]
+    factor = 1.0 if not fitting else fitting[0]
+    if factor != 1.0:
+        log["time"] = {"column": name, "factor": factor}
+        rate = 1.0 / (factor * period)
+        statements.append(f"the time is in {name}, in {PERIODS[factor]}: samples at {rate:.4g} Hz")
+    elif name != "time":
+        log["time"] = name
+        statements.append(f"the time is in {name}, in s")
+
+
+def _pattern(
+    columns: dict[str, np.ndarray], names: Sequence[str], joints: Sequence[str]
+) -> str | None:
+    """Return the pattern of columns that stand for all joints: by their names, or numbered."""
+    for name in names:
+        for column in columns:
+            stem, joint, rest = _around(column, joints[0])
+            if joint and _word(stem + rest) == name:
+                pattern = f"{stem}{{joint}}{rest}"
+                if all(pattern.replace("{joint}", j) in columns for j in joints):
+                    return pattern
+        for column in columns:
+            match = re.fullmatch(r"(.*?)[01]\]?", column)
+            if match is None or _word(match[1]) != name:
+                continue
+            end = "]" if column.endswith("]") else ""
+            for placeholder, first in (("{i}", 0), ("{i1}", 1)):
+                numbered = [f"{match[1]}{i + first}{end}" for i in range(len(joints))]
+                beyond = f"{match[1]}{len(joints) + first}{end}"
+                if set(numbered) <= set(columns) and beyond not in columns:
+                    return match[1] + placeholder + end
+    return None
+
+
+def _around(column: str, joint: str) -> tuple[str, str, str]:
+    return column.partition(joint)
+
+
+def _word(text: str) -> str:
+    return text.strip("._/[ ").lower()
+
+
+def _sensor_columns(
+    columns: dict[str, np.ndarray], mechanism: Mechanism, joints: Sequence[str]
+) -> list[FoundSensor]:
+    by_name: dict[str, dict[str, str]] = {}
+    for column in columns:
+        match = AXIS.match(column)
+        if match is not None and not column.startswith("truth."):
+            axis = match["axis"].lower().replace("force_", "f").replace("torque_", "m")
+            by_name.setdefault(match["name"], {})[axis.replace("t", "m")] = column
+    sensors: list[FoundSensor] = []
+    for source, axes in by_name.items():
+        if set(axes) != set(AXES):
+            continue
+        name = _sensor_name(source, [s.name for s in sensors])
+        link, why = _sensor_link(mechanism, joints, name, "")
+        plain = all(axes[axis] == f"{name}.{axis}" for axis in AXES)
+        sensors.append(FoundSensor(name, link, source, why, {} if plain else axes))
+    return sensors
+
+
+def _sensor_name(source: str, taken: Sequence[str]) -> str:
+    """Return a name that tells the sensor from others: of the parts of its topic or columns."""
+    dull = {"wrench", "ft", "sensor", "broadcaster", "data", "raw", "force", "torque", ""}
+    parts = [part for part in re.split(r"[/._\W]+", source) if part.lower() not in dull]
+    name = "_".join(parts) or "ft"
+    return name if name not in taken else f"{name}_{len(taken) + 1}"
+
+
+def _sensor_link(
+    mechanism: Mechanism, joints: Sequence[str], name: str, frame: str
+) -> tuple[str, str]:
+    """Return the first link that a sensor carries, and why it is taken for that."""
+    if frame in mechanism.links:
+        return frame, f"its messages are in the frame {frame}"
+    named = [link for link in mechanism.links if name in link or link in name]
+    if named:
+        return named[0], "the link has its name"
+    if "base" in name:
+        return _first_with_mass(mechanism), "it is called a base sensor"
+    links = force_torque_links(mechanism)
+    if links:
+        return links[0], "the model has a link that is named like a force-torque sensor"
+    outermost = mechanism.joints[joints[-1]].child if joints else mechanism.root
+    return outermost, "the model does not tell, so the link of the last joint is taken"
+
+
+def _first_with_mass(mechanism: Mechanism) -> str:
+    massive = (link.name for link in mechanism.links.values() if link.inertia.mass > 0)
+    return next(massive, mechanism.root)
+
+
+def _told(sensor: FoundSensor) -> str:
+    return f"sensor {sensor.name} ({sensor.source}) carries {sensor.link}: {sensor.why}"

@@ -1,0 +1,170 @@
+"""README and documentation: short, true, whole, and in plain English."""
+
+import contextlib
+import importlib.util
+import io
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from prose import REPOSITORY, code, long_sentences
+
+from touchline.cli import main
+from touchline.cli.bench import BENCHMARKS
+from touchline.cli.main import COMMANDS
+from touchline.health import Health
+from touchline.logs.naming import LOG_KEYS
+from touchline.model.meanings import MEANINGS, accepted_keys
+from touchline.report.outputs import CONTACT_SCHEMA
+from touchline.result.contact import Candidate
+from touchline.result.native import EVENT
+
+README = REPOSITORY / "README.md"
+SCRIPT = REPOSITORY / "scripts" / "make_reference.py"
+SARA = REPOSITORY / "src" / "touchline" / "robots" / "sara"
+NAMES = (
+    "index tutorial concepts routes glossary benchmarks contributing detection reaction experiments"
+)
+PLAIN = [README, *(REPOSITORY / "docs" / f"{name}.md" for name in NAMES.split())]
+PLAIN += sorted((REPOSITORY / "docs" / "howto").glob("*.md"))
+NUMBER = re.compile(r"[-+]?\d+\.\d+")
+
+
+def ids(page: Path) -> str:
+    return str(page.relative_to(REPOSITORY))
+
+
+def test_the_readme_is_short():
+    assert len(README.read_text().splitlines()) <= 120
+
+
+@pytest.mark.parametrize("page", PLAIN, ids=ids)
+def test_no_sentence_is_longer_than_thirty_five_words(page):
+    assert long_sentences(page.read_text()) == []
+
+
+@pytest.mark.parametrize("page", PLAIN, ids=ids)
+def test_links_and_pictures_are_there(page):
+    text = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
+    for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", text):
+        if not target.startswith("http"):
+            assert (page.parent / target).exists(), target
+
+
+@pytest.mark.parametrize("page", [README, REPOSITORY / "docs" / "tutorial.md"], ids=ids)
+def test_python_examples_print_what_stands_below_them(page):
+    """A block of text that follows a block of Python is what it prints."""
+    blocks = re.findall(r"^```(python|text)\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE)
+    compared = 0
+    for i, (language, source) in enumerate(blocks):
+        if language != "python":
+            continue
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed):
+            exec(compile(source, str(page), "exec"), {})
+        if i + 1 < len(blocks) and blocks[i + 1][0] == "text":
+            told, done = blocks[i + 1][1], printed.getvalue()
+            assert NUMBER.sub("#", done) == NUMBER.sub("#", told)
+            numbers = [[float(x) for x in NUMBER.findall(text)] for text in (done, told)]
+            assert numbers[0] == pytest.approx(numbers[1], rel=0.02, abs=0.003)
+            compared += 1
+    assert compared
+
+
+def test_python_examples_of_other_pages_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for page in PLAIN:
+        if page == README or page.name == "tutorial.md":
+            continue
+        for source in code(page.read_text(), "python"):
+            exec(compile(source, str(page), "exec"), {})
+
+
+def test_the_steps_of_the_tutorial(tmp_path, monkeypatch, capsys):
+    """Every command, in the page's order, in a folder with the model and the page's YAML."""
+    text = (REPOSITORY / "docs" / "tutorial.md").read_text()
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(SARA / "sara.urdf", tmp_path)
+    shutil.copytree(SARA / "meshes", tmp_path / "meshes")
+    (block,) = code(text, "yaml")
+    (tmp_path / "my-arm.yaml").write_text(block)
+    commands = [line for block in code(text, "sh") for line in block.splitlines()]
+    assert len(commands) >= 7
+    for line in commands:
+        program, *arguments = shlex.split(line)
+        assert program == "touchline"
+        assert main(arguments) in ((0, 1) if arguments[0] == "check" else (0,)), line
+    assert (tmp_path / "results" / "report.html").exists()
+    assert "what can be felt" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("page", [REPOSITORY / "docs" / "howto" / "live.md"], ids=ids)
+def test_commands_of_how_to_pages(page, capsys):
+    for block in code(page.read_text(), "sh"):
+        for line in block.splitlines():
+            assert main(shlex.split(line)[1:]) == 0
+
+
+def written(page: str) -> str:
+    """A page of the reference as scripts/make_reference.py writes it from the code."""
+    spec = importlib.util.spec_from_file_location("reference", SCRIPT)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.PAGES[page]()
+
+
+def rows(page: str) -> dict[str, list[str]]:
+    """Rows of the tables of a page by the name in their first cell."""
+    found = {}
+    for line in written(page).splitlines():
+        if line.startswith("| `"):
+            cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
+            found[cells[0].strip("`")] = cells[1:]
+    return found
+
+
+def test_every_key_of_a_description_is_explained():
+    keys = {key.place: key for key in accepted_keys()}
+    places = {*keys, *(f"log.{name}" for name in LOG_KEYS)}
+    assert places <= set(MEANINGS), "touchline/model/meanings.py explains every key"
+    told = rows("robot_yaml.md")
+    assert places <= set(told)
+    for kind, _, default, meaning in told.values():
+        assert kind and default and meaning.endswith(".")
+
+
+def test_every_column_of_the_results_is_explained():
+    told = rows("results.md")
+    names = {*CONTACT_SCHEMA, *(field.name for field in EVENT), *Candidate.__dataclass_fields__}
+    assert names <= set(told)
+    text = written("results.md")
+    assert all(f"`{(bit.name or '').lower()}`" in text for bit in Health)
+    for name in names:
+        kind, _, meaning = told[name]
+        assert kind and meaning.endswith(".")
+
+
+def test_every_command_and_option_is_explained():
+    text = written("command_line.md")
+    for name in [*COMMANDS, *(f"bench {name}" for name in BENCHMARKS)]:
+        assert f"## touchline {name}\n" in text
+    empty = re.findall(r"^\| `(.*)` \| .* \|  \|$", text, re.MULTILINE)
+    assert empty == [], "arguments without a meaning"
+
+
+def test_the_site_is_built_without_a_warning_and_loads_nothing_from_elsewhere(tmp_path):
+    pytest.importorskip("material", reason="pip install --group docs")
+    pytest.importorskip("mkdocstrings", reason="pip install --group docs")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-q", "-d", str(tmp_path)]
+    done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    page = (tmp_path / "reference" / "python.html").read_text()
+    assert "body_probability" in page and "load_robot" in page
+    for file in tmp_path.rglob("*.html"):
+        loaded = re.findall(r'<(?:script|img|iframe)[^>]* src="(http[^"]*)"', file.read_text())
+        assert loaded == []

@@ -1,0 +1,240 @@
+"""`touchline init`: descriptions of real robots and recordings without a line by hand."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import touchline as tl
+from touchline.cli import main
+from touchline.init.contents import Contents
+from touchline.init.signals import find_signals
+from touchline.logs import open_log
+from touchline.model.guess import UNKNOWN, cautions, family_of, guess_description
+from touchline.model.loading import load_mechanism
+from touchline.model.sources import example_models, find_robot
+
+DATA = Path(os.environ.get("TOUCHLINE_DATA", Path(__file__).parents[3] / "shared" / "data"))
+URDF = """<robot name="arm"><link name="base"/>
+{links}
+</robot>"""
+LINK = """<link name="{name}"><inertial><mass value="1"/><inertia ixx=".01" iyy=".01" izz=".01"
+ixy="0" ixz="0" iyz="0"/></inertial><collision><geometry><box size=".1 .1 .3"/></geometry>
+</collision></link><joint name="{joint}" type="{kind}"><parent link="{parent}"/>
+<child link="{name}"/><origin xyz="0 0 .3"/><axis xyz="{axis}"/>
+<limit lower="-2" upper="2" effort="50" velocity="2"/></joint>"""
+
+
+def arm(folder, *joints, name="arm"):
+    """A chain of joints (name, child, kind)."""
+    parent, parts = "base", []
+    for i, (joint, child, kind) in enumerate(joints):
+        axis = ("0 0 1", "0 1 0")[i % 2]
+        parts.append(LINK.format(name=child, joint=joint, kind=kind, parent=parent, axis=axis))
+        parent = child
+    path = folder / f"{name}.urdf"
+    path.write_text(URDF.replace('"arm"', f'"{name}"').format(links="\n".join(parts)))
+    return path
+
+
+def chain(folder, n=6, **options):
+    return arm(folder, *((f"j{i + 1}", f"l{i + 1}", "revolute") for i in range(n)), **options)
+
+
+def real(name):
+    path = DATA / name
+    if not path.exists():
+        pytest.skip(f"no recordings at {DATA}: set TOUCHLINE_DATA")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("name", "torque", "locked"),
+    [
+        ("panda", "sensor", ["panda_finger_joint1"]),
+        ("ur5", "motor", []),
+        ("ur10_robot", "motor", []),
+        ("xarm7", "motor", []),
+        ("so100", "none", ["gripper"]),
+        ("talos_left_arm", "sensor", ["gripper_left_joint"]),
+        ("z1", "motor", ["jointGripper"]),
+    ],
+)
+def test_robots_by_name(name, torque, locked):
+    pytest.importorskip("pinocchio", reason="comes with example-robot-data, the arms' models")
+    robot = tl.load_robot(name)
+    assert {joint.torque for joint in robot.description.joints} == {torque}
+    assert sorted(robot.description.locked) == locked
+    assert robot.assumed[0].startswith(f"joint torques are `torque: {torque}`")
+
+
+def test_every_model_of_the_collection_is_read_or_told_what_is_wrong():
+    pytest.importorskip("pinocchio", reason="comes with example-robot-data, the arms' models")
+    names = example_models()
+    assert len(names) > 50
+    read = 0
+    for name in names:
+        try:
+            read += bool(tl.load_robot(name).assumed)
+        except tl.InputError as error:
+            assert str(names[name]) in str(error)
+    assert read > len(names) - 6
+
+
+def test_an_unknown_name_is_answered_with_those_there_are():
+    with pytest.raises(tl.InputError, match="did you mean 'sara'"):
+        find_robot("sarah")
+    with pytest.raises(tl.InputError, match="is a folder"):
+        find_robot(Path(__file__).parent)
+
+
+def test_names_of_families():
+    assert family_of(["ur5e"], []).torque == "motor"
+    assert family_of(["xarm7_nohand"], []).torque == "motor"
+    assert family_of(["so_arm100"], []).torque == "none"
+    assert family_of(["lbr_iiwa14"], []).torque == "sensor"
+    assert family_of(["fourlegs", "curfew"], []) is UNKNOWN
+
+
+def test_wheels_fingers_legs_and_coupled_joints(tmp_path):
+    joints = [
+        ("front_wheel_joint", "wheel", "continuous"),
+        ("shoulder", "upper", "revolute"),
+        ("gripper_joint", "gripper", "revolute"),
+        ("slide", "pad", "prismatic"),
+    ]
+    guess = guess_description(load_mechanism(arm(tmp_path, *joints)), tmp_path / "arm.urdf")
+    assert guess.observed == ("shoulder",)
+    assert set(guess.locked) == {"front_wheel_joint", "gripper_joint", "slide"}
+    assert "wheels" in guess.cautions[0]
+    legs = arm(tmp_path, ("hip", "thigh", "revolute"), ("knee", "shank", "revolute"), name="leg")
+    (line,) = cautions(load_mechanism(legs))
+    assert "legs" in line and "root link is taken to stand still" in line
+    hand = arm(tmp_path, ("finger1", "f1", "revolute"), ("finger2", "f2", "revolute"), name="h")
+    assert not guess_description(load_mechanism(hand), hand).locked  # a hand alone is its fingers
+
+
+def table(joints, q="q.{}", qd="qd.{}", tau="tau.{}", time="time", step=1e-3, extra=()):
+    columns = {time: step * np.arange(50)}
+    for pattern in (q, qd, tau):
+        for i, joint in enumerate(joints):
+            if pattern:
+                columns[pattern.format(joint, i=i, i1=i + 1)] = np.zeros(50)
+    return Contents(columns | {name: np.zeros(50) for name in extra})
+
+
+@pytest.mark.parametrize(
+    ("options", "log"),
+    [
+        ({}, {}),
+        ({"time": "Time", "step": 1.0}, {"time": {"column": "Time", "factor": 1e-3}}),
+        ({"time": "timestamp", "step": 1e6}, {"time": {"column": "timestamp", "factor": 1e-9}}),
+        ({"time": "t"}, {"time": "t"}),
+        ({"tau": "tau_J{i}"}, {"tau": "tau_J{i}"}),
+        ({"q": "Position{i1}"}, {"q": "Position{i1}"}),
+        ({"q": "actual_q_{i}", "qd": "dq[{i}]"}, {"q": "actual_q_{i}", "qd": "dq[{i}]"}),
+        ({"tau": "{}.effort"}, {"tau": "{joint}.effort"}),
+        ({"qd": ""}, {}),
+    ],
+    ids=str,
+)
+def test_columns_of_tables(tmp_path, options, log):
+    mechanism = load_mechanism(chain(tmp_path))
+    joints = [f"j{i + 1}" for i in range(6)]
+    found = find_signals(table(joints, **options), mechanism, joints)
+    assert found.log == log and found.has_torque
+
+
+def test_sensors_of_tables(tmp_path):
+    mechanism = load_mechanism(chain(tmp_path))
+    joints = [f"j{i + 1}" for i in range(6)]
+    extra = [f"wrist_ft/{kind}{axis}" for kind in "ft" for axis in "xyz"]
+    extra += [f"l2.{axis}" for axis in ("fx", "fy", "fz", "mx", "my", "mz")]
+    extra += [f"lame.{axis}" for axis in ("fx", "fy")]
+    found = find_signals(table(joints, extra=extra), mechanism, joints)
+    assert [(s.name, s.link) for s in found.sensors] == [("wrist", "l6"), ("l2", "l2")]
+    assert found.log["sensors"] == {
+        "wrist": {"fx": "wrist_ft/fx", "fy": "wrist_ft/fy", "fz": "wrist_ft/fz"}
+        | {"mx": "wrist_ft/tx", "my": "wrist_ft/ty", "mz": "wrist_ft/tz"}
+    }
+
+
+@pytest.mark.parametrize(
+    ("model", "log", "torque"),
+    [
+        ("panda", "panda_touches/a4.csv.gz", "sensor"),
+        ("kinova_gen3/kinovaGen3V12.urdf", "kinova_gen3/opti_traj_testing1.csv", "sensor"),
+        ("ur10", "panda_ur10_rosbag2/ur10_exciting_trajectory.db3", "motor"),
+        ("kuka_lwr4/kuka_lwr4.urdf", "kuka_lwr4/free_motion_1.csv.gz", "sensor"),
+    ],
+)
+def test_real_recordings_are_read_with_the_description_that_init_writes(
+    tmp_path, model, log, torque, capsys
+):
+    pytest.importorskip("pinocchio", reason="comes with example-robot-data, the arms' models")
+    log, out = real(log), tmp_path / "robot.yaml"
+    model = str(DATA / model) if (DATA / model).exists() else model
+    assert main(["init", model, str(log), "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert f"joint torques are `torque: {torque}`" in said
+    robot = tl.load_robot(out)
+    with open_log(log, robot.description) as recording:
+        samples = next(recording.chunks(1000))
+    assert np.isfinite(samples.q).all() and np.isfinite(samples.tau).any()
+    assert tl.Pipeline(robot).update(
+        samples.time[0], samples.q[0], samples.qd[0], samples.tau[0], samples.wrench[0]
+    )
+
+
+def test_a_file_that_is_there_is_kept(tmp_path, capsys):
+    model, out = chain(tmp_path), tmp_path / "robot.yaml"
+    out.write_text("mine")
+    assert main(["init", str(model), "--out", str(out)]) == 2
+    assert "--overwrite" in capsys.readouterr().err and out.read_text() == "mine"
+    assert main(["init", str(model), "--out", str(out), "--overwrite"]) == 0
+    assert tl.load_robot(out).name == "arm"
+    assert not list(tmp_path.glob(".*"))
+
+
+@pytest.mark.parametrize("log", ["none.csv", "log.txt", "empty.csv", "broken.parquet"])
+def test_a_recording_that_cannot_be_read_is_one_line(tmp_path, capsys, log):
+    model, path = chain(tmp_path), tmp_path / log
+    if log != "none.csv":
+        path.write_text("" if log == "empty.csv" else "x")
+    assert main(["init", str(model), str(path), "--out", str(tmp_path / "r.yaml")]) == 2
+    assert str(path) in capsys.readouterr().err
+    assert not (tmp_path / "r.yaml").exists()
+
+
+def test_a_xacro_is_expanded(tmp_path):
+    pytest.importorskip("xacro")
+    text = chain(tmp_path, 2).read_text()
+    path = tmp_path / "arm.xacro"
+    macro = '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+    macro += '<xacro:property name="half" value="0.15"/>'
+    text = text.replace('<robot name="arm">', macro).replace("0 0 .3", "0 0 ${2*half}")
+    path.write_text(text)
+    robot = tl.load_robot(path)
+    assert robot.mechanism.joints["j1"].T_parent_joint[2, 3] == pytest.approx(0.3)
+    path.write_text(text.replace("${2*half}", "${nothing}"))
+    with pytest.raises(tl.InputError, match="xacro cannot expand it"):
+        tl.load_robot(path)
+
+
+def test_names_of_robot_descriptions_come_from_its_cache_alone(tmp_path, monkeypatch):
+    pytest.importorskip("robot_descriptions")
+    monkeypatch.setenv("ROBOT_DESCRIPTIONS_CACHE", str(tmp_path))
+    with pytest.raises(tl.InputError, match="is not there; fetch it once"):
+        tl.load_robot("ur5e_mj")
+    folder = tmp_path / "mujoco_menagerie" / "universal_robots_ur5e"
+    folder.mkdir(parents=True)
+    (folder / "ur5e.xml").write_text(
+        """<mujoco model="ur5e"><worldbody><body name="link"><joint name="elbow" axis="0 1 0"/>
+        <geom size=".1" mass="1"/></body></worldbody></mujoco>"""
+    )
+    robot = tl.load_robot("ur5e_mj")
+    assert robot.description.joints[0].torque == "motor"
+    assert repr(robot) == (
+        "<Robot ur5e: 1 joints, 1 with torques; force-torque sensors: none; segments: root>"
+    )
