@@ -54,7 +54,7 @@ def beside(robot, domain, options, command):
                 timeout=50,
             )
         finally:
-            arm.terminate()
+            arm.kill()
     return done.returncode, done.stdout, done.stderr
 
 
