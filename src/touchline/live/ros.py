@@ -33,6 +33,7 @@ WRENCH_REACH = 3.0  # periods of a wrench's topic after which its last value is 
 LONGEST_REACH = 0.1  # s of the same
 AHEAD = 4096  # wrenches that wait for their joint state
 INCOMPLETE = 20  # joint states without a joint, before the first whole one: it is not there
+FELT = "/external_joint_torques"  # what Touchline's node publishes, as joint states too
 CLOCK = 1.0  # s by which two topics' stamps may differ on one clock
 
 
@@ -95,7 +96,7 @@ class RosTopics:
                 name: kinds[0] for name, kinds in self._node.get_topic_names_and_types() if kinds
             }
             useful = {n: k for n, k in known.items() if k in (JOINT_STATE, WRENCH_STAMPED)}
-            published = {n: k for n, k in useful.items() if self._node.count_publishers(n)}
+            published = {n: k for n, k in useful.items() if self._others(n, known)}
             try:
                 return choose_topics(published, self._robot.description, self._naming, self.name)
             except InputError as error:
@@ -108,6 +109,16 @@ class RosTopics:
                         ) from None
                     raise InputError("; ".join(error.problems[:-1])) from None
             time.sleep(SETTLE)
+
+    def _others(self, topic: str, known: dict[str, str]) -> bool:
+        """Whether somebody publishes a topic who is no node of Touchline."""
+
+        def publishers(name: str) -> set[tuple[str, str]]:
+            found = self._node.get_publishers_info_by_topic(name)
+            return {(info.node_namespace, info.node_name) for info in found}
+
+        felt = [name for name in known if name.endswith(FELT)]
+        return bool(publishers(topic).difference(*(publishers(name) for name in felt)))
 
     def _qos_warnings(self, topic: str) -> list[str]:
         best_effort = self._ros.qos.ReliabilityPolicy.BEST_EFFORT
