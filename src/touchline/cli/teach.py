@@ -32,10 +32,10 @@ def teach(
         kind: A button, or a toggle that each touch turns on or off.
         touches: Only the first so many touches of the recording count.
     """
-    from touchline.model.robot_file import write_description
     from touchline.errors import InputError
     from touchline.logs import read_log
     from touchline.model.robot import load_robot
+    from touchline.model.robot_file import write_description
     from touchline.touch.teach import as_yaml
     from touchline.touch.teach import teach as learn
 

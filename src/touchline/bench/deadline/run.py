@@ -93,7 +93,8 @@ def lines(arms: tuple[str, ...], updates: int, seed: int = 0) -> Iterator[Line]:
         seed: of all that is random.
     """
     kinds: list[tuple[int, Begin]] = [(0, "apart"), (1, "apart")]
-    kinds += [(n, begin) for n in (2, 3, 4) for begin in ("apart", "together")]
+    for several in (2, 3, 4):
+        kinds += [(several, "apart"), (several, "together")]
     for arm in arms:
         for contacts, begin in kinds:
             yield _line(Cell(arm, contacts, TIER, begin=begin), updates, seed)
