@@ -102,13 +102,6 @@ def test_the_steps_of_the_tutorial(tmp_path, monkeypatch, capsys):
     assert "what can be felt" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("page", [REPOSITORY / "docs" / "howto" / "live.md"], ids=ids)
-def test_commands_of_how_to_pages(page, capsys):
-    for block in code(page.read_text(), "sh"):
-        for line in block.splitlines():
-            assert main(shlex.split(line)[1:]) == 0
-
-
 def written(page: str) -> str:
     """A page of the reference as scripts/make_reference.py writes it from the code."""
     spec = importlib.util.spec_from_file_location("reference", SCRIPT)
