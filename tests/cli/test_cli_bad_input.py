@@ -370,7 +370,7 @@ def test_a_benchmark_is_told_what_it_cannot_do(arguments, message, capsys):
 @pytest.mark.parametrize("name", ["log.csv", "log.parquet"])
 def test_a_folder_that_is_called_like_a_table(capsys, tmp_path, name):
     (tmp_path / name).mkdir()
-    assert "holds no rosbag2" in refused(capsys, tmp_path / name, tmp_path / "r")
+    assert "no recordings there" in refused(capsys, tmp_path / name, tmp_path / "r")
 
 
 def test_a_name_that_no_file_can_have(capsys, log, tmp_path):

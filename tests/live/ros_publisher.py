@@ -10,8 +10,8 @@ import sys
 import time
 
 import rclpy
-from arms import pushed
 from geometry_msgs.msg import WrenchStamped
+from live_arms import pushed
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 

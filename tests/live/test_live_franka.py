@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from arms import make_arm
+from live_arms import make_arm
 
 from touchline.errors import InputError
 from touchline.live.adapters import from_franka

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arms import write_arm
+from live_arms import write_arm
 from live_support import assert_same, watch
 
 from touchline.errors import InputError

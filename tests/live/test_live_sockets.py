@@ -7,8 +7,8 @@ import time
 from pathlib import Path
 
 import pytest
-from arms import make_arm, pushed
 from fake_rtde import FakeController
+from live_arms import make_arm, pushed
 from sockets import LOOPBACK, listening
 from test_live_ros import environment, needs_ros
 

@@ -10,8 +10,8 @@ import time
 
 import numpy as np
 import pytest
-from arms import make_arm, pushed
 from fake_rtde import FakeController
+from live_arms import make_arm, pushed
 from live_support import assert_same, watch
 
 from touchline.cli.main import main

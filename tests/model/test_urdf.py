@@ -255,7 +255,10 @@ def test_file_problems(tmp_path):
         ("<robot><link></robot>", r"robot\.urdf:1:\d+: not well-formed XML: mismatched tag"),
         ("", r"robot\.urdf:1:1: not well-formed XML: no element found"),
         ("<sdf/>", r"robot\.urdf: the root element is <sdf>; a URDF has <robot>, an MJCF <mujoco>"),
-        ('<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arm/></robot>', "run xacro"),
+        (
+            '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arm/></robot>',
+            r"name the file \.xacro",
+        ),  # ,
     ):
         path.write_text(text)
         with pytest.raises(InputError, match=problem):

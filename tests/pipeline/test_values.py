@@ -68,7 +68,7 @@ def test_a_value_tells_what_it_says(said):
     assert "level='contact'" in repr(contact) and "position=[" in repr(contact)
     assert "None" not in repr(contact)
     assert repr(event).startswith("Event(id=0, segment='")
-    assert "Result(estimate=" in repr(said[0][0])
+    assert repr(said[0][0]).startswith("Result(time=") and "estimate=Estimate(" in repr(said[0][0])
 
 
 def test_words_are_of_a_fixed_choice(said):

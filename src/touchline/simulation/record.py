@@ -54,7 +54,7 @@ def simulate_to_log(
     unknown = [name for name in options if name not in known]
     if unknown:
         raise InputError(
-            f"scenario {scenario} has no option --{name}; it has: "
+            f"scenario {scenario} has no option --{name}{did_you_mean(name, known)}; it has: "
             + (", ".join(f"--{option}" for option in known) or "none")
             for name in unknown
         )
