@@ -92,10 +92,16 @@ def lines(arms: tuple[str, ...], updates: int, seed: int = 0) -> Iterator[Line]:
         updates: of each line, at least.
         seed: of all that is random.
     """
-    begins: tuple[Begin, ...] = ("apart", "together")
-    kinds = [(0, begins[0]), (1, begins[0])]
-    for several in (2, 3, 4):
-        kinds += [(several, begin) for begin in begins]
+    kinds: list[tuple[int, Begin]] = [
+        (0, "apart"),
+        (1, "apart"),
+        (2, "apart"),
+        (2, "together"),
+        (3, "apart"),
+        (3, "together"),
+        (4, "apart"),
+        (4, "together"),
+    ]
     for arm in arms:
         for contacts, begin in kinds:
             yield _line(Cell(arm, contacts, TIER, begin=begin), updates, seed)
