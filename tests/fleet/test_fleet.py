@@ -193,6 +193,11 @@ def test_limits_of_time_and_memory(made, tmp_path):
     assert row["status"] == "failed" and "took longer than 0.01 s" in row["reason"]
 
 
+def _may_be_interrupted():
+    """Also where the tests run in the background of a shell, which ignores ^C there."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def test_a_killed_run_goes_on_where_it_was(made, tmp_path):
     logs, out = tmp_path / "logs", tmp_path / "out"
     logs.mkdir()
@@ -203,7 +208,11 @@ def test_a_killed_run_goes_on_where_it_was(made, tmp_path):
     environment = os.environ | {"PYTHONPATH": str(Path(tl.__file__).parents[1])}
     for stop in (signal.SIGKILL, signal.SIGINT):
         process = subprocess.Popen(
-            command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            command,
+            env=environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            preexec_fn=_may_be_interrupted,  # noqa: PLW1509
         )
         before = len(Manifest(out).rows)
         deadline = time.monotonic() + 120

@@ -101,7 +101,7 @@ def test_ctrl_c_leaves_a_whole_recording(suffix, tmp_path, sara):
     for line in process.stdout:
         if line.startswith("live"):
             break
-    time.sleep(1.0)
+    time.sleep(4.0)  # so long that a busy machine has simulated a second
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=30)
     assert process.returncode == 0 and err == ""
