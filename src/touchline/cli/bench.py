@@ -264,7 +264,9 @@ def interface(
         data: Folder with recordings of a Panda that is touched, one spot a file.
     """
     from touchline.bench.interface.run import Plan, main
+    from touchline.numbers import check_least
 
+    check_least(1, runs=runs)
     main(Plan(runs, seed, digits, data))
     return 0
 

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Strokes: the way of a finger over a pad, as felt through the arm."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,7 +11,7 @@ Array = NDArray[np.float64]
 
 SMOOTHING = 0.02  # s, 1 sigma; what a hand writes in 2 s has nothing quicker than some 0.1 s
 FIRM = 0.5  # of the median force; a finger that is only just landing or lifting writes nothing
-STEP = 5e-4  # m between points of a cleaned stroke: an eighth of what the places are good for
+STEP = 5e-4  # m; a point nearer to the smoothed way is never a stray: places are no sharper
 FAR = 4.0  # robust standard deviations from the smoothed way; beyond it a point is a stray
 
 
@@ -115,10 +114,3 @@ def resampled(way: ArrayLike, count: int) -> Array:
         return np.repeat(way[:1], count, axis=0)
     wanted = np.linspace(0.0, at[-1], count)
     return np.column_stack([np.interp(wanted, at, way[:, i]) for i in range(way.shape[1])])
-
-
-def joined(strokes: Sequence[Stroke]) -> Stroke:
-    """Strokes of one sign, such as those of a cross, one after the other."""
-    first = strokes[0]
-    points = np.vstack([stroke.points for stroke in strokes])
-    return Stroke(first.widget, first.link, points, np.concatenate([s.force for s in strokes]))

@@ -2,7 +2,7 @@
 """Widgets: named areas on a link's surface, and what a touch of them says."""
 
 from dataclasses import dataclass
-from math import erf, sqrt
+from math import erf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,13 +100,6 @@ class Widget:
         low, high = self.given.range
         return low + value * (high - low)
 
-    @property
-    def middle(self) -> Array | None:
-        """A point (3,) [m] in the link's frame that stands for the widget; None: the whole link."""
-        if self.kind == "slider":
-            return self.point_at(0.5)
-        return None if self.given.at is None else np.array(self.given.at)
-
     def point_at(self, value: float) -> Array:
         """The point (3,) [m] of a slider at a part of its way, 0 to 1."""
         way = value * self.length
@@ -118,16 +111,6 @@ class Widget:
         """Unit vectors u, v, n (3,) of a pad or dial in the link's frame, n outward."""
         u, v, n = self._axes
         return u, v, n
-
-    @property
-    def smallest(self) -> float:
-        """Half of the smallest extent of the widget [m]: what has to be resolved there."""
-        given = self.given
-        if self.kind == "slider":
-            return given.width / 2
-        if self.kind == "pad":
-            return min(given.size or (np.inf,)) / 2
-        return given.radius if given.radius is not None else np.inf
 
 
 def _axes(name: str, given: WidgetDescription, normal: Array | None) -> Array:
@@ -144,10 +127,3 @@ def _axes(name: str, given: WidgetDescription, normal: Array | None) -> Array:
         raise InputError(f"interface.{name}.up: {given.up} stands on the surface, not along it")
     v /= np.linalg.norm(v)
     return np.array([np.cross(v, n), v, n])
-
-
-def gap(std: float, probability: float = 0.95) -> float:
-    """How far inside its rim [m] a touch must lie to be on a widget with this probability."""
-    from statistics import NormalDist
-
-    return std / sqrt(2.0) * NormalDist().inv_cdf(probability)
