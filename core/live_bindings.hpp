@@ -41,8 +41,8 @@ class Runner {
  public:
   Runner(pipelines::Pipeline& pipeline, std::size_t slots)
       : pipeline_(pipeline),
-        joints_(pipeline.value.robot().joints.size()),
-        sensors_(pipeline.value.robot().sensors.size()),
+        joints_(pipeline.value->robot().joints.size()),
+        sensors_(pipeline.value->robot().sensors.size()),
         results_(slots, std::vector<double>()),
         runner_(joints_, sensors_, slots, [this](const tl::Arrived& a) { take(a); }) {}
 
@@ -81,14 +81,14 @@ class Runner {
   void take(const tl::Arrived& arrived) {
     const std::lock_guard<std::mutex> turn(pipeline_.turn);  // no interpreter is held here
     const tl::Sample sample = arrived.sample(joints_);
-    const tl::Result result = pipeline_.value.update(sample);
+    const tl::Result result = pipeline_.value->update(sample);
     pipelines::keep_ended(pipeline_, result);
     std::vector<double>* out = results_.vacant();
     if (out == nullptr) {
       unseen_.fetch_add(1);
       return;
     }
-    pipelines::take_snapshot(pipeline_.value, sample, result, snapshot_);
+    pipelines::take_snapshot(pipeline_, sample, result, snapshot_);
     out->clear();
     out->push_back(arrived.arrival);
     out->push_back(static_cast<double>(arrived.sequence));

@@ -7,6 +7,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -28,12 +29,13 @@ using namespace nb::literals;
 // The pipeline, and what a user of Python may ask for later: the events that have ended.
 struct Pipeline {
   Pipeline(tl::Robot robot, const tl::Tuning& tuning)
-      : value(std::move(robot), tuning),
-        unmeasured(value.robot().joints.size() + 6 * value.robot().sensors.size(), tl::kUnknown) {}
+      : value(std::make_unique<tl::Pipeline>(std::move(robot), tuning)),
+        unmeasured(value->robot().joints.size() + 6 * value->robot().sensors.size(), tl::kUnknown) {}
 
-  tl::Pipeline value;
+  std::unique_ptr<tl::Pipeline> value;
   std::mutex turn;
   std::vector<double> ended;       // numbers of events, one after the other
+  std::vector<double> closed;      // of changes that a restart made, for the next sample to tell
   std::vector<double> unmeasured;  // NaN for each torque and wrench
   std::vector<double> snapshot;    // of the last sample, on its way to Python
 };
@@ -74,11 +76,13 @@ inline void keep_ended(Pipeline& p, const tl::Result& result) {
   }
 }
 
-inline void take_snapshot(const tl::Pipeline& p, const tl::Sample& sample,
-                          const tl::Result& result, std::vector<double>& out) {
+inline void take_snapshot(Pipeline& of, const tl::Sample& sample, const tl::Result& result,
+                          std::vector<double>& out) {
+  const tl::Pipeline& p = *of.value;
   const Snapshot at(p);
   const std::size_t contact = fields::width<tl::Contact>(), event = fields::width<tl::Event>() + 1;
-  out.resize(at.end + result.contacts.size() * contact + result.events.size() * event);
+  out.resize(at.end + result.contacts.size() * contact + result.events.size() * event +
+             of.closed.size());
   write_row(result, p.row_layout(), out.data());
   std::copy(result.levels.begin(), result.levels.end(), out.data() + at.levels);
   std::copy(result.normalized.begin(), result.normalized.end(), out.data() + at.normalized);
@@ -87,9 +91,11 @@ inline void take_snapshot(const tl::Pipeline& p, const tl::Sample& sample,
   out[at.time] = sample.time;
   std::copy_n(sample.q, at.contacts - at.q, out.data() + at.q);
   out[at.contacts] = static_cast<double>(result.contacts.size());
-  out[at.changes] = static_cast<double>(result.events.size());
+  out[at.changes] = static_cast<double>(result.events.size() + of.closed.size() / event);
   double* to = out.data() + at.end;
   for (const tl::Contact& c : result.contacts) to = tl::write_numbers(c, to);
+  to = std::copy(of.closed.begin(), of.closed.end(), to);
+  of.closed.clear();
   for (const tl::EventChange& change : result.events) {
     *to++ = static_cast<double>(change.happened);
     to = tl::write_numbers(change.event, to);
@@ -98,7 +104,7 @@ inline void take_snapshot(const tl::Pipeline& p, const tl::Sample& sample,
 
 inline nb::object update(Pipeline& p, double time, nb::handle q, nb::handle qd, nb::handle tau,
                          nb::handle wrench) {
-  const tl::RowLayout& layout = p.value.row_layout();
+  const tl::RowLayout& layout = p.value->row_layout();
   const std::size_t n = layout.joints, k = layout.sensors;
   const double* missing = p.unmeasured.data();
   const tl::Sample sample{time, arrays::numbers(q, {n}), arrays::numbers(qd, {n}),
@@ -107,9 +113,9 @@ inline nb::object update(Pipeline& p, double time, nb::handle q, nb::handle qd, 
   std::vector<double> numbers;  // taken out of its turn: a new array may run any code of Python
   {
     const guard::Turn turn(p.turn);
-    const tl::Result result = p.value.update(sample);
+    const tl::Result result = p.value->update(sample);
     keep_ended(p, result);
-    take_snapshot(p.value, sample, result, p.snapshot);
+    take_snapshot(p, sample, result, p.snapshot);
     numbers.swap(p.snapshot);
   }
   const nb::object out = arrays::line(numbers);
@@ -121,8 +127,8 @@ inline nb::object update(Pipeline& p, double time, nb::handle q, nb::handle qd, 
 // the numbers of the contact.
 inline nb::tuple run(Pipeline& p, nb::handle time, nb::handle q, nb::handle qd, nb::handle tau,
                      nb::handle wrench) {
-  const samples::Many in = samples::many(p.value.row_layout(), time, q, qd, tau, wrench);
-  const Snapshot at(p.value);
+  const samples::Many in = samples::many(p.value->row_layout(), time, q, qd, tau, wrench);
+  const Snapshot at(*p.value);
   arrays::Out rows({in.rows, at.width}), levels({in.rows, at.segments}),
       normalized({in.rows, at.rows}), drift({in.rows, at.rows}), quiet({in.rows, at.segments});
   std::vector<double> contacts;
@@ -132,7 +138,7 @@ inline nb::tuple run(Pipeline& p, nb::handle time, nb::handle q, nb::handle qd, 
     const guard::Turn turn(p.turn);
     nb::gil_scoped_release release;
     std::size_t i = 0;
-    p.value.run(in.rows, in.time, in.first, rows.data(), [&](const tl::Result& result) {
+    p.value->run(in.rows, in.time, in.first, rows.data(), [&](const tl::Result& result) {
       level = std::copy(result.levels.begin(), result.levels.end(), level);
       x = std::copy(result.normalized.begin(), result.normalized.end(), x);
       y = std::copy(result.drift.begin(), result.drift.end(), y);
@@ -144,7 +150,7 @@ inline nb::tuple run(Pipeline& p, nb::handle time, nb::handle q, nb::handle qd, 
         tl::write_numbers(c, to + 1);
       }
       keep_ended(p, result);
-      const std::size_t health = i * at.width + p.value.row_layout().health();
+      const std::size_t health = i * at.width + p.value->row_layout().health();
       rows.data()[health] = static_cast<double>(result.health);
       ++i;
     });
@@ -160,7 +166,7 @@ inline nb::tuple events(Pipeline& p, std::size_t from) {
   {
     const guard::Turn turn(p.turn);
     ended.assign(p.ended.begin() + std::min(from * width, p.ended.size()), p.ended.end());
-    p.value.visit_lasting([&](const tl::Event& event) {
+    p.value->visit_lasting([&](const tl::Event& event) {
       lasting.resize(lasting.size() + width);
       tl::write_numbers(event, &*lasting.end() - width);
     });
@@ -168,8 +174,37 @@ inline nb::tuple events(Pipeline& p, std::size_t from) {
   return nb::make_tuple(arrays::table(ended, width), arrays::table(lasting, width));
 }
 
+// Begins anew with the same robot but other figures, of its biases or loads. Events that last end
+// with the last sample; the numbers of events go on.
+inline void restart(Pipeline& p, const tl::Robot& robot) {
+  auto fresh = std::make_unique<tl::Pipeline>(robot, p.value->tuning());
+  const tl::Robot& before = p.value->robot();
+  if (robot.joint_names != before.joint_names || robot.sensor_names != before.sensor_names ||
+      robot.links.size() != before.links.size() || robot.rows.size() != before.rows.size())
+    throw std::invalid_argument("a pipeline goes on with the same joints, sensors and links");
+  const guard::Turn turn(p.turn);
+  p.value->visit_lasting([&p](tl::Event event) {
+    event.cleared = p.value->time();
+    const std::size_t width = fields::width<tl::Event>();
+    p.ended.resize(p.ended.size() + width);
+    tl::write_numbers(event, &*p.ended.end() - width);
+    p.closed.push_back(static_cast<double>(tl::Happened::ended));
+    p.closed.resize(p.closed.size() + width);
+    tl::write_numbers(event, &*p.closed.end() - width);
+  });
+  fresh->number_events_from(p.value->next_event());
+  p.value.swap(fresh);
+}
+
+// For how long the arm has been at rest [s]; the mean torques (n) and wrenches (6 k) felt since.
+inline nb::tuple rest(Pipeline& p) {
+  const guard::Turn turn(p.turn);
+  const tl::RestMeter& meter = p.value->rest();
+  return nb::make_tuple(meter.seconds(), meter.torque(), meter.wrench());
+}
+
 inline nb::dict slices(const Pipeline& p) {
-  const Snapshot at(p.value);
+  const Snapshot at(*p.value);
   nb::dict d;
   const auto add = [&d](const char* name, std::size_t begin, std::size_t end) {
     d[name] = nb::make_tuple(begin, end);
@@ -243,10 +278,13 @@ inline void bind(nb::module_& m) {
       .def("update", &update, "time"_a, "q"_a, "qd"_a, "tau"_a.none(), "wrench"_a.none())
       .def("run", &run, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a)
       .def("events", &events, "since"_a)
+      .def("restart", &restart, "robot"_a)
+      .def("rest", &rest)
+      .def_prop_ro("time", [](const Pipeline& p) { return p.value->time(); })
       .def("region",
            [](Pipeline& p) {
              const guard::Turn turn(p.turn);
-             return localization::region(p.value.region());
+             return localization::region(p.value->region());
            })
       .def_prop_ro("slices", &slices);
 }

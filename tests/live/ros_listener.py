@@ -57,7 +57,7 @@ def main():
     while time.monotonic() < end:
         rclpy.spin_once(node, timeout_sec=0.1)
     answers = {}
-    for name in ("reset", "tare"):
+    for name in ("reset", "tare", "set_load"):
         client = node.create_client(Trigger, f"/touchline/{name}")
         if client.wait_for_service(timeout_sec=5.0):
             future = client.call_async(Trigger.Request())

@@ -16,6 +16,14 @@ def test_what_is_felt_is_published_and_services_answer():
     env = environment(76)
     listener = [sys.executable, str(HERE / "ros_listener.py"), "10"]
     parameters = ["-p", "robot:=sara", "-p", "source:=sim://?motion=0", "-p", "publish_rate:=100.0"]
+    parameters += [
+        "-p",
+        "load_link:=tool",
+        "-p",
+        "load_mass:=0.5",
+        "-p",
+        "load_com:=[0.0, 0.0, 0.04]",
+    ]
     command = [sys.executable, "-m", "touchline.live.node", "--ros-args", *parameters]
     with (
         subprocess.Popen(listener, env=env, stdout=subprocess.PIPE, text=True) as ear,
@@ -33,8 +41,12 @@ def test_what_is_felt_is_published_and_services_answer():
     assert told["links"] and "force" in told["shapes"]
     assert told["status"][0] == "touchline: simulation" and float(told["facts"]["rate_hz"]) > 0
     assert told["collision"] in (True, False)
-    assert set(told["answers"]) == {"reset", "tare"}
-    assert all(isinstance(success, bool) and text for success, text in told["answers"].values())
+    assert told["answers"]["reset"] == [True, "reset: the estimate starts anew"]
+    assert told["answers"]["tare"][1].startswith("tare")  # done, or the arm was not at rest
+    assert told["answers"]["set_load"] == [True, LOADED]
+
+
+LOADED = "set_load: tool carries 0.500 kg at (+0.000, +0.000, +0.040) m of its frame"
 
 
 @needs_ros

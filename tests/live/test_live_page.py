@@ -31,11 +31,15 @@ def test_the_page_shows_streams_contacts_and_resets(sara, monkeypatch):
             texts.append(page._readout.content)
         assert "simulation: " in texts[-1]
         assert "<b>tool</b>" in texts[-1] and "located" in texts[-1]
-        before = session.pipeline
         page._asked.append(session.reset)
         page._written = page._drawn = 0.0
         page.update()
-        assert session.pipeline is not before and session.result is None
+        assert session.result is None
         assert "withheld" in page._readout.content
+        assert "reset: the estimate starts anew" in page._readout.content
+        page._asked.append(session.tare)
+        page._written = page._drawn = 0.0
+        page.update()
+        assert "tare needs 0.5 s of rest" in page._readout.content
         found = listening(os.getpid())
         assert found and all(address in LOOPBACK for kind, address, _ in found if kind[:3] == "tcp")

@@ -16,6 +16,7 @@
 #include "touchline/detail/events/period_watch.hpp"
 #include "touchline/detail/localizer/localizer.hpp"
 #include "touchline/detail/observer/observer.hpp"
+#include "touchline/detail/observer/rest_meter.hpp"
 #include "touchline/result.hpp"
 #include "touchline/robot.hpp"
 #include "touchline/sample.hpp"
@@ -36,6 +37,7 @@ class Pipeline {
                    tuning.localizer),
         classifier_(observer_, robot_.blows),
         recorder_(robot_, observer_, localizer_),
+        rest_(observer_.row_layout()),
         period_(robot_.noise.period),
         levels_(robot_.segment_names.size(), 0.0),
         contacts_(robot_.segment_names.size() * Reports::kMost) {}
@@ -74,6 +76,13 @@ class Pipeline {
   // allocates. Throws std::invalid_argument where there are several or none.
   std::vector<SurfaceCell> region() const { return localizer_.region(); }
 
+  // What is felt while the arm is at rest: the offsets that a tare takes off the biases.
+  const RestMeter& rest() const { return rest_; }
+  double time() const { return observer_.time(); }  // of the last accepted sample [s]
+  // The number of the next event; another pipeline that goes on for this one counts on from it.
+  int next_event() const { return recorder_.next_event(); }
+  void number_events_from(int next) { recorder_.number_events_from(next); }
+
   // Without its surfaces, which are the localizer's: `surfaces()`.
   const Robot& robot() const { return robot_; }
   const std::vector<LinkSurface>& surfaces() const { return localizer_.surfaces(); }
@@ -96,6 +105,7 @@ class Pipeline {
     if (touched()) localize(sample, row);
     recorder_.finish();
     period_.take(observer_.time(), observer_.max_gap());
+    rest_.take(row, sample.qd, observer_.time());
     return result(sample, row);
   }
 
@@ -178,6 +188,7 @@ class Pipeline {
   Localizer localizer_;
   Classifier classifier_;
   EventRecorder recorder_;
+  RestMeter rest_;
   PeriodWatch period_;
   std::vector<double> levels_;  // of the segments, as the classifier takes them
   std::vector<Contact> contacts_;

@@ -39,7 +39,7 @@ def live(
         duration: Ends after so long by the sensors' clock [s]. Default: until Ctrl-C, or the end.
         force: Go live whatever the first second looks like.
         view: Show the robot and what it feels on a page.
-        allow_control: Visitors of the page may let the pipeline start anew.
+        allow_control: Visitors of the page may let the estimate start anew, and tare.
         host: Address at which the page is served. Another than 127.0.0.1 lets other machines see
             it: it needs the token that is then printed.
         port: The first port that is tried.

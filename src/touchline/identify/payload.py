@@ -1,14 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """A body that the model lacks at the end of the arm: a hand, a tool, a grasped object."""
 
+from collections.abc import Iterable
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.identify.evidence import Evidence
+from touchline.errors import InputError
+from touchline.identify.evidence import PER_CONSTANT, Evidence, gather
 from touchline.identify.fit import BodyChange, Equations, Problem, Solution
-from touchline.identify.regressor import PARAMETERS, body_vector
+from touchline.identify.regressor import PARAMETERS, body_of_vector, body_vector
+from touchline.identify.touches import usual_scatter
 from touchline.model.mechanism import Inertia
 from touchline.model.robot import Robot
+from touchline.model.transforms import move_inertia
+from touchline.model.tree import invert
+from touchline.observer.samples import Samples
+from touchline.suggest import unknown
 
 Array = NDArray[np.float64]
 
@@ -17,6 +26,8 @@ SURE = 4.0  # standard errors of the mass
 FARTHEST = 0.25  # m from the flange; a mass centred farther off is an error of the links
 RADIUS = 0.05  # m, of gyration of a first guess
 SIGMA = 0.3  # prior of the steps from a first guess
+FLOOR = 0.002  # of a row's largest reading: no model foretells more closely
+ROUNDS = 4  # of fitting and weighing rows by what is left of them
 SETTLED = 0.01  # the same, once it has been fitted beside links that are as modelled
 CENTRE_SIGMA = 0.1  # m, prior of the centre, so that mass and offsets part where the data can
 
@@ -79,3 +90,72 @@ def seen_leaves(evidence: Evidence) -> list[int]:
     """Leaf nodes whose weight or motion some row feels."""
     model, used = evidence.model, evidence.used
     return [i for i in leaf_nodes(evidence.robot) if np.abs(model[:, used, i]).max(initial=0.0) > 0]
+
+
+@dataclass(frozen=True)
+class WeighedLoad:
+    """A body that was identified on the link that carries it.
+
+    Attributes:
+        link: that it is fixed to.
+        mass: [kg], and `mass_error`, its standard error.
+        com: (3,) centre in the link's frame [m], and `com_error`, the largest standard error of it.
+    """
+
+    link: str
+    mass: float
+    mass_error: float
+    com: Array
+    com_error: float
+
+
+def weigh_load(robot: Robot, samples: Iterable[Samples], link: str) -> WeighedLoad:
+    """Mass and centre of what a link carries beyond its description, from free motion.
+
+    Biases count as right: tare, or calibrate, before the gripper closes. A few seconds that turn
+    the link against gravity are enough; in one posture the centre stays unknown along the force.
+
+    Args:
+        robot: as described, without the body.
+        samples: parts of one recording in which nothing else touches the arm.
+        link: that carries the body.
+
+    Raises:
+        InputError: there is no such link, the samples are too few, or show no body there.
+    """
+    if link not in robot.places:
+        raise InputError(unknown(link, "link", list(robot.places)))
+    try:
+        evidence = gather(robot, [samples])
+    except ValueError as error:
+        raise InputError(f"no load on {link}: {error}") from None
+    node = robot.places[link].node
+    if not np.abs(evidence.model[:, evidence.used, node]).max(initial=0.0) > 0.0:
+        raise InputError(f"no load on {link}: no torque or sensor that is measured feels it")
+    left, use = evidence.residual(), np.ones(len(evidence), dtype=bool)
+    unit = Inertia(1.0, np.zeros(3), RADIUS**2 * np.eye(3))
+    problem = Problem((), (BodyChange(node, body_vector(unit), SIGMA, added=True),))
+    prior = np.diag([0.0, *np.full(3, CENTRE_SIGMA**-2.0)])
+    least = FLOOR * np.abs(evidence.reading).max(axis=0, initial=0.0)
+    four, rest = np.zeros(4), left  # mass, and mass times centre
+    covariance, weight = np.zeros((4, 4)), np.ones(left.shape)
+    for _ in range(ROUNDS):
+        sigma = np.maximum(usual_scatter(rest, evidence.used), np.maximum(least, 1e-6))
+        weight = np.broadcast_to(sigma**-2.0, left.shape)
+        equations = Equations.of(evidence, problem, left, weight, use)
+        covariance = np.linalg.pinv(equations.normal[:4, :4] + prior)
+        four = -covariance @ equations.gradient[:4]
+        rest = left + evidence.model[:, :, node, :4] @ four
+    spread = max(1.0, float(np.mean((rest**2 * weight)[:, evidence.used])))
+    covariance = covariance * spread * 2.0 * PER_CONSTANT  # instants closer than that repeat
+    mass, error = float(four[0]), float(np.sqrt(covariance[0, 0]))
+    if mass < SURE * error:
+        raise InputError(
+            f"no load on {link}: {mass:+.3f} kg with a standard error of {error:.3f} kg; "
+            "move the link against gravity for a few seconds"
+        )
+    body = body_of_vector(np.array([*four, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    T_link_node = invert(robot.places[link].T_node_link)
+    centre = move_inertia(body, T_link_node).com
+    centre_errors = np.sqrt(np.diag(covariance)[1:] + (four[1:] / mass * error) ** 2) / mass
+    return WeighedLoad(link, mass, error, centre, float(centre_errors.max()))

@@ -10,7 +10,7 @@ Publishes `~/external_joint_torques`, `~/SEGMENT/wrench`, `~/contacts`, `~/colli
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -109,6 +109,9 @@ class TouchlineNode:
         declare("reliable", True, "whether what is published is reliable")
         declare("frame", "world", "of what is published in world axes")
         text = "largest rate at which results are published [Hz]"
+        declare("load_link", "", "that ~/set_load is about", False)
+        declare("load_mass", -1.0, "[kg] of ~/set_load; 0: none; negative: weighed", False)
+        declare("load_com", [0.0, 0.0, 0.0], "[m] of ~/set_load, in the link's frame", False)
         declare("publish_rate", 1000.0, text, False, floating_point_range=[rate])
 
     def _value(self, name: str) -> Any:
@@ -163,23 +166,31 @@ class TouchlineNode:
         ]
 
     def _on_reset(self, request: Any, response: Any) -> Any:
-        """The pipeline starts anew; a collision that was latched is cleared."""
+        """The estimate starts anew; a collision that was latched is cleared."""
         self._publish_collision(False)
-        return self._ask("reset", response)
+        return self._ask(response, lambda session: session.reset())
 
     def _on_tare(self, request: Any, response: Any) -> Any:
-        return self._ask("tare", response)
+        return self._ask(response, lambda session: session.tare())
 
     def _on_set_load(self, request: Any, response: Any) -> Any:
-        return self._ask("set_load", response)
+        """From now on that is carried which `load_link`, `load_mass` and `load_com` say."""
+        link, mass = self._value("load_link"), self._value("load_mass")
+        if not link:
+            response.success, response.message = False, "parameter load_link: give a link's name"
+            return response
+        com = list(self._value("load_com"))
+        weighed = None if mass < 0.0 else mass
+        return self._ask(response, lambda session: session.set_load(link, weighed, com))
 
-    def _ask(self, what: str, response: Any) -> Any:
+    def _ask(self, response: Any, act: Callable[[Session], str]) -> Any:
         if self.session is None or self.session.pipeline is None:
             response.success, response.message = False, "the node is not active"
             return response
-        done = self.session.reset() if what == "reset" else False
-        response.success = done
-        response.message = f"{what}: done" if done else f"{what}: the pipeline cannot do it yet"
+        try:
+            response.success, response.message = True, act(self.session)
+        except InputError as error:
+            response.success, response.message = False, str(error)
         return response
 
     def _activate(self) -> None:

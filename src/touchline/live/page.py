@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from touchline.errors import InputError
 from touchline.health import Health
 from touchline.live.session import Session
 from touchline.live.streams import StreamState
@@ -26,7 +27,7 @@ class RobotPage:
     Args:
         server: without anything on its page.
         session: that is shown.
-        allow_control: whether visitors may let the pipeline start anew.
+        allow_control: whether visitors may let the estimate start anew, and tare.
     """
 
     def __init__(self, server: PageServer, session: Session, allow_control: bool = False) -> None:
@@ -35,10 +36,11 @@ class RobotPage:
         self._robot = RobotScene(self._page.scene, session.robot)
         self._contacts = ContactScene(self._page.scene, self._robot)
         self._readout = self._page.gui.add_html("")
-        self._asked: list[Callable[[], object]] = []
+        self._asked: list[Callable[[], str]] = []
+        self._answer = ""
         if allow_control:
-            button = self._page.gui.add_button("Reset the pipeline")
-            button.on_click(lambda _: self._asked.append(session.reset))
+            for text, act in (("Reset", session.reset), ("Tare (nothing may touch)", session.tare)):
+                self._page.gui.add_button(text).on_click(lambda _, act=act: self._asked.append(act))
         self._drawn, self._written = -np.inf, -np.inf
 
     def update(self) -> None:
@@ -48,7 +50,10 @@ class RobotPage:
             return
         self._drawn = now
         while self._asked:
-            self._asked.pop()()
+            try:
+                self._answer = self._asked.pop(0)()
+            except InputError as error:
+                self._answer = str(error)
         session = self._session
         if not self._page.get_clients() or session.sample is None:
             return
@@ -75,4 +80,6 @@ class RobotPage:
             for contact in result.contacts:
                 where = contact.link or contact.likely_link or contact.segment
                 lines.append(f"<b>{html.escape(where)}</b>: {contact.size:.1f} N, {contact.status}")
+        if self._answer:
+            lines.append(html.escape(self._answer))
         return f'<div style="font-size:12px;padding:0 0.75em">{"<br>".join(lines)}</div>'

@@ -2,14 +2,17 @@
 """A running robot from its first second to the end: checked, observed, recorded, told."""
 
 import time
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from touchline.errors import InputError
+from touchline.identify.payload import weigh_load
 from touchline.live.connection import Connection, Notice
 from touchline.live.preflight import SECONDS, Reason, preflight
 from touchline.live.recorder import Recorder, make_recorder
@@ -18,11 +21,14 @@ from touchline.live.source import NativeSource
 from touchline.localizer.skin import Skin
 from touchline.logs.period import typical_period
 from touchline.model.robot import Robot
+from touchline.observer.samples import Samples
 from touchline.pipeline.pipeline import Pipeline, Result
 from touchline.result.event import Event
 
 SILENT = 5.0  # s without a sample, after which `duration` is over on this machine's clock too
 LONGEST_START = 3.0  # s in which the first second has to come
+RECENT = 5.0  # s of samples that are kept to weigh a load in
+MOST_RECENT = 40_000  # of them: 5 s at 8 kHz
 
 
 @dataclass
@@ -68,6 +74,7 @@ class Session:
         self.sample: Sample | None = None
         self.result: Result | None = None
         self._first: list[Sample] = []
+        self._recent: deque[Sample] = deque(maxlen=MOST_RECENT)
         self._origin = 0.0
         self._fresh = EventNews()
 
@@ -108,16 +115,66 @@ class Session:
     def _made(self) -> Pipeline:
         return Pipeline(self.robot, period=self._period, skin=self._skin)
 
-    def reset(self) -> bool:
-        """Forgets the past: the pipeline starts anew, and events begin at 0 again.
+    def reset(self) -> str:
+        """Forgets the past: the estimate starts anew, events that last end; returns what was done.
 
-        A recording goes on; what it is replayed to differs from here.
+        A recording goes on. What it is replayed to differs from here, as after the next two.
         """
-        if self.pipeline is None:
-            return False
-        self.pipeline = self._made()
+        self._running().reset()
         self.result = None
-        return True
+        return "reset: the estimate starts anew"
+
+    def tare(self) -> str:
+        """Takes what is felt now for offsets, as `Pipeline.tare`; returns what was done.
+
+        Raises:
+            InputError: the arm has not been at rest for half a second.
+        """
+        try:
+            taken = self._running().tare()
+        except ValueError as error:
+            raise InputError(str(error)) from None
+        self.result = None
+        parts = []
+        names = zip(self.robot.sensor_names, taken.wrench, strict=True)
+        for name, wrench in names:
+            force, moment = np.linalg.norm(wrench[:3]), np.linalg.norm(wrench[3:])
+            parts.append(f"{force:.2f} N and {moment:.3f} Nm at {name}")
+        torques = np.abs(taken.torque[np.isfinite(taken.torque)])
+        if len(torques):
+            parts.append(f"up to {torques.max():.2f} Nm at a joint")
+        return f"tare: took off {', '.join(parts) or 'nothing: no signal is measured'}"
+
+    def set_load(self, link: str, mass: float | None = None, com: ArrayLike = (0, 0, 0)) -> str:
+        """Tells what a link carries from now on; returns what was done.
+
+        Args:
+            link: that carries it.
+            mass: [kg]; 0 takes it off; None: weighed in the last seconds of free motion.
+            com: (3,) its centre in the link's frame [m], if the mass is given.
+
+        Raises:
+            InputError: there is no such link, or nothing could be weighed.
+        """
+        pipeline, error = self._running(), ""
+        if mass is None:
+            found = weigh_load(pipeline.robot, [_samples(self._recent)], link)
+            mass, com = found.mass, found.com
+            error = f" +- {found.mass_error:.3f}"
+        try:
+            pipeline.set_load(link, mass, com)
+        except ValueError as problem:
+            raise InputError(str(problem)) from None
+        self.result = None
+        if mass == 0.0:
+            return f"set_load: {link} carries nothing more than described"
+        where = ", ".join(f"{x:+.3f}" for x in np.asarray(com, dtype=float))
+        return f"set_load: {link} carries {mass:.3f}{error} kg at ({where}) m of its frame"
+
+    def _running(self) -> Pipeline:
+        if self.pipeline is None:
+            raise InputError(f"{self.connection.source.name}: not live yet")
+        return self.pipeline
 
     @property
     def origin(self) -> float:
@@ -163,6 +220,9 @@ class Session:
             self._recorder.add(sample)
         result: Result = sample.result or self.pipeline.update(*sample)
         self.result, self.sample = result, sample
+        self._recent.append(sample)
+        while sample.time - self._recent[0].time > RECENT:
+            self._recent.popleft()
         self.samples += 1
         for change in result.events:
             if change.happened == "began":
@@ -201,3 +261,8 @@ class Session:
 
 def _times(samples: list[Sample]) -> np.ndarray:
     return np.array([sample.time for sample in samples])
+
+
+def _samples(samples: Iterable[Sample]) -> Samples:
+    columns = zip(*(tuple(sample) for sample in samples), strict=True)
+    return Samples(*(np.array(column) for column in columns))

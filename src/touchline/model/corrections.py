@@ -4,11 +4,14 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from touchline.model.description import LinkCorrection, Load, RobotDescription
 from touchline.model.mechanism import Inertia, Link, Mechanism
 from touchline.model.plausibility import inertia_warnings
 from touchline.model.transforms import combine_inertias, inertia_matrix
+
+NO_MASS = 1e-9  # kg
 
 
 def apply_corrections(mechanism: Mechanism, description: RobotDescription) -> Mechanism:
@@ -38,6 +41,54 @@ def _changed(link: Link, correction: LinkCorrection | None, loads: tuple[Load, .
     if carried:
         inertia = combine_inertias([inertia, *carried])
     return replace(link, inertia=inertia)
+
+
+def with_loads(
+    mechanism: Mechanism, description: RobotDescription, loads: tuple[Load, ...]
+) -> tuple[RobotDescription, Mechanism]:
+    """The description with other loads, and the mechanism that follows.
+
+    Args:
+        mechanism: with the loads that the description has now.
+        description: of the same robot.
+        loads: all that are carried from now on; their links exist.
+    """
+    changed = {load.link for load in (*description.loads, *loads)}
+    links = dict(mechanism.links)
+    for name in changed:
+        before = [_opposite(load_inertia(x)) for x in description.loads if x.link == name]
+        after = [load_inertia(x) for x in loads if x.link == name]
+        own = combine_inertias([links[name].inertia, *before])
+        if own.mass < NO_MASS:  # what is left of a link without mass is rounding
+            own = Inertia(0.0, np.zeros(3), np.zeros((3, 3)))
+        links[name] = replace(links[name], inertia=combine_inertias([own, *after]))
+    return replace(description, loads=loads), replace(mechanism, links=links)
+
+
+def with_offsets(
+    description: RobotDescription, torque: NDArray[np.float64], wrench: NDArray[np.float64]
+) -> RobotDescription:
+    """The description with biases that take away what is felt.
+
+    Args:
+        description: of the robot.
+        torque: (n,) external torques that nothing causes [Nm]; NaN where none is measured.
+        wrench: (k, 6) external wrenches outboard of each sensor, in its frame [N, Nm].
+    """
+    felt_torque, felt_wrench = np.nan_to_num(torque), np.nan_to_num(wrench)
+    joints = tuple(
+        replace(joint, bias=joint.bias - float(felt)) if joint.measured else joint
+        for joint, felt in zip(description.joints, felt_torque, strict=True)
+    )
+    sensors = tuple(
+        replace(sensor, bias=tuple((np.array(sensor.bias) - felt).tolist()))
+        for sensor, felt in zip(description.sensors, felt_wrench, strict=True)
+    )
+    return replace(description, joints=joints, sensors=sensors)
+
+
+def _opposite(body: Inertia) -> Inertia:
+    return Inertia(-body.mass, body.com, -body.inertia)
 
 
 def corrected_inertia(body: Inertia, correction: LinkCorrection) -> Inertia:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Observer, detection, localization, classification and the record of events in one object."""
 
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,8 @@ from touchline.localizer.localizer import (
 )
 from touchline.localizer.region import Region
 from touchline.localizer.skin import Skin
+from touchline.model.corrections import with_loads, with_offsets
+from touchline.model.description import Load
 from touchline.model.robot import Robot, load_robot
 from touchline.native import core
 from touchline.observer.observer import Estimate, Observer
@@ -25,8 +27,26 @@ from touchline.pipeline.result import Layout, Result
 from touchline.pipeline.table import ContactTable
 from touchline.result.event import Event
 from touchline.result.native import Names
+from touchline.suggest import unknown
 
 Array = NDArray[np.float64]
+
+REST = 0.5  # s that an arm must have stood still before a tare: the mean of so long
+
+
+@dataclass(frozen=True)
+class Tare:
+    """What a tare took off.
+
+    Attributes:
+        time: of the last sample before [s].
+        torque: (n,) felt at each joint [Nm]; NaN where none is measured.
+        wrench: (k, 6) felt outboard of each sensor [N, Nm], in its frame, at its origin.
+    """
+
+    time: float
+    torque: Array
+    wrench: Array
 
 
 class Pipeline:
@@ -87,16 +107,7 @@ class Pipeline:
         tuning = core.Tuning()
         tuning.method = getattr(core.Method, method)
         tuning.localizer = localizer_settings(rule, friction)
-        self._native = partial(
-            native_robot,
-            robot,
-            thresholds,
-            self.skin,
-            period,
-            bandwidth,
-            wrench_error,
-            torque_error,
-        )
+        self._weights = period, bandwidth, wrench_error, torque_error
         self._core = core.Pipeline(self._native(), tuning)
         self._update = self._core.update
         names = Names.of(
@@ -109,6 +120,7 @@ class Pipeline:
         self._layout = Layout(self._core, slices, names)
         self.contacts = ContactTable.empty(names)
         self._ended: list[Event] = []
+        self._loads: dict[str, Load] = {}  # by link, of `set_load`
 
     @property
     def events(self) -> list[Event]:
@@ -171,6 +183,78 @@ class Pipeline:
         """
         write_robot(Path(path), self._native())
 
+    def reset(self) -> None:
+        """Forgets the past, as after a long gap; events that last end, their numbers go on."""
+        self._core.restart(self._native())
+
+    def tare(self) -> Tare:
+        """Takes what is felt now for the sensors' and joints' offsets: nothing may touch the arm.
+
+        The mean of the last half second of rest goes into the biases of `robot`; the estimate
+        starts anew. It holds for this posture: what gravity puts on a wrong model is no offset.
+
+        Raises:
+            ValueError: the arm has not been at rest, with all signals there, for half a second.
+        """
+        seconds, torque, wrench = self._core.rest()
+        if seconds < REST:
+            raise ValueError(
+                f"tare needs {REST:g} s of rest with all signals there; it was {seconds:.2f} s"
+            )
+        torque, wrench = np.array(torque), np.array(wrench).reshape(-1, 6)
+        before, time = self.robot, self._core.time
+        description = with_offsets(before.description, torque, wrench)
+        self._go_on_with(Robot(description, before.mechanism, before.assumed))
+        return Tare(time, torque, wrench)
+
+    def set_load(
+        self,
+        link: str,
+        mass: float,
+        com: ArrayLike = (0.0, 0.0, 0.0),
+        inertia: ArrayLike = (0.0,) * 6,
+    ) -> None:
+        """From now on the arm carries a body there, as when a gripper has closed on something.
+
+        It replaces what an earlier call gave that link; a mass of 0 takes it off. The estimate
+        starts anew.
+
+        Args:
+            link: that carries it.
+            mass: [kg].
+            com: (3,) its centre in the link's frame [m].
+            inertia: (6,) ixx ixy ixz iyy iyz izz about its centre [kg m2], in the link's axes.
+
+        Raises:
+            ValueError: there is no such link, or the body is not possible.
+        """
+        load = Load(link, float(mass), _numbers(com, 3, "com"), _numbers(inertia, 6, "inertia"))
+        if link not in self.robot.mechanism.links:
+            links = [name for name, body in self.robot.mechanism.links.items() if not body.virtual]
+            raise ValueError(unknown(link, "link", links))
+        if not 0.0 <= load.mass < np.inf:
+            raise ValueError(f"mass is {mass}, but must be at least 0 kg")
+        if not np.all(np.isfinite([*load.com, *load.inertia])):
+            raise ValueError("com and inertia must be finite numbers [m, kg m2]")
+        set_before = self._loads.get(link)
+        kept = tuple(x for x in self.robot.description.loads if x is not set_before)
+        loads = (*kept, load) if load.mass > 0.0 else kept
+        robot = self.robot
+        changed = with_loads(robot.mechanism, robot.description, loads)
+        self._go_on_with(Robot(*changed, robot.assumed))
+        self._loads[link] = load
+
+    def _go_on_with(self, robot: Robot) -> None:
+        before, self.robot = self.robot, robot
+        try:
+            self._core.restart(self._native())
+        except BaseException:
+            self.robot = before
+            raise
+
+    def _native(self) -> core.Robot:
+        return native_robot(self.robot, self.thresholds, self.skin, *self._weights)
+
     def beside(self, slots: int) -> core.Runner:
         """A native thread that takes samples for this pipeline; it gives what `result` reads.
 
@@ -193,3 +277,10 @@ class Pipeline:
                 alone; a `Contact` has `candidates` and `covariance` in any case.
         """
         return Region.of(self.skin, self._core.region())
+
+
+def _numbers(values: ArrayLike, count: int, name: str) -> tuple[float, ...]:
+    array = np.asarray(values, dtype=float)
+    if array.shape != (count,):
+        raise ValueError(f"{name} needs {count} numbers, not an array of shape {array.shape}")
+    return tuple(array.tolist())

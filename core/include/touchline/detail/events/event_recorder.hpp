@@ -105,6 +105,8 @@ class EventRecorder {
   // What the last sample did to events. And was there no room for one?
   const std::vector<EventChange>& changes() const { return changes_; }
   bool crowded() const { return crowded_; }
+  int next_event() const { return next_; }
+  void number_events_from(int next) { next_ = next; }
 
   // Calls `visit(Event)` for each event that lasts, in the order of detection.
   template <class Visit>

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What changes while a robot runs: reset, tare, a load that a gripper has closed on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from free_motion import exact_loads, free_motion
+
+import touchline as tl
+from touchline.errors import InputError
+from touchline.identify.payload import weigh_load
+from touchline.model.corrections import with_loads
+from touchline.model.description import Load
+from touchline.model.robot import Robot
+from touchline.observer.samples import Samples
+
+LINK = "tool"
+
+
+@pytest.fixture(scope="module")
+def sara():
+    return tl.load_robot("sara")
+
+
+def at_rest(robot, seconds=1.0, rate=1000.0, q=None, noise=0.01, seed=0):
+    """Samples of an arm that stands still."""
+    count = round(seconds * rate)
+    q = np.linspace(0.3, 0.9, len(robot.joint_names)) if q is None else q
+    time, q = np.arange(count) / rate, np.tile(q, (count, 1))
+    qd = np.zeros_like(q)
+    tau, wrench = exact_loads(robot, time, q, qd)
+    rng = np.random.default_rng(seed)
+    tau = tau + rng.normal(0.0, noise, tau.shape)
+    return Samples(time, q, qd, tau, wrench + rng.normal(0.0, noise, wrench.shape))
+
+
+def feed(pipeline, samples, start=0.0):
+    """The estimate of each sample, which begin at `start`."""
+    return pipeline.run(samples.time + start, samples.q, samples.qd, samples.tau, samples.wrench)[0]
+
+
+def carrying(robot, mass, com=(0.0, 0.0, 0.05)):
+    inertia = (mass * 1e-3, 0.0, 0.0, mass * 1e-3, 0.0, mass * 1e-3)
+    changed = with_loads(robot.mechanism, robot.description, (Load(LINK, mass, com, inertia),))
+    return Robot(*changed)
+
+
+def test_a_tare_takes_off_what_is_felt_at_rest(sara):
+    rng = np.random.default_rng(1)
+    still = at_rest(sara)
+    still.tau[:] += rng.normal(0.0, 1.0, 7)
+    still.wrench[:] += rng.normal(0.0, 2.0, (len(sara.sensor_names), 6))
+    pipeline = tl.Pipeline(sara)
+    before = feed(pipeline, still)
+    taken = pipeline.tare()
+    after = feed(pipeline, still, 1.0)
+    assert np.abs(before.tau_ext[-1]).max() > 0.5
+    assert np.abs(before.sensor_wrench[-1]).max() > 1.0
+    np.testing.assert_allclose(after.tau_ext[-200:].mean(axis=0), 0.0, atol=0.01)
+    np.testing.assert_allclose(after.sensor_wrench[-200:].mean(axis=0), 0.0, atol=0.02)
+    np.testing.assert_allclose(taken.torque, before.tau_ext[-500:].mean(axis=0), atol=0.02)
+    assert taken.time == pytest.approx(still.time[-1])
+
+
+def test_the_biases_of_a_tare_stand_in_the_robot(sara):
+    still = at_rest(sara, noise=0.0)
+    still.tau[:] += 0.7
+    pipeline = tl.Pipeline(sara)
+    feed(pipeline, still)
+    pipeline.tare()
+    joints = pipeline.robot.description.joints
+    expected = [0.7 if joint.measured else 0.0 for joint in joints]
+    np.testing.assert_allclose([joint.bias for joint in joints], expected, atol=1e-3)
+    assert all(joint.bias == 0.0 for joint in sara.description.joints)
+
+
+def test_a_tare_needs_rest(sara):
+    moving = free_motion(sara, seconds=1.0, rate=1000.0)
+    pipeline = tl.Pipeline(sara)
+    feed(pipeline, moving)
+    with pytest.raises(ValueError, match=r"tare needs 0\.5 s of rest"):
+        pipeline.tare()
+    pipeline.reset()
+    feed(pipeline, at_rest(sara, seconds=0.3), 2.0)
+    with pytest.raises(ValueError, match="it was 0"):
+        pipeline.tare()
+
+
+def test_a_load_that_is_set_is_no_longer_felt(sara):
+    loaded = at_rest(carrying(sara, 1.2), noise=0.0)
+    pipeline = tl.Pipeline(sara)
+    before = feed(pipeline, loaded)
+    pipeline.set_load(LINK, 1.2, (0.0, 0.0, 0.05), (1.2e-3, 0, 0, 1.2e-3, 0, 1.2e-3))
+    after = feed(pipeline, loaded, 1.0)
+    assert np.abs(before.segment_wrench[-1]).max() > 5.0
+    assert np.abs(after.segment_wrench[-1]).max() < 1e-6
+    pipeline.set_load(LINK, 0.0)
+    again = feed(pipeline, loaded, 2.0)
+    np.testing.assert_allclose(again.segment_wrench[-1], before.segment_wrench[-1], atol=1e-9)
+
+
+def test_a_load_replaces_the_one_before_but_not_the_description_s(sara):
+    described = carrying(sara, 0.5)
+    pipeline = tl.Pipeline(described)
+    for mass in (0.3, 0.8):
+        pipeline.set_load(LINK, mass)
+    masses = [load.mass for load in pipeline.robot.description.loads]
+    assert masses == [0.5, 0.8]
+    own = sara.mechanism.links[LINK].inertia.mass
+    assert pipeline.robot.mechanism.links[LINK].inertia.mass == pytest.approx(own + 1.3)
+
+
+WRONG_LOADS = [
+    (("toool", 1.0), "unknown link 'toool'"),
+    ((LINK, -1.0), "mass is -1.0"),
+    ((LINK, np.nan), "mass is nan"),
+    ((LINK, 1.0, (0.0, 0.0)), "com needs 3 numbers"),
+    ((LINK, 1.0, (0.0, 0.0, np.inf)), "finite"),
+    ((LINK, 1.0, (0.0, 0.0, 0.0), (1.0,)), "inertia needs 6 numbers"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "message"), WRONG_LOADS)
+def test_a_load_that_cannot_be_is_refused(sara, arguments, message):
+    pipeline = tl.Pipeline(sara)
+    with pytest.raises(ValueError, match=message):
+        pipeline.set_load(*arguments)
+    assert pipeline.robot is sara
+
+
+def test_events_end_with_a_reset_and_their_numbers_go_on(sara):
+    pipeline = tl.Pipeline(sara)
+    still = at_rest(sara)
+    feed(pipeline, still)
+    pushed = replace(still, wrench=still.wrench + np.array([0.0, 0.0, -30.0, 0.0, 0.0, 0.0]))
+    feed(pipeline, pushed, 1.0)
+    assert pipeline.events and pipeline.events[-1].cleared is None
+    count = len(pipeline.events)
+    pipeline.reset()
+    assert len(pipeline.events) == count
+    assert all(event.cleared is not None for event in pipeline.events)
+    told = pipeline.update(2.5, *(x[0] for x in (still.q, still.qd, still.tau, still.wrench)))
+    assert "ended" in [change.happened for change in told.events]
+    feed(pipeline, still, 3.0)
+    feed(pipeline, pushed, 4.0)
+    ids = [event.id for event in pipeline.events]
+    assert ids == sorted(set(ids)) and len(ids) > count
+
+
+def test_after_a_reset_all_is_as_at_the_start(sara):
+    still = at_rest(sara)
+    once, again = tl.Pipeline(sara), tl.Pipeline(sara)
+    feed(again, free_motion(sara, seconds=1.0, rate=1000.0))
+    again.reset()
+    expected, found = feed(once, still, 5.0), feed(again, still, 5.0)
+    np.testing.assert_array_equal(expected.tau_ext, found.tau_ext)
+    np.testing.assert_array_equal(expected.segment_wrench, found.segment_wrench)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_grasped_body_is_weighed_in_three_seconds_of_motion(sara, seed):
+    com = np.array([0.02, -0.01, 0.06])
+    motion = free_motion(carrying(sara, 0.8, tuple(com)), seconds=3.0, seed=seed, noise=0.05)
+    found = weigh_load(sara, [motion], LINK)
+    assert found.mass == pytest.approx(0.8, abs=max(4 * found.mass_error, 0.005))
+    assert found.mass_error < 0.02
+    np.testing.assert_allclose(found.com, com, atol=0.005)
+
+
+def test_an_empty_gripper_has_no_load(sara):
+    motion = free_motion(sara, seconds=3.0, noise=0.05)
+    with pytest.raises(InputError, match="no load on tool"):
+        weigh_load(sara, [motion], LINK)
+
+
+def test_weighing_names_what_is_wrong(sara):
+    motion = free_motion(sara, seconds=3.0)
+    with pytest.raises(InputError, match="unknown link 'claw'"):
+        weigh_load(sara, [motion], "claw")
+    with pytest.raises(InputError, match="no load on tool"):
+        weigh_load(sara, [], LINK)
