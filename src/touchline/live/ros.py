@@ -25,7 +25,7 @@ from touchline.suggest import did_you_mean, listing
 
 Array = NDArray[np.float64]
 
-DISCOVERY = 3.0  # s in which the topics have to appear
+DISCOVERY = 8.0  # s in which the topics have to appear: drivers start beside this program
 SETTLE = 0.2  # s between two looks at the topics
 DEPTH = 2000  # messages that wait for this program: two seconds at 1 kHz
 MOST = 256  # messages of a topic that are taken at once
