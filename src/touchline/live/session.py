@@ -264,5 +264,7 @@ def _times(samples: list[Sample]) -> np.ndarray:
 
 
 def _samples(samples: Iterable[Sample]) -> Samples:
-    columns = zip(*(tuple(sample) for sample in samples), strict=True)
-    return Samples(*(np.array(column) for column in columns))
+    time, q, qd, tau, wrench = (
+        np.array(column) for column in zip(*(tuple(sample) for sample in samples), strict=True)
+    )
+    return Samples(time=time, q=q, qd=qd, tau=tau, wrench=wrench)
