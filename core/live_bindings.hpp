@@ -36,7 +36,7 @@ namespace tl = touchline;
 using namespace nb::literals;
 
 // A pipeline in a thread of its own. Python takes of each sample: arrival, sequence, time, signals,
-// then the pipeline's snapshot.
+// ages, then the pipeline's snapshot.
 class Runner {
  public:
   Runner(pipelines::Pipeline& pipeline, std::size_t slots)
@@ -94,6 +94,7 @@ class Runner {
     out->push_back(static_cast<double>(arrived.sequence));
     out->push_back(arrived.time);
     out->insert(out->end(), arrived.signals.begin(), arrived.signals.end());
+    out->insert(out->end(), arrived.ages.begin(), arrived.ages.end());
     out->insert(out->end(), snapshot_.begin(), snapshot_.end());
     results_.publish();
   }
@@ -109,6 +110,65 @@ class Runner {
 
 #ifdef TOUCHLINE_SOCKETS
 
+// A thread that reads a socket until that ends, and gives all bytes that wait to `take`.
+class SocketReader {
+ public:
+  explicit SocketReader(int socket) : socket_(::dup(socket)) {}
+  SocketReader(const SocketReader&) = delete;
+  SocketReader& operator=(const SocketReader&) = delete;
+  ~SocketReader() { stop(); }
+
+  // `take(bytes, now)` erases from the front of `bytes` what it has used; false where they are not
+  // what was expected, which ends the thread with `wrong`.
+  template <class Take>
+  void start(std::vector<unsigned char> begun, const char* wrong, Take take) {
+    thread_ = std::thread([this, bytes = std::move(begun), wrong, take]() mutable {
+      work(bytes, wrong, take);
+    });
+  }
+
+  void stop() {
+    stopping_.store(true);
+    if (thread_.joinable()) thread_.join();
+    if (socket_ >= 0) ::close(socket_);
+    socket_ = -1;
+  }
+  // Empty while all is well.
+  std::string fault() const { return ended_.load() ? fault_ : std::string(); }
+
+ private:
+  static constexpr int kPatience = 20;         // [ms] after which the thread looks whether it shall end
+  static constexpr std::size_t kRead = 1 << 16;  // bytes at once
+
+  template <class Take>
+  void work(std::vector<unsigned char>& bytes, const char* wrong, Take& take) {
+    std::vector<unsigned char> read(kRead);
+    while (!stopping_.load()) {
+      if (!take(bytes, tl::monotonic_seconds())) return end(wrong);
+      pollfd wait{socket_, POLLIN, 0};
+      if (::poll(&wait, 1, kPatience) <= 0) continue;
+      const ssize_t got = ::recv(socket_, read.data(), read.size(), MSG_DONTWAIT);
+      if (got == 0) return end("it has closed the connection");
+      if (got < 0 && errno != EAGAIN && errno != EINTR) return end(std::strerror(errno));
+      if (got > 0) bytes.insert(bytes.end(), read.begin(), read.begin() + got);
+    }
+  }
+
+  void end(std::string why) {
+    fault_ = std::move(why);
+    ended_.store(true);
+  }
+
+  int socket_;
+  std::atomic<bool> stopping_{false}, ended_{false};
+  std::string fault_;  // written before `ended_` is set
+  std::thread thread_;
+};
+
+inline std::vector<unsigned char> bytes_of(const std::string& text) {
+  return {text.begin(), text.end()};
+}
+
 // Where the fields of an RTDE data package stand, in bytes behind its head; -1: not there.
 struct RtdeLayout {
   int recipe = 0;
@@ -122,57 +182,35 @@ struct RtdeLayout {
 // Reads the data packages of a controller in a thread of its own, until the socket ends.
 class RtdeReader {
  public:
-  RtdeReader(Runner& runner, int socket, RtdeLayout layout, std::string begun)
-      : runner_(runner), socket_(::dup(socket)), layout_(std::move(layout)),
-        buffer_(begun.begin(), begun.end()), thread_([this] { work(); }) {}
-  ~RtdeReader() { stop(); }
-
-  void stop() {
-    stopping_.store(true);
-    if (thread_.joinable()) thread_.join();
-    if (socket_ >= 0) ::close(socket_);
-    socket_ = -1;
+  RtdeReader(Runner& runner, int socket, RtdeLayout layout, const std::string& begun)
+      : runner_(runner), layout_(std::move(layout)), reader_(socket) {
+    reader_.start(bytes_of(begun), "it sends no RTDE any more",
+                  [this](std::vector<unsigned char>& bytes, double now) {
+                    return packages(bytes, now);
+                  });
   }
-  // Empty while all is well.
-  std::string fault() const { return ended_.load() ? fault_ : std::string(); }
+
+  void stop() { reader_.stop(); }
+  std::string fault() const { return reader_.fault(); }
 
  private:
-  static constexpr int kPatience = 20;  // [ms] after which the thread looks whether it shall end
-  static constexpr std::size_t kLongest = 4096, kRead = 1 << 16;  // bytes
-  static constexpr unsigned char kData = 'U', kText = 'M';
+  static constexpr std::size_t kLongest = 4096;  // bytes of a package
+  static constexpr unsigned char kData = 'U';
 
-  void work() {
-    std::vector<unsigned char> read(kRead);
-    while (!stopping_.load()) {
-      if (!packages(tl::monotonic_seconds())) return end("it sends no RTDE any more");
-      pollfd wait{socket_, POLLIN, 0};
-      if (::poll(&wait, 1, kPatience) <= 0) continue;
-      const ssize_t got = ::recv(socket_, read.data(), read.size(), MSG_DONTWAIT);
-      if (got == 0) return end("it has closed the connection");
-      if (got < 0 && errno != EAGAIN && errno != EINTR) return end(std::strerror(errno));
-      if (got > 0) buffer_.insert(buffer_.end(), read.begin(), read.begin() + got);
-    }
-  }
-
-  void end(std::string why) {
-    fault_ = std::move(why);
-    ended_.store(true);
-  }
-
-  // Takes whole packages from the front of the buffer; false where they are none of RTDE.
-  bool packages(double now) {
+  // Takes whole packages from the front; false where they are none of RTDE.
+  bool packages(std::vector<unsigned char>& bytes, double now) {
     std::size_t at = 0;
     bool good = true;
-    while (good && buffer_.size() - at >= 3) {
-      const std::size_t size = buffer_[at] * 256u + buffer_[at + 1];
+    while (good && bytes.size() - at >= 3) {
+      const std::size_t size = bytes[at] * 256u + bytes[at + 1];
       if (size < 3 || size > kLongest) good = false;
-      if (!good || buffer_.size() - at < size) break;
-      const unsigned char* payload = buffer_.data() + at + 3;
-      if (buffer_[at + 2] == kData && size - 3 == layout_.size && payload[0] == layout_.recipe)
+      if (!good || bytes.size() - at < size) break;
+      const unsigned char* payload = bytes.data() + at + 3;
+      if (bytes[at + 2] == kData && size - 3 == layout_.size && payload[0] == layout_.recipe)
         sample(payload, now);
       at += size;
     }
-    buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(at));
+    bytes.erase(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(at));
     return good;
   }
 
@@ -216,12 +254,85 @@ class RtdeReader {
   }
 
   Runner& runner_;
-  int socket_;
   RtdeLayout layout_;
-  std::vector<unsigned char> buffer_;
-  std::atomic<bool> stopping_{false}, ended_{false};
-  std::string fault_;  // written before `ended_` is set
-  std::thread thread_;
+  SocketReader reader_;  // last: its thread uses the others
+};
+
+// Reads the samples of another process of this machine, and keeps what else it tells: frames of
+// size (4 bytes), kind (1 byte) and payload, in this machine's byte order. A sample's payload is
+// sequence, arrival, time, signals and ages as doubles.
+class FrameReader {
+ public:
+  FrameReader(Runner& runner, int socket, const std::string& begun) : runner_(runner), reader_(socket) {
+    reader_.start(bytes_of(begun), "the reading process has sent something else than frames",
+                  [this](std::vector<unsigned char>& bytes, double) { return frames(bytes); });
+  }
+
+  void stop() { reader_.stop(); }
+  std::string fault() const { return reader_.fault(); }
+
+  // What else was told since the last call: kind and payload, one after the other.
+  nb::list told() {
+    std::vector<std::vector<unsigned char>> told;
+    {
+      const std::lock_guard<std::mutex> lock(telling_);
+      told.swap(told_);
+    }
+    nb::list out;
+    for (const std::vector<unsigned char>& frame : told)
+      out.append(nb::bytes(reinterpret_cast<const char*>(frame.data()), frame.size()));
+    return out;
+  }
+
+ private:
+  static constexpr std::size_t kHead = 4, kLongest = 1 << 20;  // bytes
+  static constexpr std::size_t kMostTold = 4096;  // frames that wait for Python
+  static constexpr unsigned char kSample = 'S';
+
+  // Takes whole frames from the front; false where they are none.
+  bool frames(std::vector<unsigned char>& bytes) {
+    std::size_t at = 0;
+    bool good = true;
+    while (good && bytes.size() - at >= kHead) {
+      std::uint32_t size;
+      std::memcpy(&size, bytes.data() + at, kHead);
+      good = size >= 1 && size <= kLongest;
+      if (!good || bytes.size() - at - kHead < size) break;
+      const unsigned char* frame = bytes.data() + at + kHead;
+      good = frame[0] != kSample ? tell(frame, size) : sample(frame + 1, size - 1);
+      at += kHead + size;
+    }
+    bytes.erase(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(at));
+    return good;
+  }
+
+  bool tell(const unsigned char* frame, std::size_t size) {
+    const std::lock_guard<std::mutex> lock(telling_);
+    if (told_.size() == kMostTold) told_.erase(told_.begin());
+    told_.emplace_back(frame, frame + size);
+    return true;
+  }
+
+  bool sample(const unsigned char* payload, std::size_t size) {
+    const std::size_t signals = 3 * runner_.joints() + 6 * runner_.sensors();
+    if (size != sizeof(double) * (3 + signals + runner_.sensors())) return false;
+    double head[3];
+    std::memcpy(head, payload, sizeof head);
+    runner_.push(head[2], [&](tl::Arrived& slot) {
+      slot.sequence = std::llround(head[0]);
+      slot.arrival = head[1];
+      slot.time = head[2];
+      std::memcpy(slot.signals.data(), payload + sizeof head, sizeof(double) * signals);
+      std::memcpy(slot.ages.data(), payload + sizeof head + sizeof(double) * signals,
+                  sizeof(double) * runner_.sensors());
+    });
+    return true;
+  }
+
+  Runner& runner_;
+  std::mutex telling_;
+  std::vector<std::vector<unsigned char>> told_;
+  SocketReader reader_;  // last: its thread uses the others
 };
 
 #endif
@@ -266,6 +377,16 @@ inline void bind(nb::module_& m) {
           "runner"_a, "socket"_a, "layout"_a, "begun"_a, nb::keep_alive<1, 2>())
       .def_prop_ro("fault", &RtdeReader::fault)
       .def("stop", &RtdeReader::stop, nb::call_guard<nb::gil_scoped_release>());
+  nb::class_<FrameReader>(m, "FrameReader")
+      .def(
+          "__init__",
+          [](FrameReader* self, Runner& runner, int socket, const nb::bytes& begun) {
+            new (self) FrameReader(runner, socket, std::string(begun.c_str(), begun.size()));
+          },
+          "runner"_a, "socket"_a, "begun"_a, nb::keep_alive<1, 2>())
+      .def("told", &FrameReader::told)
+      .def_prop_ro("fault", &FrameReader::fault)
+      .def("stop", &FrameReader::stop, nb::call_guard<nb::gil_scoped_release>());
 #endif
 }
 

@@ -254,14 +254,14 @@ def test_a_stall_of_python_costs_no_sample_and_no_time(arm, samples):
         stalls, gaps = [], []
 
         def each(session):
-            runner = session.connection.source._runner
-            if runner is None or session.samples < 600 or stalls:
+            felt = session.connection.source._felt
+            if felt is None or session.samples < 600 or stalls:
                 return
-            before = runner.taken
-            runner.longest_gap()
+            before = felt.runner.taken
+            felt.runner.longest_gap()
             hold(300_000)
-            stalls.append(runner.taken - before)
-            gaps.append(runner.longest_gap())
+            stalls.append(felt.runner.taken - before)
+            gaps.append(felt.runner.longest_gap())
 
         seen = watch(arm, controller.address, duration=2.5, each=each)
     assert stalls[0] > 75  # of 150; on a quiet machine all of them

@@ -99,6 +99,7 @@ struct Arrived {
   long long sequence = 0;  // its number at the source
   double time = 0.0;       // [s] of the sensors' clock
   std::vector<double> signals;  // q (n), qd (n), tau (n), wrench (k, 6)
+  std::vector<double> ages;     // (k) how much older than `time` each wrench is [s]
 
   Sample sample(std::size_t joints) const {
     const double* q = signals.data();
@@ -113,7 +114,7 @@ class Runner {
 
   // `slots` samples may wait. `take` is called in the runner's thread and must not throw.
   Runner(std::size_t joints, std::size_t sensors, std::size_t slots, Take take)
-      : ring_(slots, blank(3 * joints + 6 * sensors)), take_(std::move(take)), thread_([this] { work(); }) {}
+      : ring_(slots, blank(3 * joints + 6 * sensors, sensors)), take_(std::move(take)), thread_([this] { work(); }) {}
 
   Runner(const Runner&) = delete;
   Runner& operator=(const Runner&) = delete;
@@ -149,9 +150,10 @@ class Runner {
   // A wake-up that comes between a look at the ring and the wait is made up for after so long.
   static constexpr std::chrono::microseconds kNap{200};
 
-  static Arrived blank(std::size_t signals) {
+  static Arrived blank(std::size_t signals, std::size_t sensors) {
     Arrived made;
     made.signals.assign(signals, 0.0);
+    made.ages.assign(sensors, 0.0);
     return made;
   }
 

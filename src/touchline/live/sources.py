@@ -3,6 +3,7 @@
 
 from collections.abc import Callable
 
+from touchline.live.aside import ReadAside
 from touchline.live.connection import Connection
 from touchline.live.source import Address, Source, parse_address
 from touchline.model.robot import Robot, load_robot
@@ -50,11 +51,33 @@ SCHEMES: dict[str, tuple[str, Callable[[Address, Robot], Source]]] = {
 def make_source(source: str, robot: Robot) -> Source:
     """The source of an address, not opened yet.
 
+    What is read by Python code of others (ROS 2, Franka's library) is read in a process of its
+    own, so that nothing this program does costs a sample.
+
     Raises:
         InputError: the address is of no known kind, or cannot be a source of this robot.
     """
-    address = parse_address(source, {name: form for name, (form, _) in SCHEMES.items()})
+    address = _parsed(source)
+    if address.scheme == "ros2":
+        return ReadAside(source, robot, ("joints", *robot.sensor_names))
+    own = own_source(source, robot)
+    if address.scheme == "franka":
+        return ReadAside(source, robot, tuple(s.name for s in own.streams), own.period)
+    return own
+
+
+def own_source(source: str, robot: Robot) -> Source:
+    """The same, to be read by this process.
+
+    Raises:
+        InputError: as `make_source`.
+    """
+    address = _parsed(source)
     return SCHEMES[address.scheme][1](address, robot)
+
+
+def _parsed(source: str) -> Address:
+    return parse_address(source, {name: form for name, (form, _) in SCHEMES.items()})
 
 
 def connect(source: str, robot: Robot | str) -> Connection:

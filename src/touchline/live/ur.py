@@ -2,12 +2,12 @@
 """`ur://HOST`: a Universal Robots arm, read over RTDE at up to 500 Hz."""
 
 import time
-from typing import Any
 
 import numpy as np
 
 from touchline.errors import InputError
 from touchline.live.rtde import PORT, Recipe, Rtde
+from touchline.live.runner import Felt
 from touchline.live.sample import Sample, make_sample, on_nanoseconds
 from touchline.live.source import Address, LinkLost
 from touchline.live.streams import Stream
@@ -17,8 +17,6 @@ from touchline.pipeline.pipeline import Pipeline
 
 FREQUENCY = 500.0  # Hz; that of an e-Series controller
 JOINTS = 6
-SLOTS = 8192  # samples that may wait for Python: 16 s at 500 Hz
-POLL = 5e-4  # s between two looks at what the native threads have left
 SILENCE = 2.0  # s after which a connection that still stands is given up
 TIME, POSITION, VELOCITY = "timestamp", "actual_q", "actual_qd"
 TORQUES, CURRENTS = "actual_current_as_torque", "actual_current"
@@ -54,8 +52,7 @@ class UrArm:
         self.period: float | None = 1.0 / self._frequency
         self.streams = (Stream("rtde", self.period),)
         self._link: Rtde | None = None
-        self._pipeline: Any = None
-        self._runner: core.Runner | None = None
+        self._felt: Felt | None = None
         self._reader: core.RtdeReader | None = None
         self._first: float | None = None  # the first time stamp, from which samples are counted
         self._sequence = 0
@@ -115,13 +112,13 @@ class UrArm:
 
     def attach(self, pipeline: Pipeline) -> None:
         """From now on the link is read and the pipeline runs in native threads."""
-        if self._runner is not None:  # another pipeline: the link begins anew with it
+        if self._felt is not None:  # another pipeline: the link begins anew with it
             self.close()
-        self._pipeline, self._runner = pipeline, pipeline.beside(SLOTS)
+        self._felt = Felt(self._robot, pipeline)
         self._hand_over()
 
     def _hand_over(self) -> None:
-        if self._link is None or self._runner is None:
+        if self._link is None or self._felt is None:
             return
         layout = core.RtdeLayout()
         recipe = self._recipe
@@ -131,7 +128,7 @@ class UrArm:
         layout.wrench = recipe.offset(self._wrench)
         layout.measured = [joint.measured for joint in self._robot.description.joints]
         layout.frequency, layout.first = self._frequency, self._first or 0.0
-        self._reader = core.RtdeReader(self._runner, *self._handed(layout))
+        self._reader = core.RtdeReader(self._felt.runner, *self._handed(layout))
 
     def _handed(self, layout: core.RtdeLayout) -> tuple[int, core.RtdeLayout, bytes]:
         assert self._link is not None
@@ -142,8 +139,8 @@ class UrArm:
         """The samples that have come; with results where a pipeline is attached."""
         if self._link is None:
             raise LinkLost("the link begins anew")
-        if self._runner is not None:
-            return self._felt(timeout)
+        if self._felt is not None:
+            return self._read_felt(self._felt, timeout)
         payloads = self._link.receive(timeout)
         now = time.monotonic()
         if payloads:
@@ -153,14 +150,15 @@ class UrArm:
         found = (self._recipe.read(payload) for payload in payloads)
         return [self._sample(values, now) for values in found if values is not None]
 
-    def _felt(self, timeout: float) -> list[Sample]:
+    def _read_felt(self, felt: Felt, timeout: float) -> list[Sample]:
         """What the native threads have left."""
-        assert self._runner is not None and self._link is not None and self._reader is not None
-        end = time.monotonic() + timeout
-        while self._runner.idle and time.monotonic() < end:
-            time.sleep(POLL)
-        found = [self._named(numbers) for numbers in self._runner.results()]
-        self.streams[0].refused = self._runner.refused
+        assert self._link is not None and self._reader is not None
+        found = felt.read(timeout)
+        for sample in found:
+            self._count(
+                sample.time, sample.arrival, sample.sequence, bool(np.isfinite(sample.q).all())
+            )
+        self.streams[0].refused = felt.runner.refused
         if found:
             self._heard = found[-1].arrival
         elif self._reader.fault:
@@ -168,17 +166,6 @@ class UrArm:
         elif time.monotonic() - self._heard > SILENCE:
             raise LinkLost(f"nothing came from {self._link.peer} for {SILENCE:g} s")
         return found
-
-    def _named(self, numbers: np.ndarray) -> Sample:
-        """A sample and its result from a row of the native threads."""
-        n, k = len(self._robot.joint_names), len(self._robot.sensor_names)
-        arrival, number, at = (float(x) for x in numbers[:3])
-        q, qd, tau, wrench, rest = np.split(numbers[3:], [n, 2 * n, 3 * n, 3 * n + 6 * k])
-        self._count(at, arrival, int(number), bool(np.isfinite(q).all()))
-        result = self._pipeline.result(rest)
-        return Sample(
-            at, q, qd, tau, wrench.reshape(k, 6), arrival, int(number), np.zeros(k), result
-        )
 
     def _count(self, at: float, arrival: float, number: int, valid: bool) -> None:
         lost = max(number - self._sequence - 1, 0) if self.streams[0].received else 0
