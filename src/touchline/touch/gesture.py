@@ -7,8 +7,11 @@ from math import erf, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.touch.grip import CLEAR, MISS
+
 Array = NDArray[np.float64]
 
+SHORTEST = 0.03  # s; no finger presses for less: what is as short is a doubt of the localizer
 TAP = 0.3  # s; a shorter press is a tap
 HOLD = 1.0  # s; a longer one a hold, told while it lasts
 AGAIN = 0.3  # s, from the end of one tap to the beginning of the next in a double tap
@@ -16,7 +19,9 @@ NEARBY = 0.05  # m, between the two taps of a double tap
 SWIPE = 0.03  # m; a finger that gets farther than this swipes
 TIMING = 0.03  # s, 1 sigma: how exactly beginning and end of a press are known
 TRAVEL = 0.005  # m, 1 sigma, of the way between two places of one finger
-PRESS = 0.5  # of the peak force so far: below it the finger has lifted
+PRESS = 0.5  # of the peak force so far: below it the finger lifts or eases
+LIFTED = 0.25  # of the peak force: below it the finger has lifted
+EASING = 0.08  # s between both levels: a finger that takes as long presses on with less
 GRAB = 0.1  # s; two fingers from opposite sides for as long are a hand
 OPPOSITE = -0.5  # cosine between their forces
 CLAMPED = 0.95  # probability of a hand where the pipeline says so (docs/reaction.md)
@@ -35,6 +40,7 @@ class Finger:
         first, last: (3,) places in the link's frame [m]; None where they are not told.
         collision: whether it was a blow, or too strong for a command.
         widget: name of the widget it is on.
+        grip: by how much a second push misses it [m] (`Grip`); 0 where there is none.
     """
 
     event: int
@@ -51,6 +57,7 @@ class Finger:
     collision: bool = False
     clamped: bool = False
     widget: str | None = None
+    grip: float = 0.0
     told: set[str] = field(default_factory=set)
 
     def duration(self, time: float) -> float:
@@ -82,6 +89,7 @@ class GestureReader:
 
     def __init__(self) -> None:
         self._waiting: list[tuple[Finger, float]] = []  # taps that may become double taps
+        self._held: dict[str | None, float] = {}  # segments that a hand holds; when last touched
 
     def follow(self, fingers: list[Finger], time: float) -> list[Gesture]:
         """Takes the fingers of one sample, those that lifted just now included."""
@@ -99,6 +107,8 @@ class GestureReader:
         if finger.lifted is None:
             if length >= HOLD and moved < 0.5:
                 return [_tell("hold", finger, time, (1 - moved) * _beyond(length - TAP, TIMING))]
+            return []
+        if length < SHORTEST:
             return []
         if moved >= 0.5:
             return [_tell("swipe", finger, time, moved)]
@@ -127,21 +137,30 @@ class GestureReader:
         return found
 
     def _grabs(self, fingers: list[Finger], time: float) -> list[Gesture]:
-        """A hand around a link: the pipeline calls it clamped, or two fingers oppose each other."""
+        """A hand around a link: felt as such, called clamped, or two fingers that oppose."""
+        for segment in dict.fromkeys(finger.segment for finger in fingers):
+            if segment in self._held:
+                self._held[segment] = time
+        self._held = {name: last for name, last in self._held.items() if time - last < AGAIN}
         found = []
         for segment in dict.fromkeys(finger.segment for finger in fingers):
             hand = [finger for finger in fingers if finger.segment == segment]
-            if any("grab" in finger.told for finger in hand):
+            if segment in self._held:
                 for finger in hand:  # one that joins belongs to the hand
                     finger.told.add("grab")
                 continue
             lasting = max((_opposed_for(a, b, time) for a in hand for b in hand), default=0.0)
             clamped = any(finger.clamped for finger in hand)
-            if lasting < GRAB and not (clamped and hand[0].duration(time) >= GRAB):
+            gripped = max(finger.grip for finger in hand)
+            if lasting < GRAB and not gripped and not (clamped and hand[0].duration(time) >= GRAB):
                 continue
             for finger in hand[1:]:
                 finger.told.add("grab")
+            self._held[segment] = time
+            self._waiting = [tap for tap in self._waiting if tap[0].segment != segment]
             sure = _beyond(lasting - TIMING, TIMING)
+            if gripped:
+                sure = max(sure, _beyond(gripped - MISS, CLEAR))
             found.append(_tell("grab", hand[0], time, max(sure, CLAMPED if clamped else 0.0)))
         return found
 

@@ -15,7 +15,9 @@ from touchline.model.robot import Robot
 from touchline.pipeline.result import Result
 from touchline.result.contact import Contact
 from touchline.suggest import unknown
-from touchline.touch.gesture import PRESS, Finger, GestureReader
+from touchline.touch.gesture import EASING, LIFTED, PRESS, Finger, GestureReader
+from touchline.touch.grip import Grip
+from touchline.touch.slide import STEPS, Rows, Slide
 from touchline.touch.spot import TorqueSpots
 from touchline.touch.stroke import Stroke
 from touchline.touch.widget import Widget
@@ -30,6 +32,7 @@ GESTURE_MOST = 60.0  # N; what presses harder means no gesture
 BEFORE = 0.3, 0.03  # s: from when to when before a touch its torques are taken as those at rest
 AVERAGE = 0.03  # s, over which the place of a press is averaged
 STROKE_LEAST = 0.01  # m; a shorter way on a pad is a press, no stroke
+BESIDE = 0.1  # s; another contact that began later has to last as long to be more than a doubt
 KEPT = 1000  # events and strokes that are kept; the oldest go
 
 
@@ -75,6 +78,9 @@ class _Press:
     trace: list[tuple[float, float, float, float]] = field(default_factory=list)
     value: float | None = None
     turned: float = 0.0
+    easing: float | None = None  # since when the force falls
+    grip: Grip = field(default_factory=Grip)
+    before: Array | None = None  # `Rows` of its segment (6 + n,), before it landed
 
 
 class Touch:
@@ -107,6 +113,12 @@ class Touch:
         self._gestures = GestureReader()
         self._presses: dict[int, _Press] = {}
         self._rest: deque[tuple[float, Array]] = deque()
+        self._slides = {
+            widget.name: _slide(robot, self._patches[widget.link], widget)
+            for widget in self.widgets.values()
+            if widget.kind == "slider" and widget.link in self._patches
+        }
+        self._past: deque[tuple[float, Result]] = deque()
 
     def on(self, name: str, callback: Callback | None = None) -> Any:
         """Calls `callback(event)` for a widget or a gesture; without one a decorator.
@@ -130,15 +142,20 @@ class Touch:
         time, q = result.time, np.asarray(result.q, float)
         found: list[TouchEvent] = []
         torque = result.estimate.tau_ext
-        if not result.contacts and not self._presses:
+        contacts = result.contacts
+        if not contacts and not self._presses:
             self._rest.append((time, torque))
             while self._rest[0][0] < time - BEFORE[0]:
                 self._rest.popleft()
-        poses = self.robot.poses(q) if result.contacts else None
+        if self._slides:
+            self._past.append((time, result))
+            while self._past[0][0] < time - BEFORE[0]:
+                self._past.popleft()
+        poses = self.robot.poses(q) if contacts else None
         seen = set()
-        for contact in result.contacts:
+        for contact in contacts:
             seen.add(contact.event)
-            found += self._follow(contact, time, q, torque, poses)
+            found += self._follow(contact, result, q, torque, poses)
         for number in [n for n in self._presses if n not in seen]:
             found += self._lift(self._presses[number], time)
         fingers = [press.finger for press in self._presses.values()]
@@ -166,19 +183,20 @@ class Touch:
         ]
         return min(inside)[1] if inside and min(inside)[0] <= 0.0 else None
 
-    def _follow(self, contact: Contact, time, q, torque, poses) -> list[TouchEvent]:
+    def _follow(self, contact: Contact, result: Result, q, torque, poses) -> list[TouchEvent]:
+        time = result.time
         press = self._presses.get(contact.event)
         size = contact.size
         if press is None:
             press = self._begin(contact, time, torque)
         finger = press.finger
+        beside = self._beside(press, result, poses)
+        if beside is not None:
+            size = float(np.linalg.norm(beside[1]))
         if size == 0.0:  # joint torques alone: their step stands for the force
             size = float(np.linalg.norm(np.nan_to_num(torque - press.resting)))
         if finger.lifted is not None:
-            if size < PRESS * finger.peak or "again" in finger.told:
-                return []
-            if size < 1.5 * finger.now:  # still falling, or resting on the surface
-                finger.now = min(finger.now, size)
+            if size < PRESS * finger.peak:  # it rests on the surface
                 return []
             press = self._begin(contact, time, press.resting, keep=True)
             finger = press.finger
@@ -190,12 +208,24 @@ class Touch:
         finger.clamped |= bool(contact.clamped)
         finger.force = contact.force
         if size < PRESS * finger.peak:
-            return self._lift(press, time)
+            return self._ease(press, time)
+        press.easing = None
         press.steps.append(torque - press.resting)
         self._place(press, contact, time, poses)
         if press.widget is not None:
-            return self._use(press, time, torque)
+            return self._use(press, time, None if beside is None else beside[0])
         return self._choose(press, contact, time, q)
+
+    def _ease(self, press: _Press, time: float) -> list[TouchEvent]:
+        """The force falls: the finger lifts, or presses on with less."""
+        finger = press.finger
+        if press.easing is None:
+            press.easing = time
+        if finger.now < LIFTED * finger.peak:
+            return self._lift(press, time)
+        if time - press.easing >= EASING:
+            finger.peak, press.easing = finger.now, None
+        return []
 
     def _begin(self, contact: Contact, time: float, torque: Array, keep: bool = False) -> _Press:
         resting = torque
@@ -205,6 +235,9 @@ class Touch:
             resting = np.mean(early, axis=0) if early else np.zeros_like(torque)
         finger = Finger(contact.event, time, segment=contact.segment)
         press = _Press(finger, np.asarray(resting))
+        early = [past for at, past in self._past if at <= time - BEFORE[1]]
+        if early and not keep:
+            press.before = np.mean([self._rows(past, contact.segment) for past in early], axis=0)
         self._presses[contact.event] = press
         return press
 
@@ -216,8 +249,12 @@ class Touch:
         point = in_link(patch, poses[patch.node], contact.position)
         if contact.link != finger.link:
             press.places.clear()
+            press.grip = Grip()
             finger.link, finger.first, finger.far = contact.link, None, 0.0
         press.places.append((time, point, contact.position_std or 0.0))
+        if contact.wrench is not None and press.grip.due(time):
+            wrench = _in(poses[patch.node] @ patch.T_node_link, contact.wrench)
+            finger.grip = max(finger.grip, press.grip.follow(time, wrench, point))
         while press.places[0][0] < time - AVERAGE:
             press.places.popleft()
         if time - finger.begun >= DWELL / 2:
@@ -243,7 +280,7 @@ class Touch:
             self.values[widget.name] = not self.values[widget.name]
             value = self.values[widget.name]
             found.append(self._event("toggle", press, time, value, probability))
-        return found + self._use(press, time, None)
+        return found + self._use(press, time)
 
     def _on_widget(self, press: _Press, q: Array, time: float) -> tuple[Widget | None, float]:
         finger = press.finger
@@ -265,7 +302,38 @@ class Touch:
                 return self.widgets[name], probability
         return None, 0.0
 
-    def _use(self, press: _Press, time: float, torque: Array | None) -> list[TouchEvent]:
+    def _beside(self, press: _Press, result: Result, poses) -> tuple[float, Array] | None:
+        """Way and force (3,) of a slider's finger where others touch its segment, too."""
+        widget, finger = press.widget, press.finger
+        if widget is None or widget.name not in self._slides or press.before is None:
+            return None
+        others = []
+        for contact in result.contacts:
+            other = self._presses.get(contact.event)
+            if other is None or other is press or contact.segment != finger.segment:
+                continue
+            newer = other.finger.begun > finger.begun
+            if newer and other.finger.duration(result.time) < BESIDE:
+                continue
+            if contact.link in self._patches and contact.position is not None:
+                node = self._patches[contact.link].node
+                force = np.zeros(3) if contact.force is None else contact.force
+                others.append((node, contact.position, force, newer))
+        if not others:
+            return None
+        alone = all(contact.segment == finger.segment for contact in result.contacts)
+        change = self._rows(result, finger.segment, alone) - press.before
+        return self._slides[widget.name].at(poses, change, others)
+
+    def _rows(self, result: Result, segment: str | None, alone: bool = True) -> Array:
+        """What a segment's sensor and the joints show (6 + n,); joints only if all is on it."""
+        torque = result.estimate.tau_ext
+        wrench = np.full(6, np.nan)
+        if segment in self.robot.segment_names:
+            wrench = result.estimate.segment_wrench[self.robot.segment_names.index(segment)]
+        return Rows(wrench, torque if alone else np.full_like(torque, np.nan)).values()
+
+    def _use(self, press: _Press, time: float, way: float | None = None) -> list[TouchEvent]:
         """What a pressed slider, dial or pad reports."""
         widget, finger = press.widget, press.finger
         if widget is None or finger.last is None or not press.places:
@@ -276,7 +344,7 @@ class Touch:
         if widget.kind == "pad" and isinstance(reading.value, tuple):
             press.trace.append((time, *reading.value, finger.now))
             return []
-        mean = widget.read(finger.last).value
+        mean = widget.read(finger.last).value if way is None else way
         if widget.kind == "slider" and isinstance(mean, float):
             value = widget.scaled(mean)
         elif widget.kind == "dial" and isinstance(mean, float):
@@ -295,7 +363,7 @@ class Touch:
         finger, widget = press.finger, press.widget
         if finger.lifted is not None:
             return []
-        finger.lifted = time
+        finger.lifted = time if press.easing is None else press.easing
         if widget is None:
             return []
         found = [self._event("release", press, time, self.values.get(widget.name))]
@@ -336,6 +404,13 @@ def _widget(name: str, given, patches) -> Widget:
     return Widget(name, given, normal)
 
 
+def _slide(robot: Robot, patch, widget: Widget) -> Slide:
+    T = patch.T_node_link
+    points = np.array([widget.point_at(i / STEPS) for i in range(STEPS + 1)])
+    sensor = patch.segment if patch.segment in robot.sensor_names else None
+    return Slide(robot, patch.node, points @ T[:3, :3].T + T[:3, 3], sensor)
+
+
 def mean_normal(patch, at: Array, radius: float) -> Array:
     """The outward normal (3,) of a link's surface around a place, in the link's frame.
 
@@ -349,3 +424,10 @@ def mean_normal(patch, at: Array, radius: float) -> Array:
     total = (surface.normals[near] * surface.areas[near, None]).sum(axis=0)
     length = float(np.linalg.norm(total))
     return total / length if length > 0.0 else nearest
+
+
+def _in(frame: Array, wrench: Array) -> Array:
+    """A wrench (6,) in world about its origin, in the axes and about the origin of a frame."""
+    R, p = frame[:3, :3], frame[:3, 3]
+    force = wrench[:3]
+    return np.concatenate([force @ R, (wrench[3:] - np.cross(p, force)) @ R])

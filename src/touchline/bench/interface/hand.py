@@ -38,7 +38,12 @@ class Finger:
 
 
 def find_pad(
-    skin: Skin, links: tuple[str, ...], width: float, height: float, rng: np.random.Generator
+    skin: Skin,
+    links: tuple[str, ...],
+    width: float,
+    height: float,
+    rng: np.random.Generator,
+    posture: Array | None = None,
 ) -> tuple[Array, Patch, WidgetDescription]:
     """A random place for a pad that a finger can reach in a random posture.
 
@@ -48,12 +53,13 @@ def find_pad(
         width: along its u [m].
         height: along its v [m].
         rng: source of chance.
+        posture: joint positions (n,) [rad or m]; default: random ones.
 
     Returns:
         Joint positions (n,), the link's surface, and the pad.
     """
     patches = [patch for patch in skin.patches if patch.link in links and patch.segment]
-    q = rng.uniform(*skin.robot.ranges)
+    q = rng.uniform(*skin.robot.ranges) if posture is None else posture
     while True:
         patch = patches[rng.integers(len(patches))]
         surface = patch.surface
@@ -71,7 +77,7 @@ def find_pad(
             continue
         if _reachable(skin, q, patch, given, corners):
             return q, patch, given
-        q = rng.uniform(*skin.robot.ranges)
+        q = rng.uniform(*skin.robot.ranges) if posture is None else posture
 
 
 def project(patch: Patch, given: WidgetDescription, way: Array) -> tuple[Array, Array] | None:
@@ -157,6 +163,43 @@ def sliding(
     drag = friction * speed / np.maximum(size, 1e-3)
     pressed = (force * rising(time, begin, end))[:, None]
     return Finger(patch.link, points, pressed * (drag - normals))
+
+
+def press(
+    point: Array, normal: Array, link: str, time: Array, begin: float, end: float, force: float
+) -> Finger:
+    """A finger that presses at a place (3,) against its outward normal (3,), in the link's frame.
+
+    Args:
+        point: [m].
+        normal: unit vector.
+        link: that is pressed.
+        time: (N,) of all samples [s].
+        begin: when it lands; it lifts at `end` [s].
+        end: see `begin`.
+        force: [N].
+    """
+    size = (force * rising(time, begin, end))[:, None]
+    return Finger(link, np.tile(point, (len(time), 1)), -size * normal)
+
+
+def middle_of(patch: Patch, given: WidgetDescription) -> tuple[Array, Array]:
+    """Place (3,) [m] and outward normal (3,) in the middle of a pad, in the link's frame."""
+    placed = project(patch, given, np.zeros((1, 2)))
+    assert placed is not None  # `find_pad` looked there
+    return placed[0][0], placed[1][0]
+
+
+def reaching(part: float) -> float:
+    """How long a landing finger takes to a part of its force [s]."""
+    return float(np.arccos(1 - 2 * min(part, 1.0)) / np.pi * LANDING)
+
+
+def times(delays: list[float]) -> str:
+    """Median and 99th percentile of delays [s], in ms."""
+    if not delays:
+        return "-"
+    return f"{1e3 * np.median(delays):.0f}, {1e3 * np.percentile(delays, 99):.0f} ms"
 
 
 def signals_of(
