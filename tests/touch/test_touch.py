@@ -137,3 +137,34 @@ def test_a_written_sign_is_read(arm):
         assert finger is not None
         touch, _ = felt(robot, skin, {"page": replace(given, size=(0.07, 0.07))}, [finger], q)
         assert recognizer.read(touch.strokes[-1].cleaned())[0][0] == sign
+
+
+@pytest.fixture(scope="module")
+def torques_alone():
+    full = tl.load_robot("sara-full")
+    robot = Robot(replace(full.description, sensors=()), full.mechanism)
+    return robot, Skin(robot)
+
+
+def test_a_spot_taught_by_torques_is_told_from_another_place(torques_alone):
+    robot, skin = torques_alone
+    q, patch, given = pad_of(skin, 6)
+    other = find_pad(skin, ("link2", "link3"), 0.02, 0.02, np.random.default_rng(1), q)[1:]
+    begins = (0.3, 0.95, 1.6)
+    rng = np.random.default_rng(0)
+
+    def signals(place):
+        fingers = [pressing(*place, 0.0, begin, begin + 0.35) for begin in begins]
+        return signals_of(robot, q, fingers, TIME, 0.0, rng, rng)
+
+    s = signals((patch, given))
+    lesson = teach(robot, s.time, s.q, s.qd, s.tau, s.wrench)
+    assert lesson.touches == 3 and lesson.scatter < 0.02
+    taught = Robot(replace(robot.description, interface={"go": lesson.widget}), robot.mechanism)
+    for place, expected in (((patch, given), ["go"] * 3), (other, [])):
+        s = signals(place)
+        pipeline, touch = tl.Pipeline(taught, skin=skin), Touch(taught, skin)
+        for row in zip(s.time, s.q, s.qd, s.tau, s.wrench, strict=True):
+            touch.update(pipeline.update(*row))
+        assert [e.widget for e in touch.events if e.kind == "press"] == expected
+        assert len(touch.steps) == 3

@@ -14,14 +14,15 @@ from touchline.model.robot import Robot
 from touchline.pipeline.pipeline import Pipeline
 from touchline.result.event import Event
 from touchline.touch.spot import LEAST_STEP, POSTURE
-from touchline.touch.touch import BEFORE
+from touchline.touch.touch import TorqueStep, Touch
 
 Array = NDArray[np.float64]
 
 RADIUS = 0.02  # m, of a button about a fingertip's place at least
 SCATTER = 3.0  # standard deviations of the taught places that a button holds
 APART = 0.05  # m; touches farther from their middle do not mean one place
-STRONG = 0.5  # of a touch's largest torque; weaker samples are its beginning and end
+STRONG = 0.25  # of the largest torque step; what is weaker was not meant as a touch
+NO_TOUCH = "the recording holds no touch: touch the spot three times, 1 s apart"
 
 
 @dataclass(frozen=True)
@@ -68,12 +69,23 @@ def teach(
     """
     period = float(np.median(np.diff(time))) if len(time) > 1 else 1e-3
     pipeline = Pipeline(robot, period=period)
-    estimate, _ = pipeline.run(time, q, qd, tau, wrench)
-    events = pipeline.events[:touches]
-    if not events:
-        raise InputError("the recording holds no touch: touch the spot three times, 1 s apart")
     if not robot.sensor_names:
-        return _directions(time, np.asarray(q, float), estimate.tau_ext, events, kind)
+        touch = Touch(robot, pipeline.skin)
+        for sample in zip(time, q, qd, tau, wrench, strict=True):
+            touch.update(pipeline.update(*sample))
+        return lesson_of_steps(list(touch.steps), kind, touches)
+    pipeline.run(time, q, qd, tau, wrench)
+    return lesson_of_events(pipeline.events[:touches], kind)
+
+
+def lesson_of_events(events: Sequence[Event], kind: str = "button") -> Lesson:
+    """A button or toggle where these touches were located.
+
+    Raises:
+        InputError: there are none, or they are not at one place.
+    """
+    if not events:
+        raise InputError(NO_TOUCH)
     located = [e for e in events if e.status == "located" and e.link is not None]
     if len(located) < len(events):
         named = ", ".join(f"{e.detected:.2f} s ({e.status})" for e in events if e not in located)
@@ -105,25 +117,6 @@ def as_yaml(widget: WidgetDescription, known: WidgetDescription | None = None) -
     return {**entry, "taught": taught}
 
 
-def torque_step(time: Array, tau_ext: Array, event: Event) -> Array:
-    """The change of the external torques (n,) [Nm] that a touch brought.
-
-    From the mean over `BEFORE` it was detected to the mean over its strong samples.
-
-    Args:
-        time: (N,) [s].
-        tau_ext: (N, n) [Nm].
-        event: the touch.
-    """
-    before = (time >= event.detected - BEFORE[0]) & (time < event.detected - BEFORE[1])
-    end = time[-1] if event.cleared is None else event.cleared
-    during = (time >= event.detected) & (time <= end)
-    resting = tau_ext[before].mean(axis=0) if before.any() else np.zeros(tau_ext.shape[1])
-    change = tau_ext[during] - resting
-    size = np.linalg.norm(np.nan_to_num(change), axis=1)
-    return change[size >= STRONG * size.max()].mean(axis=0)
-
-
 def _place(events: Sequence[Event], kind: str) -> Lesson:
     links = sorted({str(event.link) for event in events})
     if len(links) > 1:
@@ -143,21 +136,31 @@ def _place(events: Sequence[Event], kind: str) -> Lesson:
     return Lesson(widget, len(events), scatter, note)
 
 
-def _directions(
-    time: Array, q: Array, tau_ext: Array, events: Sequence[Event], kind: str
+def lesson_of_steps(
+    steps: Sequence[TorqueStep], kind: str = "button", touches: int | None = None
 ) -> Lesson:
-    taught = []
-    for event in events:
-        step = torque_step(time, tau_ext, event)
-        if np.linalg.norm(np.nan_to_num(step)) < LEAST_STEP:
-            continue
-        posture = q[np.searchsorted(time, event.detected).clip(0, len(q) - 1)]
-        taught.append(
-            TaughtTouch(
-                tuple(round(float(x), 4) for x in posture),
-                tuple(round(float(x), 4) for x in np.nan_to_num(step)),
-            )
+    """A button or toggle of the directions in which these touches changed the joint torques.
+
+    Args:
+        steps: of `Touch.steps`; much weaker ones are no touches, but what a hand does besides.
+        kind: "button" or "toggle".
+        touches: only the first so many; default: all.
+
+    Raises:
+        InputError: there are none, or they are too soft.
+    """
+    if not steps:
+        raise InputError(NO_TOUCH)
+    sizes = [float(np.linalg.norm(np.nan_to_num(step.step))) for step in steps]
+    meant = [s for s, size in zip(steps, sizes, strict=True) if size >= STRONG * max(sizes)]
+    taught = [
+        TaughtTouch(
+            tuple(round(float(x), 4) for x in step.q),
+            tuple(round(float(x), 4) for x in np.nan_to_num(step.step)),
         )
+        for step in meant[:touches]
+        if max(sizes) >= LEAST_STEP
+    ]
     if not taught:
         raise InputError(f"the touches change the torques by less than {LEAST_STEP} Nm: too soft")
     units = np.array([touch.step for touch in taught])

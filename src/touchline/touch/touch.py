@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.detector.detector import Level
 from touchline.localizer.skin import Skin, in_link
 from touchline.model.interface_names import GESTURES
 from touchline.model.robot import Robot
@@ -26,6 +27,8 @@ Array = NDArray[np.float64]
 
 DWELL = 0.03  # s; by then 99 % of the collisions are called so (docs/reaction.md), and no command
 TORQUE_DWELL = 0.1  # s; a torque step has its direction once the force no longer rises
+TORQUE_AVERAGE = 0.05  # s, over which that direction is averaged
+FULL = 0.8  # of the largest step of a press; a smaller mean is of a force that rises or falls
 LATEST = 0.25  # s; a finger that is not on a widget by then only passes over it
 SURE = 0.9  # probability of being on a widget, or of a taught spot, from which it counts
 GESTURE_MOST = 60.0  # N; what presses harder means no gesture
@@ -63,6 +66,22 @@ class TouchEvent:
     contact: int | None = None
 
 
+@dataclass(frozen=True)
+class TorqueStep:
+    """What a finger did to the joint torques of an arm without a force-torque sensor.
+
+    Attributes:
+        begun: [s], and `lifted` [s].
+        q: (n,) joint positions [rad or m].
+        step: (n,) change of the external torque [Nm]; NaN where it is not measured.
+    """
+
+    begun: float
+    lifted: float
+    q: Array
+    step: Array
+
+
 Callback = Callable[[TouchEvent], Any]
 
 
@@ -71,16 +90,51 @@ class _Press:
     """A finger, and what a widget needs of it."""
 
     finger: Finger
-    resting: Array  # torques (n,) before it
+    resting: Array  # torques (n,) [Nm] without it
+    felt: bool  # whether a force-torque sensor feels it, not joint torques alone
+    before: Array | None  # `Rows` of its segment (6 + n,), before it landed
+    start: Array  # torques (n,) [Nm] before the contact began
+    again: bool = False  # whether another finger pressed on the same contact before
+    least: float = 0.0  # by how much `resting` differs from them [Nm]
+    crest: float = 0.0  # the largest step of this contact [Nm]
     places: deque[tuple[float, Array, float]] = field(default_factory=deque)
-    steps: list[Array] = field(default_factory=list)
+    steps: deque[tuple[float, Array]] = field(default_factory=deque)
+    full: tuple[Array, Array] | None = None  # joint positions (n,), and the largest mean step (n,)
     widget: Widget | None = None
     trace: list[tuple[float, float, float, float]] = field(default_factory=list)
     value: float | None = None
     turned: float = 0.0
     easing: float | None = None  # since when the force falls
     grip: Grip = field(default_factory=Grip)
-    before: Array | None = None  # `Rows` of its segment (6 + n,), before it landed
+
+    def take(self, time: float, q: Array, torque: Array) -> None:
+        """A sample while it presses, where joint torques alone tell."""
+        self.steps.append((time, torque - self.resting))
+        while self.steps[0][0] < time - TORQUE_AVERAGE:
+            self.steps.popleft()
+        if time - self.finger.begun >= TORQUE_DWELL:
+            mean = np.mean([step for _, step in self.steps], axis=0)
+            if self.full is None or _size(mean) >= _size(self.full[1]):
+                self.full = q, mean
+
+    def after(self, finger: Finger) -> "_Press":
+        """The next finger on what is still the same contact."""
+        return _Press(
+            finger, self.resting, self.felt, self.before, self.start, True, self.least, self.crest
+        )
+
+    def step(self, torque: Array) -> float:
+        """By how much the torques differ from those at rest [Nm], where they alone tell.
+
+        Friction holds a part of a touch after its end. So at rest is what was nearest to the
+        torques before the contact since the last finger lifted.
+        """
+        away = _size(torque - self.start)
+        if away < self.least:
+            self.least, self.resting = away, torque
+        size = _size(torque - self.resting)
+        self.crest = max(self.crest, size)
+        return size
 
 
 class Touch:
@@ -93,6 +147,7 @@ class Touch:
     Attributes:
         events: the last `TouchEvent`s.
         strokes: the last finished ones, as felt; `Stroke.cleaned` is what a `Recognizer` likes.
+        steps: what finished presses did to the joint torques, where these alone tell.
         values: of toggles (bool), sliders and dials (float), by name.
     """
 
@@ -109,6 +164,7 @@ class Touch:
         }
         self.events: deque[TouchEvent] = deque(maxlen=KEPT)
         self.strokes: deque[Stroke] = deque(maxlen=KEPT)
+        self.steps: deque[TorqueStep] = deque(maxlen=KEPT)
         self._callbacks: dict[str, list[Callback]] = {}
         self._gestures = GestureReader()
         self._presses: dict[int, _Press] = {}
@@ -186,60 +242,84 @@ class Touch:
     def _follow(self, contact: Contact, result: Result, q, torque, poses) -> list[TouchEvent]:
         time = result.time
         press = self._presses.get(contact.event)
-        size = contact.size
         if press is None:
             press = self._begin(contact, time, torque)
         finger = press.finger
         beside = self._beside(press, result, poses)
         if beside is not None:
             size = float(np.linalg.norm(beside[1]))
-        if size == 0.0:  # joint torques alone: their step stands for the force
-            size = float(np.linalg.norm(np.nan_to_num(torque - press.resting)))
+        elif contact.wrench is not None:
+            size = contact.size
+        else:
+            size = press.step(torque)
         if finger.lifted is not None:
-            if size < PRESS * finger.peak:  # it rests on the surface
-                return []
-            press = self._begin(contact, time, press.resting, keep=True)
+            if size < (PRESS * finger.peak if press.felt else LIFTED * press.crest):
+                return []  # it rests on the surface
+            press = self._begin(contact, time, torque, press)
             finger = press.finger
         finger.now = size
         finger.peak = max(finger.peak, size)
-        finger.collision |= contact.level == "collision" or (
-            contact.force is not None and size > GESTURE_MOST
-        )
+        finger.collision |= self._is_blow(press, contact, result)
         finger.clamped |= bool(contact.clamped)
         finger.force = contact.force
         if size < PRESS * finger.peak:
             return self._ease(press, time)
         press.easing = None
-        press.steps.append(torque - press.resting)
+        if not press.felt:
+            press.take(time, q, torque)
         self._place(press, contact, time, poses)
         if press.widget is not None:
             return self._use(press, time, None if beside is None else beside[0])
         return self._choose(press, contact, time, q)
+
+    def _is_blow(self, press: _Press, contact: Contact, result: Result) -> bool:
+        """Is it a collision, or too strong for a command?
+
+        A contact that was one stays one while it lasts; a finger that presses on it anew does not.
+        """
+        if press.again:
+            segment = self.robot.segment_names.index(contact.segment)
+            if result.detection.levels[segment] == Level.COLLISION:
+                return True
+        elif contact.level == "collision":
+            return True
+        return press.felt and press.finger.now > GESTURE_MOST
 
     def _ease(self, press: _Press, time: float) -> list[TouchEvent]:
         """The force falls: the finger lifts, or presses on with less."""
         finger = press.finger
         if press.easing is None:
             press.easing = time
-        if finger.now < LIFTED * finger.peak:
+        if press.felt and finger.now < LIFTED * finger.peak:
             return self._lift(press, time)
         if time - press.easing >= EASING:
+            if not press.felt:  # friction holds a part of the torques: they do not return to zero
+                return self._lift(press, time)
             finger.peak, press.easing = finger.now, None
         return []
 
-    def _begin(self, contact: Contact, time: float, torque: Array, keep: bool = False) -> _Press:
-        resting = torque
-        if not keep:
+    def _begin(
+        self, contact: Contact, time: float, torque: Array, earlier: _Press | None = None
+    ) -> _Press:
+        """A finger that lands; `earlier` on what is still the same contact."""
+        finger = Finger(contact.event, time, segment=contact.segment)
+        if earlier is not None:
+            press = earlier.after(finger)
+        else:
             last = self._rest[-1][0] if self._rest else time
             early = [t for at, t in self._rest if at <= last - BEFORE[1]]
             resting = np.mean(early, axis=0) if early else np.zeros_like(torque)
-        finger = Finger(contact.event, time, segment=contact.segment)
-        press = _Press(finger, np.asarray(resting))
-        early = [past for at, past in self._past if at <= time - BEFORE[1]]
-        if early and not keep:
-            press.before = np.mean([self._rows(past, contact.segment) for past in early], axis=0)
+            felt = contact.wrench is not None
+            press = _Press(finger, resting, felt, self._before(contact, time), resting)
         self._presses[contact.event] = press
         return press
+
+    def _before(self, contact: Contact, time: float) -> Array | None:
+        """What the segment of a contact showed before it (6 + n,); None without sliders."""
+        early = [past for at, past in self._past if at <= time - BEFORE[1]]
+        if not early:
+            return None
+        return np.mean([self._rows(past, contact.segment) for past in early], axis=0)
 
     def _place(self, press: _Press, contact: Contact, time: float, poses) -> None:
         finger = press.finger
@@ -267,7 +347,7 @@ class Touch:
     def _choose(self, press: _Press, contact: Contact, time, q) -> list[TouchEvent]:
         finger = press.finger
         age = time - finger.begun
-        if finger.collision or not DWELL <= age <= LATEST:
+        if finger.collision or age < DWELL or (press.felt and age > LATEST):
             return []
         widget, probability = self._on_widget(press, q, time)
         if widget is None or probability < SURE:
@@ -295,9 +375,11 @@ class Touch:
             if chances:
                 best = max(chances, key=lambda chance: chance[:2])
                 return best[2], best[0]
-        if self._spots is not None and time - finger.begun >= TORQUE_DWELL:
-            recent = np.mean(press.steps[-max(1, len(press.steps) // 2) :], axis=0)
-            name, probability = self._spots.read(q, recent)[0]
+        if self._spots is not None and press.full is not None:
+            step = press.full[1]
+            if _size(step) < FULL * finger.peak:
+                return None, 0.0
+            name, probability = self._spots.read(q, step)[0]
             if name is not None:
                 return self.widgets[name], probability
         return None, 0.0
@@ -364,6 +446,9 @@ class Touch:
         if finger.lifted is not None:
             return []
         finger.lifted = time if press.easing is None else press.easing
+        press.least = np.inf
+        if press.full is not None:
+            self.steps.append(TorqueStep(finger.begun, finger.lifted, *press.full))
         if widget is None:
             return []
         found = [self._event("release", press, time, self.values.get(widget.name))]
@@ -424,6 +509,10 @@ def mean_normal(patch, at: Array, radius: float) -> Array:
     total = (surface.normals[near] * surface.areas[near, None]).sum(axis=0)
     length = float(np.linalg.norm(total))
     return total / length if length > 0.0 else nearest
+
+
+def _size(torque: Array) -> float:
+    return float(np.linalg.norm(np.nan_to_num(torque)))
 
 
 def _in(frame: Array, wrench: Array) -> Array:

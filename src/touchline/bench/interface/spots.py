@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Spots taught on a real arm by joint torques alone: are later touches told?"""
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm
 
 from touchline.bench.real.recordings import Recording, read_touched, touched_files
 from touchline.bench.tables import Row
@@ -14,7 +16,7 @@ from touchline.errors import InputError
 from touchline.model.robot import Robot
 from touchline.pipeline.pipeline import Pipeline
 from touchline.touch.teach import teach
-from touchline.touch.touch import Touch
+from touchline.touch.touch import Touch, TouchEvent
 
 Array = NDArray[np.float64]
 
@@ -22,44 +24,51 @@ TAUGHT = 3  # touches that teach a spot
 MARGIN = 0.15  # s; a press counts for a labelled touch from so long before it to so long after
 
 
-def taught_spots(data: Path) -> list[tuple[str, ...]]:
+def taught_spots(data: Path) -> list[Row]:
     """Real recordings: one spot each, taught with its first touches, judged on the others."""
     with TemporaryDirectory() as scratch:
         found = [read_touched(file, Path(scratch)) for file in touched_files(data)]
     if not found:
         raise InputError(f"--data {data}: holds no recording (panda_touches/*.csv.gz)")
     robot, logs = found[0].robot, {recording.name: recording for recording in found}
-    taught = {}
-    for name, recording in logs.items():
-        taught[name] = teach(robot, *_signals(recording), touches=TAUGHT).widget
+    taught = {name: teach(robot, *_first(recording)).widget for name, recording in logs.items()}
     rows: list[Row] = [("real Panda, joint torques alone", "right", "another", "none of them")]
-    rows.append(("taught, later touches", *_judged(robot, logs, taught, list(logs), TAUGHT)))
-    left_out = np.zeros(3, int)
-    for link in sorted({name[0] for name in logs}):
-        others = {name: widget for name, widget in taught.items() if name[0] != link}
-        own = [name for name in logs if name[0] == link]
-        left_out += np.array([int(x) for x in _judged(robot, logs, others, own, 0)])
-    rows.append(("on links that were not taught", *(str(x) for x in left_out)))
+    known, unknown = np.zeros(3, int), np.zeros(3, int)
+    for name, recording in tqdm(logs.items(), file=sys.stderr, leave=False, disable=None):
+        others = {other: widget for other, widget in taught.items() if other[0] != name[0]}
+        both = _judged(robot, recording, (taught, others))
+        known += np.sum(both[0][TAUGHT:], axis=0)
+        unknown += np.sum(both[1], axis=0)
+    for what, counts in (("taught, later touches", known), ("links not taught", unknown)):
+        total = counts.sum()
+        rows.append((what, *(f"{count}/{total}" for count in counts)))
     return rows
 
 
-def _signals(recording: Recording) -> tuple[Array, Array, Array, Array, Array]:
-    s = recording.samples
-    return s.time, s.q, s.qd, s.tau, s.wrench
+def _first(recording: Recording) -> tuple[Array, Array, Array, Array, Array]:
+    """The signals until the touches that teach are over."""
+    s, touches = recording.samples, recording.touches
+    rows = s.time < 0.5 * (touches[TAUGHT - 1, 1] + touches[TAUGHT, 0])
+    return s.time[rows], s.q[rows], s.qd[rows], s.tau[rows], s.wrench[rows]
 
 
-def _judged(robot, logs, taught, names, first: int) -> tuple[str, str, str]:
-    robot = Robot(replace(robot.description, interface=taught), robot.mechanism)
-    right = other = none = 0
-    for name in names:
-        recording = logs[name]
-        pipeline, touch = Pipeline(robot, period=recording.period), Touch(robot)
-        found = []
-        for row in zip(*_signals(recording), strict=True):
-            found += [e for e in touch.update(pipeline.update(*row)) if e.kind == "press"]
-        for begin, end in recording.touches[first:]:
-            named = {e.widget for e in found if begin - MARGIN <= e.time <= end + MARGIN}
-            right += named == {name}
-            other += bool(named - {name})
-            none += not named
-    return str(right), str(other), str(none)
+def _judged(robot: Robot, recording: Recording, interfaces) -> list[Array]:
+    """For each interface and labelled touch (T, 3): right, another, none of them."""
+    s, pipeline = recording.samples, Pipeline(robot, period=recording.period)
+    touch = [
+        Touch(Robot(replace(robot.description, interface=widgets), robot.mechanism), pipeline.skin)
+        for widgets in interfaces
+    ]
+    found: list[list[TouchEvent]] = [[] for _ in touch]
+    for row in zip(s.time, s.q, s.qd, s.tau, s.wrench, strict=True):
+        result = pipeline.update(*row)
+        for one, events in zip(touch, found, strict=True):
+            events += [event for event in one.update(result) if event.kind == "press"]
+    judged = []
+    for events in found:
+        counts = np.zeros((len(recording.touches), 3), int)
+        for i, (begin, end) in enumerate(recording.touches):
+            named = {e.widget for e in events if begin - MARGIN <= e.time <= end + MARGIN}
+            counts[i] = named == {recording.name}, bool(named - {recording.name}), not named
+        judged.append(counts)
+    return judged
