@@ -149,7 +149,7 @@ def torques_alone():
 def test_a_spot_taught_by_torques_is_told_from_another_place(torques_alone):
     robot, skin = torques_alone
     q, patch, given = pad_of(skin, 6)
-    other = find_pad(skin, ("link2", "link3"), 0.02, 0.02, np.random.default_rng(1), q)[1:]
+    other = find_pad(skin, ("link4", "link5"), 0.02, 0.02, np.random.default_rng(1), q)[1:]
     begins = (0.3, 0.95, 1.6)
     rng = np.random.default_rng(0)
 
