@@ -103,6 +103,9 @@ class Pipeline {
     recorder_.begin();
     count_ = 0;
     if (touched()) localize(sample, row);
+    for (std::size_t segment = 0; segment < levels_.size(); ++segment) {
+      if (!(levels_[segment] > 0.0)) localizer_.rest(static_cast<int>(segment), row, sample.time);
+    }
     recorder_.finish();
     period_.take(observer_.time(), observer_.max_gap());
     rest_.take(row, sample.qd, observer_.time());

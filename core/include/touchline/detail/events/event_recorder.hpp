@@ -55,6 +55,7 @@ class EventRecorder {
     }
     changes_.reserve(3 * events_.size());  // each ends, another begins in its place and changes
     scratch_.q.resize(rest_.size(), kUnknown);
+    scratch_.links = localizer.memories(0).front().links;
     for (const DetectionRow& row : robot.rows) {
       if (row.joint >= 0) limits_[row.joint] = row.contact;
     }
@@ -261,6 +262,8 @@ class EventRecorder {
     if (memory == nullptr) return;
     scratch_.event = memory->event;  // weighing sorts the places: the localizer's stay as they are
     scratch_.undetermined = memory->undetermined;
+    scratch_.links = memory->links;
+    scratch_.revision = memory->revision;
     std::copy(memory->q.begin(), memory->q.end(), scratch_.q.begin());
     localizer_.conclude(scratch_);
     const Status status = localizer_.status(scratch_);

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
+#include "touchline/detail/place/body_share.hpp"
 #include "touchline/detail/place/hypothesis.hpp"
 
 namespace touchline {
@@ -17,6 +19,7 @@ struct Place {
   double evidence = 0.0;  // log of the odds, before normalization
   double last = 0.0;      // probability in the sample at hand
   double share = 0.0;     // probability of the place
+  double radius = 0.0;    // one sigma of a patch that it stands for, 0: a point [m]
 };
 
 class EventPlace {
@@ -96,6 +99,53 @@ class EventPlace {
     for (int i = 0; i < count_; ++i) sum += std::exp(looks * (places_[i].evidence - most));
     for (int i = 0; i < count_; ++i)
       places_[i].share = std::exp(looks * (places_[i].evidence - most)) / sum;
+    lead(body);
+  }
+
+  // Gives each body the probability that the evidence for links gives it; where no sample has named
+  // it, its best patch stands for it. `body(surface)` is the node of a surface.
+  template <class Body>
+  void share_out(const std::vector<BodyShare>& shares, Body&& body) {
+    for (const BodyShare& of : shares) {
+      double here = 0.0;
+      for (int i = 0; i < count_; ++i) here += body(places_[i].surface) == of.node ? places_[i].share : 0.0;
+      for (int i = 0; i < count_; ++i) {
+        if (body(places_[i].surface) == of.node) places_[i].share *= of.share / here;
+      }
+      if (here > 0.0 || of.share < kFloor) continue;
+      Place& place = count_ < kPlaces ? places_[count_++] : *least_likely();
+      place = Place{};
+      place.surface = of.surface;
+      place.point = of.point;
+      place.radius = of.radius;
+      place.share = of.share;
+    }
+    lead(body);
+  }
+
+  int count() const { return count_; }
+  const Place& place(int i) const { return places_[i]; }
+  double time() const { return time_; }
+  bool mostly_unexplained() const { return 2 * unexplained_ > samples_; }
+  int frequent(int a, int b) const { return statuses_[a] >= statuses_[b] ? a : b; }
+
+  // Of the mean over the event, which takes away only what differs from sample to sample.
+  double variance() const {
+    if (count_ > 0 && places_[0].radius > 0.0) return 2.0 * places_[0].radius * places_[0].radius;
+    if (explained_ == 0) return std::nan("");
+    const double looks = 1.0 + (explained_ - 1) * independence_;
+    return (variance_ / looks + lasting_) / explained_;
+  }
+
+ private:
+  static constexpr double kStrong = 0.5;      // of the peak
+  static constexpr double kFloor = 1e-3;      // no sample rules a place out
+  static constexpr double kLooks = 3.0;       // that an event is worth at most
+  static constexpr double kSmoothness = 1e-8;  // m2; no mesh is smoother
+
+  // Sorts by probability, but that the most probable body's best place comes first.
+  template <class Body>
+  void lead(Body&& body) {
     std::sort(places_, places_ + count_,
               [](const Place& a, const Place& b) { return a.share > b.share; });
     int first = 0;
@@ -112,24 +162,10 @@ class EventPlace {
     std::rotate(places_, places_ + first, places_ + std::min(first + 1, count_));
   }
 
-  int count() const { return count_; }
-  const Place& place(int i) const { return places_[i]; }
-  double time() const { return time_; }
-  bool mostly_unexplained() const { return 2 * unexplained_ > samples_; }
-  int frequent(int a, int b) const { return statuses_[a] >= statuses_[b] ? a : b; }
-
-  // Of the mean over the event, which takes away only what differs from sample to sample.
-  double variance() const {
-    if (explained_ == 0) return std::nan("");
-    const double looks = 1.0 + (explained_ - 1) * independence_;
-    return (variance_ / looks + lasting_) / explained_;
+  Place* least_likely() {
+    return std::min_element(places_, places_ + count_,
+                            [](const Place& a, const Place& b) { return a.share < b.share; });
   }
-
- private:
-  static constexpr double kStrong = 0.5;      // of the peak
-  static constexpr double kFloor = 1e-3;      // no sample rules a place out
-  static constexpr double kLooks = 3.0;       // that an event is worth at most
-  static constexpr double kSmoothness = 1e-8;  // m2; no mesh is smoother
 
   Place* fresh(int surface) {
     Place* place = places_;

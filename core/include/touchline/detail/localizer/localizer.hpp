@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "touchline/detail/localizer/event_place.hpp"
+#include "touchline/detail/localizer/link_evidence.hpp"
 #include "touchline/detail/localizer/tracks.hpp"
 
 namespace touchline {
@@ -25,10 +26,14 @@ class Localizer {
         single_(observer, measurement_.posture(), settings_, std::move(surfaces)),
         tracks_(single_, measurement_, settings_, measurement_.most_rows(),
                 observer.row_layout().segments, period_),
+        links_(observer, single_.surfaces(), settings_, measurement_.torque_error(), period_),
         states_(observer.row_layout().segments),
         memories_(observer.row_layout().segments, std::vector<Memory>(Reports::kMost + 1)) {
     for (std::vector<Memory>& of_segment : memories_) {
-      for (Memory& m : of_segment) m.q.resize(observer.row_layout().joints, kNaN);
+      for (Memory& m : of_segment) {
+        m.q.resize(observer.row_layout().joints, kNaN);
+        m.links = links_.shares();
+      }
     }
     ended_.reserve(Reports::kMost + 1);
   }
@@ -41,10 +46,13 @@ class Localizer {
   // there are several or none, or where that one's place is not this sample's.
   std::vector<SurfaceCell> region() const {
     const Answer& own = single_.answer();
-    if (said_ != 1 || !placed(*last_) || !placed(own) ||
-        norm(last_->candidates[0].point - own.candidates[0].point) > 0.0)
+    const bool same = said_ == 1 && placed(*last_) && placed(own) &&
+                      (shared_ || !(norm(last_->candidates[0].point - own.candidates[0].point) > 0.0));
+    if (!same)
       throw std::invalid_argument("the last sample does not speak of the place of a single contact");
-    return single_.region();
+    std::vector<SurfaceCell> cells = single_.region();
+    if (shared_) share_out(cells);
+    return cells;
   }
   const Measurement& measurement() const { return measurement_; }
 
@@ -69,6 +77,7 @@ class Localizer {
   void set_state(const double* q, const double* qd, const double* drift, const double* quiet) {
     measurement_.set_state(q, qd, drift, quiet);
     said_ = 0;
+    shared_ = false;
   }
 
   // Covariance (6, 6) of a segment's wrench; false where it has none.
@@ -91,6 +100,11 @@ class Localizer {
     return single_.locate(g, lag, measurement_, false, true);
   }
 
+  // Takes a sample [row of the observer] at `time` [s] in which nothing touches segment g.
+  void rest(int g, const double* row, double time) {
+    if (g == links_.segment()) links_.rest(row, time);
+  }
+
   // Takes a sample of segment g at `time` [s]: what is said of each contact on it is in `reports()`,
   // and the events that have ended in `ended()`.
   void follow(int g, bool touched, const double* row, const double* normalized, double time,
@@ -102,12 +116,14 @@ class Localizer {
       s = SegmentContacts{};
       s.first = first;
       s.age.restart(time);
+      if (g == links_.segment()) links_.begin();
     }
     if (s.touched && !touched) end_all(g);
     s.touched = touched;
     if (!touched) return;
     tracks_.follow(s, g, bandwidth(g), time,
                    [&] { return measurement_.read(g, row, normalized); });
+    if (g == links_.segment()) weigh_links(row, q);
     const Reports& reports = tracks_.reports();
     for (int i = 0; i < reports.ended(); ++i) end(g, reports.ended(i));
     said_ += reports.count();
@@ -125,6 +141,8 @@ class Localizer {
     EventPlace event;
     std::vector<double> q;
     bool undetermined = false;  // were there fewer equations than unknowns?
+    std::vector<BodyShare> links;  // what joint torques say of each body, if `revision` is not -1
+    int revision = -1;
   };
 
   // Those that ended with the last sample; those that last or were the last on segment g.
@@ -133,7 +151,9 @@ class Localizer {
 
   // Weighs the places of an event, those of the most probable body first.
   void conclude(Memory& m) {
-    m.event.conclude([this](int surface) { return surfaces()[surface].node; });
+    const auto node = [this](int surface) { return surfaces()[surface].node; };
+    m.event.conclude(node);
+    if (m.revision >= 0) m.event.share_out(m.links, node);
   }
 
   Status status(const Memory& m) const {
@@ -163,6 +183,7 @@ class Localizer {
     if (room == nullptr) room = &memories_[g].back();
     room->serial = serial;
     room->event.restart();
+    room->revision = -1;
     return *room;
   }
 
@@ -181,6 +202,10 @@ class Localizer {
   void remember(int g, const Report& report, double strength, double time, const double* q) {
     Memory& m = memory(g, report.serial);
     const Answer& answer = report.answer;
+    if (shared_ && m.revision != links_.revision()) {
+      std::copy(links_.shares().begin(), links_.shares().end(), m.links.begin());
+      m.revision = links_.revision();
+    }
     if (!m.event.begin_sample(strength, time, 0.5 * period_ * bandwidth(g))) return;
     std::copy(q, q + m.q.size(), m.q.begin());
     const bool explained =
@@ -193,6 +218,24 @@ class Localizer {
                   k.weight, k.along[0] + k.along[2], settings_.place_radius);
     }
     m.event.close(explained ? answer.spread * answer.spread : kNaN, answer.lasting);
+  }
+
+  // What the step of the joint torques says of each body.
+  void weigh_links(const double* row, const double* q) {
+    if (!measurement_.can_be_followed()) links_.take(row, q, measurement_);
+    shared_ = links_.known() && tracks_.share_out(links_.shares());
+  }
+
+  void share_out(std::vector<SurfaceCell>& cells) const {
+    for (const BodyShare& of : links_.shares()) {
+      double here = 0.0;
+      for (const SurfaceCell& c : cells) here += surfaces()[c.surface].node == of.node ? c.probability : 0.0;
+      for (SurfaceCell& c : cells) {
+        if (surfaces()[c.surface].node != of.node || !(here > 0.0)) continue;
+        c.probability *= of.share / here;
+        c.log_density += std::log(std::max(of.share, 1e-300) / here);
+      }
+    }
   }
 
   double steady_lag(int g) const {
@@ -213,9 +256,11 @@ class Localizer {
   Measurement measurement_;
   SingleContact single_;
   Tracks tracks_;
+  LinkEvidence links_;
   std::vector<SegmentContacts> states_;              // per segment
   std::vector<std::vector<Memory>> memories_;  // per segment: of events
   std::vector<Memory*> ended_;
+  bool shared_ = false;  // has the evidence for links been given to the answer of the last sample?
   int said_ = 0;  // contacts of which something was said in the last sample, and of one of them what
   const Answer* last_ = nullptr;
 };

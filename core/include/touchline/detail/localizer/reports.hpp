@@ -33,6 +33,7 @@ class Reports {
     reports_[count_].serial = k.serial;
     report(k, surfaces_, reports_[count_++].answer);
   }
+  Answer& answer(int i) { return reports_[i].answer; }
   void doubt_last() { reports_[count_ - 1].answer.status = Status::ambiguous; }
   void change_force(int i, const Vec3& force) {
     reports_[i].answer.force = reports_[i].answer.candidates[0].fit.force = force;

@@ -69,6 +69,16 @@ class Tracks {
   // What is said after the last sample.
   const Reports& reports() const { return reports_; }
 
+  // Gives each body the probability that the evidence for links gives it, where one contact stands for
+  // all that joint torques show.
+  bool share_out(const std::vector<BodyShare>& shares) {
+    if (measurement_.can_be_followed() || settings_.first_entry || reports_.count() != 1) return false;
+    Answer& answer = reports_.answer(0);
+    if (!placed(answer)) return false;
+    single_.share_out(shares, measurement_, answer);
+    return true;
+  }
+
  private:
   static constexpr double kLook = 0.35;        // times 1 / K, between searches
   static constexpr double kNear = 2e-3;        // places that differ by less are the same [m]

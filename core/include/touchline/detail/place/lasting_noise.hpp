@@ -27,6 +27,7 @@ class LastingNoise {
         torque_error_(torque_error),
         joints_(observer.row_layout().joints, 0.0) {}
 
+  double torque_error() const { return torque_error_; }
   // Are torques as good as their noise figures say?
   bool exact_torques() const { return torque_error_ == 0.0; }
 

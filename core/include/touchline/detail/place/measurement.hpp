@@ -78,6 +78,8 @@ class Measurement {
   }
 
   bool has_wrench() const { return has_wrench_; }
+  // What the gains of joint torques err by, as a part of the load.
+  double torque_error() const { return lasting_.torque_error(); }
   const double* wrench() const { return wrench_; }
   // Do changes tell of new contacts? With joint torques alone there is no pitch, and few equations
   // or none are left over: what a model's errors leave looks like one more contact.
@@ -132,6 +134,14 @@ class Measurement {
   bool feels(int i, int node) const {
     const int first = has_wrench_ ? 6 : 0;
     return i < first || rows_.feels(*used_[i - first], node);
+  }
+
+  // The joint of row i where there is no wrench; -1: the row is a sensor's axis.
+  int joint(int i) const { return used_[i]->joint; }
+  // What a unit wrench on the body of `node` does to row i in a posture, where there is no wrench;
+  // false: nothing.
+  bool subspace(int i, const Posture& posture, int node, double* out) const {
+    return rows_.subspace(*used_[i], posture, node, out);
   }
 
   // Independent equations for one contact on the body of `node`: a wrench, or the rows that feel it.

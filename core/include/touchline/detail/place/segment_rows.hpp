@@ -42,16 +42,21 @@ class SegmentRows {
 
   // What a unit wrench on the body of `node` does to a row; false: nothing.
   bool subspace(const SegmentRow& r, int node, double* out) const {
+    return subspace(r, posture_, node, out);
+  }
+
+  // The same in another posture.
+  bool subspace(const SegmentRow& r, const Posture& posture, int node, double* out) const {
     Spatial sum{};
     bool loaded = false;
     if (r.joint >= 0) {
       for (int own : observer_.joints()[r.joint].nodes) {
         if (!is_outboard(node, own)) continue;
-        sum = sum + posture_.subspace(own);
+        sum = sum + posture.subspace(own);
         loaded = true;
       }
     } else if (is_outboard(node, observer_.sensors()[r.sensor].node)) {
-      sum = posture_.axis(observer_.sensors()[r.sensor].node, r.axis);
+      sum = posture.axis(observer_.sensors()[r.sensor].node, r.axis);
       loaded = true;
     }
     // The power of a wrench along a twist [v; w]: f . v + m . w.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "touchline/detail/place/answer.hpp"
+#include "touchline/detail/place/body_share.hpp"
 #include "touchline/detail/place/approach.hpp"
 #include "touchline/detail/place/credible_region.hpp"
 #include "touchline/detail/place/explanations.hpp"
@@ -59,6 +60,33 @@ class SingleContact {
   }
 
   const Answer& answer() const { return answer_; }
+
+  // Gives each body the probability that the evidence for links gives it; where no candidate is on
+  // it, its best patch stands for it.
+  void share_out(const std::vector<BodyShare>& shares, const Measurement& measurement,
+                 Answer& answer) const {
+    Candidate* all = answer.candidates;
+    for (const BodyShare& of : shares) {
+      double here = 0.0;
+      for (int i = 0; i < answer.count; ++i) here += node_of(all[i]) == of.node ? all[i].weight : 0.0;
+      for (int i = 0; i < answer.count; ++i) {
+        if (node_of(all[i]) == of.node) all[i].weight *= of.share / here;
+      }
+      if (here > 0.0 || of.share < kLeast) continue;
+      if (answer.count == Answer::kCandidates) {  // in place of the least likely
+        std::iter_swap(all + answer.count - 1,
+                       std::min_element(all, all + answer.count, [](const auto& a, const auto& b) {
+                         return a.weight < b.weight;
+                       }));
+        --answer.count;
+      }
+      all[answer.count++] = patch_of(of);
+    }
+    std::sort(all, all + answer.count,
+              [](const Candidate& a, const Candidate& b) { return a.weight > b.weight; });
+    answer.body_probability = lead_with_best_body(all, all + answer.count);
+    conclude(measurement, answer);
+  }
   // The posterior of the place that was located last, cell by cell.
   std::vector<SurfaceCell> region() const { return CredibleRegion(found_, settings_).cells(); }
   const LinkSurfaces& surfaces() const { return found_.surfaces(); }
@@ -66,6 +94,7 @@ class SingleContact {
  private:
   static constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   static constexpr int kUnknowns = 5;  // of one contact: two of its place, three of its force
+  static constexpr double kLeast = 1e-3;  // probability of a candidate that is told
   static constexpr double kNegligible = 10.0;  // of the log posterior, below the best
   // A steady twist and force are assumed. A past that is remembered is exact up to the first order:
   // the rest (`Mean::moment`) is that of the body's origin (measured: 0.08 to 0.1 m in the plane).
@@ -164,36 +193,57 @@ class SingleContact {
       answer_.status = unexplained(g, measurement);
       return;
     }
-    lead_with_best_body();
+    answer_.body_probability = lead_with_best_body(found_.begin(), found_.end());
     const Candidate& best = *found_.begin();
     const View& view = found_.view(best);
     answer_.pitch = view.pitch;
     answer_.chi2 = best.fit.chi2;
     answer_.degrees = std::max(1, measurement.size() - 5);
-    spread_over_surface(best);
+    spread_over_surface(best, answer_);
     copy_candidates();
     if (std::fabs(view.pitch) > settings_.pitch_limit ||
         (!graspable(best) && found_.fitter().cone_cost(best.fit.cosine) > 16.0) ||
         best.fit.chi2 > chi2_limit(answer_.degrees, settings_.pitch_limit)) {
       answer_.status = unexplained(g, measurement);
     } else {
-      answer_.force = best.fit.force;
-      const int equations = measurement.equations(node_of(best));
-      if (equations <= kUnknowns) {
-        answer_.rank = equations;
-        answer_.unknowns = kUnknowns;
-      }
-      const bool sure = equations >= kUnknowns && certain();
-      answer_.status = sure ? Status::located : Status::ambiguous;
+      conclude(measurement, answer_);
     }
   }
 
   void copy_candidates() {
     answer_.count = 0;
     for (const Candidate& k : found_) {
-      if (answer_.count < Answer::kCandidates && (answer_.count == 0 || k.weight > 1e-3))
+      if (answer_.count < Answer::kCandidates && (answer_.count == 0 || k.weight > kLeast))
         answer_.candidates[answer_.count++] = k;
     }
+  }
+
+  Candidate patch_of(const BodyShare& of) const {
+    Candidate k;
+    k.surface = of.surface;
+    k.point = found_.surfaces().to_world(of.point, of.node);
+    k.normal = found_.surfaces().turn_to_world(of.normal, of.node);
+    k.fit.force = found_.surfaces().turn_to_world(of.force, of.node);
+    k.fit.cosine = -dot(k.normal, k.fit.force) / std::max(norm(k.fit.force), 1e-9);
+    k.radius = of.radius;
+    k.weight = of.share;
+    k.along[0] = k.along[2] = of.radius * of.radius;
+    return k;
+  }
+
+  // All that follows from the first candidate, and from the weights.
+  void conclude(const Measurement& measurement, Answer& answer) const {
+    const Candidate& best = answer.candidates[0];
+    spread_over_surface(best, answer);
+    answer.force = best.fit.force;
+    answer.rank = answer.unknowns = 0;
+    const int equations = measurement.equations(node_of(best));
+    if (equations <= kUnknowns) {
+      answer.rank = equations;
+      answer.unknowns = kUnknowns;
+    }
+    const bool sure = equations >= kUnknowns && certain(answer);
+    answer.status = sure ? Status::located : Status::ambiguous;
   }
 
   // What can be grasped, and what only a tool's or a handle's own sensor feels, may be loaded by a
@@ -215,44 +265,47 @@ class SingleContact {
   bool graspable(const Candidate& k) const { return found_.surfaces()[k.surface].graspable; }
   int node_of(const Candidate& k) const { return found_.surfaces()[k.surface].node; }
 
-  void lead_with_best_body() {
+  // Puts the best candidate of the most probable body first, and returns that body's probability.
+  double lead_with_best_body(Candidate* begin, Candidate* end) const {
     double most = 0.0;
-    Candidate* first = found_.begin();
-    for (Candidate& a : found_) {
+    Candidate* first = begin;
+    for (Candidate* a = begin; a != end; ++a) {
       double sum = 0.0;
-      for (const Candidate& b : found_) sum += node_of(a) == node_of(b) ? b.weight : 0.0;
+      for (const Candidate* b = begin; b != end; ++b)
+        sum += node_of(*a) == node_of(*b) ? b->weight : 0.0;
       if (sum > most + 1e-12) {
         most = sum;
-        first = &a;
+        first = a;
       }
     }
-    answer_.body_probability = std::min(most, 1.0);
-    std::rotate(found_.begin(), first, first + 1);
+    if (begin != end) std::rotate(begin, first, first + 1);
+    return std::min(most, 1.0);
   }
 
   // Is nearly all of the probability at one place?
-  bool certain() {
-    if (answer_.spread > settings_.spread_limit()) return false;
+  bool certain(const Answer& answer) const {
+    if (answer.spread > settings_.spread_limit()) return false;
     double here = 0.0;
-    for (const Candidate& k : found_) {
-      if (norm(k.point - found_.begin()->point) < settings_.place_radius) here += k.weight;
+    for (int i = 0; i < answer.count; ++i) {
+      const Candidate& k = answer.candidates[i];
+      if (norm(k.point - answer.candidates[0].point) < settings_.place_radius) here += k.weight;
     }
     return here >= settings_.certain;
   }
 
   // Covariance of the point, which stays on its surface.
-  void spread_over_surface(const Candidate& k) {
+  static void spread_over_surface(const Candidate& k, Answer& answer) {
     Vec3 s, t;
     tangents(k.normal, s, t);
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) {
         const double si = component(s, i), sj = component(s, j);
         const double ti = component(t, i), tj = component(t, j);
-        answer_.covariance[3 * i + j] =
+        answer.covariance[3 * i + j] =
             k.along[0] * si * sj + k.along[1] * (si * tj + ti * sj) + k.along[2] * ti * tj;
       }
     }
-    answer_.spread = std::sqrt(k.along[0] + k.along[2]);
+    answer.spread = std::sqrt(k.along[0] + k.along[2]);
   }
 
   // The paper's rule: along the line of the segment's wrench, the first entry into any link.
