@@ -124,7 +124,7 @@ def _on_link(
     forces, rank = [], 0
     for poses in frames:
         points, directions = _pushes(patch, poses[patch.node], rng)
-        screws = np.array([_screw(robot, rows[i], poses) for i in own])
+        screws = np.array([screw_of(robot, rows[i], poses) for i in own])
         wrenches = np.hstack([directions, np.cross(points, directions)])
         loads = np.abs(wrenches @ screws.T)
         with np.errstate(divide="ignore"):
@@ -150,7 +150,7 @@ def _pushes(patch: Patch, T_world_node: Array, rng: np.random.Generator) -> tupl
     return points @ T[:3, :3].T + T[:3, 3], directions @ T[:3, :3].T
 
 
-def _screw(robot: Robot, row: RowThreshold, poses: Array) -> Array:
+def screw_of(robot: Robot, row: RowThreshold, poses: Array) -> Array:
     """What a row shows of a wrench (6,) about the world's origin: its joint's or axis's screw."""
     if row.component < 0:
         name = robot.joint_names[row.joint]

@@ -6,6 +6,7 @@ from pathlib import Path
 from touchline.check.assumptions import check_assumptions
 from touchline.check.felt import note_felt
 from touchline.check.findings import Findings
+from touchline.check.interface import check_interface
 from touchline.check.model import check_model
 from touchline.errors import InputError
 from touchline.model.robot import load_robot
@@ -24,6 +25,7 @@ def check(robot: str | Path, log: str | Path | None = None) -> Findings:
     check_assumptions(model, findings)
     check_model(model, findings)
     note_felt(model, findings)
+    check_interface(model, findings)
     if log is not None:
         from touchline.check.recording import check_recording
 

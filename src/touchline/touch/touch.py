@@ -2,7 +2,7 @@
 """The arm as an interface: widgets, gestures and strokes from the contacts of a pipeline."""
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.detector.detector import Level
-from touchline.localizer.skin import Skin, in_link
+from touchline.localizer.skin import Patch, Skin, in_link
+from touchline.model.description import WidgetDescription
 from touchline.model.interface_names import GESTURES
 from touchline.model.robot import Robot
 from touchline.pipeline.result import Result
@@ -156,7 +157,7 @@ class Touch:
         skin = skin or Skin(robot)
         self._patches = {patch.link: patch for patch in skin.patches}
         given = robot.description.interface
-        self.widgets = {name: _widget(name, given[name], self._patches) for name in given}
+        self.widgets = {name: make_widget(name, given[name], self._patches) for name in given}
         taught = {name: entry.taught for name, entry in given.items() if entry.taught}
         self._spots = TorqueSpots(taught, skin) if taught else None
         self.values: dict[str, Any] = {
@@ -482,10 +483,15 @@ class Touch:
         )
 
 
-def _widget(name: str, given, patches) -> Widget:
+def make_widget(name: str, given: WidgetDescription, patches: Mapping[str, Patch]) -> Widget:
+    """A widget on the surfaces of a robot, by link; a pad's normal follows from the surface.
+
+    Raises:
+        InputError: its directions do not fit each other.
+    """
     normal = None
-    if given.kind == "pad" and given.normal is None and given.link in patches:
-        normal = mean_normal(patches[given.link], np.array(given.at), max(given.size) / 2)
+    if given.kind == "pad" and given.normal is None and given.link and given.link in patches:
+        normal = mean_normal(patches[given.link], np.array(given.at), max(given.size or (0.0,)) / 2)
     return Widget(name, given, normal)
 
 

@@ -54,6 +54,20 @@ class Widget:
             self._axes = _axes(name, given, normal)
 
     @property
+    def whole(self) -> bool:
+        """Whether it is its whole link, or taught without a place."""
+        return self.kind != "slider" and self.given.at is None
+
+    @property
+    def reach(self) -> float:
+        """From its middle to the nearest rim [m]; infinite for a whole link."""
+        if self.whole:
+            return np.inf
+        if self.kind == "slider":
+            return self.given.width / 2
+        return min(self.given.size) / 2 if self.given.size else self.given.radius or 0.0
+
+    @property
     def length(self) -> float:
         """Of a slider's way [m]."""
         return float(self._lengths.sum())
