@@ -18,6 +18,7 @@
 #include "guard.hpp"
 #include "localizer_bindings.hpp"
 #include "samples.hpp"
+#include "touchline/redundant.hpp"
 #include "touchline/touchline.hpp"
 
 namespace pipelines {
@@ -28,11 +29,14 @@ using namespace nb::literals;
 
 // The pipeline, and what a user of Python may ask for later: the events that have ended.
 struct Pipeline {
-  Pipeline(tl::Robot robot, const tl::Tuning& tuning)
-      : value(std::make_unique<tl::Pipeline>(std::move(robot), tuning)),
+  Pipeline(tl::Robot robot, const tl::Tuning& tuning, nb::object builder)
+      : value(std::make_unique<tl::RedundantPipeline>(std::move(robot), tuning)),
+        build(std::move(builder)),
         unmeasured(value->robot().joints.size() + 6 * value->robot().sensors.size(), tl::kUnknown) {}
 
-  std::unique_ptr<tl::Pipeline> value;
+  std::unique_ptr<tl::RedundantPipeline> value;
+  nb::object build;  // of a list of lost sensors: their `StandIn`, or None
+  std::vector<std::vector<int>> hopeless;  // lost sensors that nobody can stand in for
   std::mutex turn;
   std::vector<double> ended;       // numbers of events, one after the other
   std::vector<double> closed;      // of changes that a restart made, for the next sample to tell
@@ -44,7 +48,7 @@ struct Pipeline {
 // detector says, the sample's time and joint positions, how many contacts and changes of events
 // follow.
 struct Snapshot {
-  explicit Snapshot(const tl::Pipeline& p)
+  explicit Snapshot(const tl::RedundantPipeline& p)
       : width(p.row_layout().width()),
         segments(p.row_layout().segments),
         rows(p.rows()),
@@ -52,19 +56,25 @@ struct Snapshot {
         normalized(levels + segments),
         drift(normalized + rows),
         quiet(drift + rows),
-        time(quiet + segments),
+        watch(quiet + segments),
+        time(watch + segments),
         q(time + 1),
         contacts(q + p.row_layout().joints),
         changes(contacts + 1),
         end(changes + 1) {}
   std::size_t width, segments, rows;
-  std::size_t levels, normalized, drift, quiet, time, q, contacts, changes, end;
+  std::size_t levels, normalized, drift, quiet, watch, time, q, contacts, changes, end;
 };
 
 inline void write_row(const tl::Result& result, const tl::RowLayout& layout, double* out) {
   const tl::Span<double> row = result.estimate.row();
   std::copy(row.begin(), row.end(), out);
   out[layout.health()] = static_cast<double>(result.health);
+}
+
+inline double* write_watch(const tl::Result& result, double* out) {
+  for (const tl::Watch watch : result.watch) *out++ = static_cast<double>(watch);
+  return out;
 }
 
 // Keeps the events that a sample has ended.
@@ -78,7 +88,7 @@ inline void keep_ended(Pipeline& p, const tl::Result& result) {
 
 inline void take_snapshot(Pipeline& of, const tl::Sample& sample, const tl::Result& result,
                           std::vector<double>& out) {
-  const tl::Pipeline& p = *of.value;
+  const tl::RedundantPipeline& p = *of.value;
   const Snapshot at(p);
   const std::size_t contact = fields::width<tl::Contact>(), event = fields::width<tl::Event>() + 1;
   out.resize(at.end + result.contacts.size() * contact + result.events.size() * event +
@@ -88,6 +98,7 @@ inline void take_snapshot(Pipeline& of, const tl::Sample& sample, const tl::Resu
   std::copy(result.normalized.begin(), result.normalized.end(), out.data() + at.normalized);
   std::copy(result.drift.begin(), result.drift.end(), out.data() + at.drift);
   std::copy(result.quiet.begin(), result.quiet.end(), out.data() + at.quiet);
+  write_watch(result, out.data() + at.watch);
   out[at.time] = sample.time;
   std::copy_n(sample.q, at.contacts - at.q, out.data() + at.q);
   out[at.contacts] = static_cast<double>(result.contacts.size());
@@ -102,6 +113,19 @@ inline void take_snapshot(Pipeline& of, const tl::Sample& sample, const tl::Resu
   }
 }
 
+// Makes a stand-in for the sensors that a sample lacks, before the sample is taken.
+inline void prepare(Pipeline& p, const std::vector<int>& lost) {
+  if (lost.empty() || p.value->stands_in(lost)) return;
+  if (std::find(p.hopeless.begin(), p.hopeless.end(), lost) != p.hopeless.end()) return;
+  const nb::object made = p.build.is_none() ? nb::none() : p.build(lost);
+  const guard::Turn turn(p.turn);
+  if (made.is_none()) {
+    p.hopeless.push_back(lost);
+  } else {
+    p.value->add(nb::cast<tl::StandIn>(made));
+  }
+}
+
 inline nb::object update(Pipeline& p, double time, nb::handle q, nb::handle qd, nb::handle tau,
                          nb::handle wrench) {
   const tl::RowLayout& layout = p.value->row_layout();
@@ -110,6 +134,7 @@ inline nb::object update(Pipeline& p, double time, nb::handle q, nb::handle qd, 
   const tl::Sample sample{time, arrays::numbers(q, {n}), arrays::numbers(qd, {n}),
                           arrays::numbers_or(tau, {n}, missing),
                           arrays::numbers_or(wrench, {k, 6}, missing)};
+  if (p.value->absent(sample)) prepare(p, p.value->absent_in(sample));
   std::vector<double> numbers;  // taken out of its turn: a new array may run any code of Python
   {
     const guard::Turn turn(p.turn);
@@ -129,11 +154,18 @@ inline nb::tuple run(Pipeline& p, nb::handle time, nb::handle q, nb::handle qd, 
                      nb::handle wrench) {
   const samples::Many in = samples::many(p.value->row_layout(), time, q, qd, tau, wrench);
   const Snapshot at(*p.value);
+  for (std::size_t i = 0; i < in.rows; ++i) {
+    tl::Sample sample = in.first;
+    sample.wrench += 6 * i * p.value->row_layout().sensors;
+    if (p.value->absent(sample)) prepare(p, p.value->absent_in(sample));
+  }
   arrays::Out rows({in.rows, at.width}), levels({in.rows, at.segments}),
-      normalized({in.rows, at.rows}), drift({in.rows, at.rows}), quiet({in.rows, at.segments});
+      normalized({in.rows, at.rows}), drift({in.rows, at.rows}), quiet({in.rows, at.segments}),
+      watch({in.rows, at.segments});
   std::vector<double> contacts;
   const std::size_t contact = fields::width<tl::Contact>() + 1;
-  double *level = levels.data(), *x = normalized.data(), *y = drift.data(), *since = quiet.data();
+  double *level = levels.data(), *x = normalized.data(), *y = drift.data(), *since = quiet.data(),
+         *watched = watch.data();
   {
     const guard::Turn turn(p.turn);
     nb::gil_scoped_release release;
@@ -143,6 +175,7 @@ inline nb::tuple run(Pipeline& p, nb::handle time, nb::handle q, nb::handle qd, 
       x = std::copy(result.normalized.begin(), result.normalized.end(), x);
       y = std::copy(result.drift.begin(), result.drift.end(), y);
       since = std::copy(result.quiet.begin(), result.quiet.end(), since);
+      watched = write_watch(result, watched);
       for (const tl::Contact& c : result.contacts) {
         contacts.resize(contacts.size() + contact);
         double* to = &*contacts.end() - contact;
@@ -156,7 +189,7 @@ inline nb::tuple run(Pipeline& p, nb::handle time, nb::handle q, nb::handle qd, 
     });
   }
   return nb::make_tuple(rows.release(), levels.release(), normalized.release(), drift.release(),
-                        quiet.release(), arrays::table(contacts, contact));
+                        quiet.release(), watch.release(), arrays::table(contacts, contact));
 }
 
 // The events that have ended, from number `from` of them on, and those that last.
@@ -177,7 +210,7 @@ inline nb::tuple events(Pipeline& p, std::size_t from) {
 // Begins anew with the same robot but other figures, of its biases or loads. Events that last end
 // with the last sample; the numbers of events go on.
 inline void restart(Pipeline& p, const tl::Robot& robot) {
-  auto fresh = std::make_unique<tl::Pipeline>(robot, p.value->tuning());
+  auto fresh = std::make_unique<tl::RedundantPipeline>(robot, p.value->tuning());
   const tl::Robot& before = p.value->robot();
   if (robot.joint_names != before.joint_names || robot.sensor_names != before.sensor_names ||
       robot.links.size() != before.links.size() || robot.rows.size() != before.rows.size())
@@ -194,6 +227,7 @@ inline void restart(Pipeline& p, const tl::Robot& robot) {
   });
   fresh->number_events_from(p.value->next_event());
   p.value.swap(fresh);
+  p.hopeless.clear();
 }
 
 // For how long the arm has been at rest [s]; the mean torques (n) and wrenches (6 k) felt since.
@@ -213,7 +247,8 @@ inline nb::dict slices(const Pipeline& p) {
   add("levels", at.levels, at.normalized);
   add("normalized", at.normalized, at.drift);
   add("drift", at.drift, at.quiet);
-  add("quiet", at.quiet, at.time);
+  add("quiet", at.quiet, at.watch);
+  add("watch", at.watch, at.time);
   add("time", at.time, at.q);
   add("q", at.q, at.contacts);
   add("counts", at.contacts, at.end);
@@ -266,19 +301,35 @@ inline void bind(nb::module_& m) {
         const std::string content = tl::robot_bytes(robot);
         return nb::bytes(content.data(), content.size());
       });
+  nb::enum_<tl::Watch>(m, "Watch")
+      .value("watched", tl::Watch::watched)
+      .value("degraded", tl::Watch::degraded)
+      .value("blind", tl::Watch::blind);
+  nb::class_<tl::StandIn>(m, "StandIn")
+      .def(
+          "__init__",
+          [](tl::StandIn* self, std::vector<int> lost, const tl::Robot& robot,
+             std::vector<int> sensors, std::vector<int> segments, std::vector<int> rows,
+             std::vector<tl::Watch> watch) {
+            new (self) tl::StandIn{std::move(lost),     robot,           std::move(sensors),
+                                   std::move(segments), std::move(rows), std::move(watch)};
+          },
+          "lost"_a, "robot"_a, "sensors"_a, "segments"_a, "rows"_a, "watch"_a);
   nb::exception<tl::RobotFileError>(m, "RobotFileError", PyExc_ValueError);
   m.def("read_robot", &tl::read_robot, "path"_a);
   nb::class_<Pipeline>(m, "Pipeline")
       .def(
           "__init__",
-          [](Pipeline* self, const tl::Robot& robot, const tl::Tuning& tuning) {
-            new (self) Pipeline(robot, tuning);
+          [](Pipeline* self, const tl::Robot& robot, const tl::Tuning& tuning, nb::object build) {
+            new (self) Pipeline(robot, tuning, std::move(build));
           },
-          "robot"_a, "tuning"_a)
+          "robot"_a, "tuning"_a, "build"_a = nb::none())
       .def("update", &update, "time"_a, "q"_a, "qd"_a, "tau"_a.none(), "wrench"_a.none())
       .def("run", &run, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a)
       .def("events", &events, "since"_a)
       .def("restart", &restart, "robot"_a)
+      .def("prepare", &prepare, "lost"_a)
+      .def_prop_ro("lost", [](const Pipeline& p) { return p.value->lost(); })
       .def("rest", &rest)
       .def_prop_ro("time", [](const Pipeline& p) { return p.value->time(); })
       .def("region",

@@ -21,7 +21,7 @@ from touchline.pipeline.pipeline import Pipeline
 from touchline.pipeline.result import Result
 from touchline.result.contact import Candidate, Contact
 from touchline.result.event import Event, EventChange
-from touchline.result.kinds import ContactLevel, Happened, Status, Zone
+from touchline.result.kinds import ContactLevel, Happened, Status, Watch, Zone
 
 if TYPE_CHECKING:
     from touchline import live as live
@@ -54,6 +54,7 @@ __all__ = [
     "Result",
     "Robot",
     "Status",
+    "Watch",
     "Zone",
     "load_robot",
 ]

@@ -470,13 +470,23 @@ class Robot:
 
     def to_bytes(self) -> bytes: ...
 
+class Watch(enum.Enum):
+    watched = 0
+
+    degraded = 1
+
+    blind = 2
+
+class StandIn:
+    def __init__(self, lost: Sequence[int], robot: Robot, sensors: Sequence[int], segments: Sequence[int], rows: Sequence[int], watch: Sequence[Watch]) -> None: ...
+
 class RobotFileError(ValueError):
     pass
 
 def read_robot(path: str) -> Robot: ...
 
 class Pipeline:
-    def __init__(self, robot: Robot, tuning: Tuning) -> None: ...
+    def __init__(self, robot: Robot, tuning: Tuning, build: object | None = None) -> None: ...
 
     def update(self, time: float, q: object, qd: object, tau: object | None, wrench: object | None) -> object: ...
 
@@ -485,6 +495,11 @@ class Pipeline:
     def events(self, since: int) -> tuple: ...
 
     def restart(self, robot: Robot) -> None: ...
+
+    def prepare(self, lost: Sequence[int]) -> None: ...
+
+    @property
+    def lost(self) -> list[int]: ...
 
     def rest(self) -> tuple: ...
 

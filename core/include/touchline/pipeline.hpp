@@ -40,6 +40,7 @@ class Pipeline {
         rest_(observer_.row_layout()),
         period_(robot_.noise.period),
         levels_(robot_.segment_names.size(), 0.0),
+        watch_(levels_.size(), Watch::blind),
         contacts_(robot_.segment_names.size() * Reports::kMost) {}
 
   Pipeline(const Pipeline&) = delete;
@@ -109,6 +110,7 @@ class Pipeline {
     recorder_.finish();
     period_.take(observer_.time(), observer_.max_gap());
     rest_.take(row, sample.qd, observer_.time());
+    judge_watch();
     return result(sample, row);
   }
 
@@ -163,6 +165,19 @@ class Pipeline {
     for (int i = 0; i < 6; ++i) c.wrench[i] = root ? kUnknown : wrench[i];
   }
 
+  // By what is known of the detector's rows.
+  void judge_watch() {
+    for (std::size_t g = 0, i = 0; g < watch_.size(); ++g) {
+      bool any = false, all = true;
+      for (; i < robot_.rows.size() && robot_.rows[i].segment == static_cast<int>(g); ++i) {
+        const bool known = detector_.sample(i).known;
+        any = any || known;
+        all = all && known;
+      }
+      watch_[g] = !any ? Watch::blind : all ? Watch::watched : Watch::degraded;
+    }
+  }
+
   Result result(const Sample& sample, const double* row) const {
     const RowLayout& layout = observer_.row_layout();
     const Health health = static_cast<Health>(row[layout.health()]) |
@@ -175,6 +190,7 @@ class Pipeline {
             view(detector_.normalized()),
             view(detector_.drift()),
             view(detector_.quiet()),
+            view(watch_),
             {contacts_.data(), count_},
             view(recorder_.changes())};
   }
@@ -194,6 +210,7 @@ class Pipeline {
   RestMeter rest_;
   PeriodWatch period_;
   std::vector<double> levels_;  // of the segments, as the classifier takes them
+  std::vector<Watch> watch_;
   std::vector<Contact> contacts_;
   std::size_t count_ = 0;  // of contacts in the last sample
   bool touched_ = false;

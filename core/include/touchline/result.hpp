@@ -144,6 +144,9 @@ struct EventChange {
   Event event;
 };
 
+// Can a touch of a segment be felt? `degraded`: with fewer signals than the robot has.
+enum class Watch { watched, degraded, blind };
+
 // After one sample. Views stay valid until the pipeline's next call.
 struct Result {
   double time;    // [s] of the sample
@@ -153,6 +156,7 @@ struct Result {
   Span<double> normalized;  // per row of the detector: residual less baseline, in thresholds
   Span<double> drift;       // per row: one sigma of what the model's errors may have added [N, Nm]
   Span<double> quiet;       // per segment: over how long its baseline has been averaged [s]
+  Span<Watch> watch;        // per segment
   Span<Contact> contacts;   // at least one per segment that is touched
   Span<EventChange> events;
 };

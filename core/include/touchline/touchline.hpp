@@ -7,6 +7,7 @@
 #pragma once
 
 #include "touchline/pipeline.hpp"
+#include "touchline/redundant.hpp"
 #include "touchline/result.hpp"
 #include "touchline/robot.hpp"
 #include "touchline/robot_file.hpp"

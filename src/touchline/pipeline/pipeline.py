@@ -3,6 +3,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from weakref import ref
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +25,7 @@ from touchline.native import core
 from touchline.observer.observer import Estimate, Observer
 from touchline.pipeline.native_robot import native_robot, write_robot
 from touchline.pipeline.result import Layout, Result
+from touchline.pipeline.stand_ins import stand_in
 from touchline.pipeline.table import ContactTable
 from touchline.result.event import Event
 from touchline.result.native import Names
@@ -75,6 +77,8 @@ class Pipeline:
         thresholds: of the detector.
         skin: the robot's surfaces.
         contacts: of the last `run`, a row for each contact and sample.
+        watch: (N, m) of the last `run`: can a touch of each segment be felt (`tl.Watch`, by number:
+            0 watched, 1 degraded, 2 blind)?
 
     Raises:
         ValueError: an option is not among those allowed, or the surfaces are another robot's.
@@ -108,7 +112,14 @@ class Pipeline:
         tuning.method = getattr(core.Method, method)
         tuning.localizer = localizer_settings(rule, friction)
         self._weights = period, bandwidth, wrench_error, torque_error
-        self._core = core.Pipeline(self._native(), tuning)
+        self._model_error = model_error
+        own = ref(self)  # the native pipeline must not keep this one alive
+
+        def build(lost: list[int]) -> core.StandIn | None:
+            pipeline = own()
+            return pipeline._stand_in(lost) if pipeline is not None else None
+
+        self._core = core.Pipeline(self._native(), tuning, build)
         self._update = self._core.update
         names = Names.of(
             robot.segment_names,
@@ -119,6 +130,7 @@ class Pipeline:
         slices = {name: slice(*ends) for name, ends in self._observer.kernel.slices.items()}
         self._layout = Layout(self._core, slices, names)
         self.contacts = ContactTable.empty(names)
+        self.watch = np.empty((0, len(robot.segment_names)), np.int8)
         self._ended: list[Event] = []
         self._loads: dict[str, Load] = {}  # by link, of `set_load`
 
@@ -167,9 +179,10 @@ class Pipeline:
             ValueError: for a wrong shape.
         """
         stamps, signals = self._observer.recording(time, q, qd, tau, wrench)
-        rows, levels, normalized, drift, quiet, contacts = self._core.run(stamps, *signals)
+        rows, levels, normalized, drift, quiet, watch, contacts = self._core.run(stamps, *signals)
         sample = contacts[:, 0].astype(np.int64)
         self.contacts = ContactTable(sample, contacts[:, 1:], self._layout.names)
+        self.watch = watch.astype(np.int8)
         detection = Detection(levels, normalized, drift, quiet)
         return Estimate(rows, self._layout.estimate), detection
 
@@ -252,8 +265,23 @@ class Pipeline:
             self.robot = before
             raise
 
+    def _stand_in(self, lost: list[int]) -> core.StandIn | None:
+        """What carries on where these sensors are lost."""
+
+        def make(robot: Robot) -> tuple[core.Robot, Thresholds, Skin]:
+            rough = make_thresholds(robot, self._weights[0])
+            thresholds, skin = expect_drift(robot, rough, self._model_error), Skin(robot)
+            return native_robot(robot, thresholds, skin, *self._weights), thresholds, skin
+
+        return stand_in(self.robot, self.thresholds, lost, make)
+
     def _native(self) -> core.Robot:
         return native_robot(self.robot, self.thresholds, self.skin, *self._weights)
+
+    @property
+    def lost(self) -> list[str]:
+        """Sensors that are done without: they have been absent for longer than 5 / bandwidth."""
+        return [self.robot.sensor_names[s] for s in self._core.lost]
 
     def beside(self, slots: int) -> core.Runner:
         """A native thread that takes samples for this pipeline; it gives what `result` reads.
@@ -261,6 +289,9 @@ class Pipeline:
         Args:
             slots: samples and results that may wait.
         """
+        sensors = range(len(self.robot.sensor_names))
+        for lost in [*([s] for s in sensors), list(sensors)]:
+            self._core.prepare(lost)  # the thread has no time to make them
         return core.Runner(self._core, slots)
 
     def result(self, numbers: Array) -> Result:

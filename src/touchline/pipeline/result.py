@@ -11,13 +11,14 @@ from touchline.native import core
 from touchline.observer.observer import Estimate
 from touchline.result.contact import Contact
 from touchline.result.event import Event, EventChange
-from touchline.result.kinds import Happened
+from touchline.result.kinds import Happened, Watch
 from touchline.result.native import Names
 from touchline.value import Value, lazily
 
 Array = NDArray[np.float64]
 
 HAPPENED = tuple(Happened)  # in the order of the core
+WATCH = tuple(Watch)  # likewise
 
 
 class Layout:
@@ -36,6 +37,7 @@ class Layout:
         self.normalized, self.drift, self.quiet = (
             slices[name] for name in ("normalized", "drift", "quiet")
         )
+        self.watch = slices["watch"]
         self.time, self.q = slices["time"].start, slices["q"]
         self.health = estimate["health"].start
         self.contacts, self.changes = slices["counts"].start, slices["counts"].start + 1
@@ -55,6 +57,7 @@ class Result(Value):
         detection: levels per segment.
         health: health bits of the sample (`touchline.Health`).
         events: those that began, changed or ended with this sample.
+        watch: of each segment: can a touch of it be felt?
     """
 
     time: float
@@ -64,6 +67,7 @@ class Result(Value):
     detection: Detection
     health: int
     events: tuple[EventChange, ...] = ()
+    watch: tuple[Watch, ...] = ()
 
 
 def _time(row: Array, at: Layout) -> float:
@@ -105,9 +109,14 @@ def _events(row: Array, at: Layout) -> tuple[EventChange, ...]:
     )
 
 
+def _watch(row: Array, at: Layout) -> tuple[Watch, ...]:
+    return tuple(WATCH[int(state)] for state in row[at.watch].tolist())
+
+
 lazily(
     Result,
     {
+        "watch": _watch,
         "time": _time,
         "q": _q,
         "estimate": _estimate,

@@ -34,3 +34,11 @@ class Happened(StrEnum):
     BEGAN = "began"
     CHANGED = "changed"
     ENDED = "ended"
+
+
+class Watch(StrEnum):
+    """Whether a touch of a segment can be felt."""
+
+    WATCHED = "watched"
+    DEGRADED = "degraded"  # with fewer signals than the robot has
+    BLIND = "blind"  # not at all: settling, or nothing that feels it is left

@@ -1,0 +1,379 @@
+// SPDX-License-Identifier: Apache-2.0
+// A pipeline that carries on where a force-torque sensor is lost, with what the robot has left: each
+// loss has a stand-in, the pipeline of the same robot without those sensors. There the segments on
+// both sides of the lost sensor are one, and joint torques step in. What is said is put into the
+// words of the whole robot. One belongs to one thread at a time; `update` allocates nothing.
+//
+// A stand-in is warmed up from the first sample without the sensor on, and speaks as soon as it has
+// settled, 5 / K later; the whole robot speaks again 5 / K after the sensor is back. What loads the
+// arm at that moment counts as it does at any start of observation. Events that last end with the
+// one that falls silent.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "touchline/pipeline.hpp"
+
+namespace touchline {
+
+// A robot without some of its sensors, and where its parts stand in the whole robot.
+struct StandIn {
+  std::vector<int> lost;      // sensors of the whole robot that it does without
+  Robot robot;
+  std::vector<int> sensors;   // of the whole robot, for each of its own
+  std::vector<int> segments;  // of the whole robot, for each of its own
+  std::vector<int> rows;      // of the whole robot's detector, for each of its own; -1: none
+  std::vector<Watch> watch;   // of each segment of the whole robot
+};
+
+class RedundantPipeline {
+ public:
+  explicit RedundantPipeline(Robot robot, const Tuning& tuning = {})
+      : whole_(std::move(robot), tuning) {
+    const Robot& own = whole_.robot();
+    const std::size_t n = own.joints.size(), k = own.sensors.size();
+    absent_.resize(k, 0);
+    row_.resize(whole_.row_layout().width());
+    levels_.resize(own.segment_names.size());
+    quiet_.resize(levels_.size());
+    normalized_.resize(own.rows.size());
+    drift_.resize(own.rows.size());
+    contacts_.resize(levels_.size() * Reports::kMost);
+    changes_.reserve(8 * levels_.size() * (Reports::kMost + 1));
+    renumbered_.reserve(changes_.capacity());
+    joints_ = n;
+  }
+
+  // Allocates. Throws std::invalid_argument where it does not fit the robot.
+  void add(StandIn given) {
+    check(given);
+    stand_ins_.push_back(std::make_unique<Second>(std::move(given), tuning(), absent_.size()));
+  }
+  // Which sensors lack a usable reading in a sample; is there a stand-in without just these?
+  std::vector<int> absent_in(const Sample& sample) const {
+    std::vector<int> found;
+    for (std::size_t s = 0; s < absent_.size(); ++s) {
+      if (absent(sample, s)) found.push_back(static_cast<int>(s));
+    }
+    return found;
+  }
+  bool stands_in(const std::vector<int>& lost) const {
+    return std::any_of(stand_ins_.begin(), stand_ins_.end(),
+                       [&](const auto& second) { return second->given.lost == lost; });
+  }
+  bool absent(const Sample& sample) const {
+    for (std::size_t s = 0; s < absent_.size(); ++s) {
+      if (absent(sample, s)) return true;
+    }
+    return false;
+  }
+
+  const RowLayout& row_layout() const { return whole_.row_layout(); }
+  const Robot& robot() const { return whole_.robot(); }
+
+  // Takes one sample; see `Pipeline::update`.
+  Result update(const Sample& sample) {
+    find_absent(sample);
+    return healthy() ? whole_.update(sample) : step(sample);
+  }
+
+  // Takes N samples; see `Pipeline::run`. The bits are those of `update`.
+  template <class Each>
+  void run(std::size_t samples, const double* time, const Sample& first, double* rows, Each&& each) {
+    const std::size_t n = joints_, w = 6 * absent_.size(), width = row_.size();
+    const auto at = [&](std::size_t i) {
+      return Sample{time[i], first.q + i * n, first.qd + i * n, first.tau + i * n,
+                    first.wrench + i * w};
+    };
+    for (std::size_t i = 0; i < samples;) {
+      std::size_t end = i;  // of the samples with all sensors from here on
+      while (healthy() && end < samples && !absent(at(end))) ++end;
+      if (end > i) {
+        whole_.run(end - i, time + i, at(i), rows + i * width, each);
+        i = end;
+        continue;
+      }
+      const Result result = update(at(i));
+      std::copy(result.estimate.row().begin(), result.estimate.row().end(), rows + i * width);
+      each(result);
+      ++i;
+    }
+  }
+
+  // Sensors that are done without.
+  const std::vector<int>& lost() const { return now_ != nullptr ? now_->given.lost : none_; }
+
+  template <class Visit>
+  void visit_lasting(Visit&& visit) {
+    Pipeline& from = now_ != nullptr ? now_->pipeline : whole_;
+    from.visit_lasting([&](Event event) {
+      rename(event);
+      visit(static_cast<const Event&>(event));
+    });
+  }
+  int next_event() const { return std::max(next_, whole_.next_event()); }
+  void number_events_from(int next) {
+    next_ = next;
+    whole_.number_events_from(next);
+  }
+  double time() const { return whole_.time(); }
+  const RestMeter& rest() const { return whole_.rest(); }
+  std::vector<SurfaceCell> region() const {
+    return now_ != nullptr ? now_->pipeline.region() : whole_.region();
+  }
+  const Tuning& tuning() const { return whole_.tuning(); }
+  const std::vector<LinkSurface>& surfaces() const { return whole_.surfaces(); }
+  std::size_t rows() const { return whole_.rows(); }
+
+ private:
+  // An event under another number than the one its pipeline gave it.
+  struct Renumbered {
+    const Pipeline* of;
+    int own, told;
+  };
+
+  struct Second {
+    Second(StandIn of, const Tuning& tuning, std::size_t sensors)
+        : given{std::move(of.lost), {}, std::move(of.sensors), std::move(of.segments),
+                std::move(of.rows), std::move(of.watch)},
+          pipeline(std::move(of.robot), tuning),
+          wrench(6 * given.sensors.size()),
+          without(sensors, 0) {
+      for (const int s : given.lost) without[s] = 1;
+    }
+    StandIn given;  // without its robot, which the pipeline has
+    Pipeline pipeline;
+    std::vector<double> wrench;
+    std::vector<char> without;  // per sensor of the whole robot
+  };
+
+  void check(const StandIn& s) const {
+    const Robot& own = whole_.robot();
+    const auto within = [](const std::vector<int>& values, int least, std::size_t end) {
+      return std::all_of(values.begin(), values.end(),
+                         [&](int i) { return i >= least && i < static_cast<int>(end); });
+    };
+    const bool fits = s.robot.joints.size() == own.joints.size() &&
+                      s.robot.links.size() == own.links.size() &&
+                      s.sensors.size() == s.robot.sensors.size() &&
+                      s.segments.size() == s.robot.segment_names.size() &&
+                      s.rows.size() == s.robot.rows.size() &&
+                      s.watch.size() == own.segment_names.size() &&
+                      s.sensors.size() + s.lost.size() == own.sensors.size() &&
+                      within(s.lost, 0, own.sensors.size()) &&
+                      within(s.sensors, 0, own.sensors.size()) &&
+                      within(s.segments, 0, own.segment_names.size()) &&
+                      within(s.rows, -1, own.rows.size());
+    if (!fits) throw std::invalid_argument("a stand-in does not fit the robot");
+  }
+
+  // Does the whole robot speak for itself, with all sensors and its own numbers of events?
+  bool healthy() const {
+    return now_ == nullptr && warming_ == nullptr && !any_absent_ && renumbered_.empty();
+  }
+
+  // Is a six-axis sensor without a usable reading?
+  bool absent(const Sample& sample, std::size_t s) const {
+    const SensorRow& sensor = whole_.robot().sensors[s];
+    double sum = 0.0;
+    for (int i = 0; i < 6; ++i) sum += sensor.axes[i] ? std::fabs(sample.wrench[6 * s + i]) : 0.0;
+    return !(sum < kAbsurd);
+  }
+  void find_absent(const Sample& sample) {
+    any_absent_ = false;
+    for (std::size_t s = 0; s < absent_.size(); ++s) {
+      absent_[s] = absent(sample, s);
+      any_absent_ = any_absent_ || absent_[s] != 0;
+    }
+  }
+
+  // The stand-in that does without just these sensors, or with the fewest others too; null: none.
+  Second* stand_in() const {
+    Second* best = nullptr;
+    for (const std::unique_ptr<Second>& second : stand_ins_) {
+      bool covers = true;
+      for (std::size_t s = 0; s < absent_.size(); ++s)
+        covers = covers && (absent_[s] == 0 || second->without[s] != 0);
+      if (covers && (best == nullptr || second->given.lost.size() < best->given.lost.size()))
+        best = second.get();
+    }
+    return best;
+  }
+
+  Result step(const Sample& sample) {
+    changes_.clear();
+    Second* const needed = any_absent_ ? stand_in() : nullptr;
+    const Result of_whole = whole_.update(sample);  // it settles anew as soon as all are back
+    Result of_now = now_ != nullptr ? feed(*now_, sample) : of_whole;
+    warming_ = needed != now_ ? needed : nullptr;
+    if (warming_ != nullptr) {
+      const Result of_warming = feed(*warming_, sample);
+      if (settled(of_warming)) {
+        now_ = hand_over(std::exchange(warming_, nullptr));
+        of_now = of_warming;
+      }
+    } else if (now_ != nullptr && !any_absent_ && settled(of_whole)) {
+      now_ = hand_over(nullptr);
+      of_now = of_whole;
+    }
+    return now_ != nullptr ? said(*now_, of_now) : with_changes(of_now);
+  }
+
+  Result feed(Second& second, const Sample& sample) {
+    for (std::size_t s = 0; s < second.given.sensors.size(); ++s)
+      std::copy_n(sample.wrench + 6 * second.given.sensors[s], 6, second.wrench.data() + 6 * s);
+    return second.pipeline.update(
+        {sample.time, sample.q, sample.qd, sample.tau, second.wrench.data()});
+  }
+
+  static bool settled(const Result& result) { return (result.health & kSettling) == 0; }
+
+  Pipeline& pipeline_of(Second* second) { return second != nullptr ? second->pipeline : whole_; }
+
+  // Events that last end with the one that falls silent; those of the other begin.
+  Second* hand_over(Second* to) {
+    next_ = next_event();
+    Pipeline &from = pipeline_of(now_), &next = pipeline_of(to);
+    from.visit_lasting([&](Event event) {
+      rename(event);
+      event.cleared = from.time();
+      tell(Happened::ended, event);
+    });
+    renumbered_.clear();
+    now_ = to;
+    next.visit_lasting([&](Event event) {
+      number(next, event.id);
+      rename(event);
+      tell(Happened::began, event);
+    });
+    if (to == nullptr) whole_.number_events_from(next_);
+    return to;
+  }
+
+  void tell(Happened happened, const Event& event) {
+    if (changes_.size() < changes_.capacity()) changes_.push_back({happened, event});
+  }
+
+  // The number under which an event of the one that speaks is told.
+  int number(const Pipeline& of, int own) {
+    for (const Renumbered& known : renumbered_) {
+      if (known.of == &of && known.own == own) return known.told;
+    }
+    if (&of == &whole_ && now_ == nullptr && own >= next_) return own;
+    if (renumbered_.size() < renumbered_.capacity()) renumbered_.push_back({&of, own, next_});
+    return next_++;
+  }
+
+  void rename(Event& event) {
+    event.id = number(pipeline_of(now_), event.id);
+    if (now_ != nullptr) event.segment = now_->given.segments[event.segment];
+  }
+
+  // What a stand-in says, in the words of the whole robot.
+  Result said(const Second& second, const Result& r) {
+    const StandIn& by = second.given;
+    put_row(second, r);
+    std::fill(levels_.begin(), levels_.end(), 0);
+    std::fill(quiet_.begin(), quiet_.end(), 0.0);
+    std::fill(normalized_.begin(), normalized_.end(), 0.0);
+    std::fill(drift_.begin(), drift_.end(), 0.0);
+    for (std::size_t g = 0; g < by.segments.size(); ++g) {
+      levels_[by.segments[g]] = std::max(levels_[by.segments[g]], r.levels[g]);
+      quiet_[by.segments[g]] = r.quiet[g];
+    }
+    for (std::size_t i = 0; i < by.rows.size(); ++i) {
+      if (by.rows[i] < 0) continue;
+      normalized_[by.rows[i]] = r.normalized[i];
+      drift_[by.rows[i]] = r.drift[i];
+    }
+    const std::size_t count = std::min(r.contacts.size(), contacts_.size());
+    for (std::size_t i = 0; i < count; ++i) {
+      contacts_[i] = r.contacts[i];
+      contacts_[i].segment = by.segments[contacts_[i].segment];
+    }
+    for (std::size_t i = 0; i < count; ++i)
+      contacts_[i].event = number(second.pipeline, contacts_[i].event);
+    Result told = with_changes(r);
+    told.health |= kSensorExcluded;
+    told.estimate = Estimate(row_.data(), whole_.row_layout());
+    told.levels = {levels_.data(), levels_.size()};
+    told.normalized = {normalized_.data(), normalized_.size()};
+    told.drift = {drift_.data(), drift_.size()};
+    told.quiet = {quiet_.data(), quiet_.size()};
+    told.watch = {by.watch.data(), by.watch.size()};
+    told.contacts = {contacts_.data(), count};
+    return told;
+  }
+
+  // Its events after those of a change.
+  Result with_changes(const Result& r) {
+    const Pipeline& speaker = pipeline_of(now_);
+    for (EventChange change : r.events) {
+      const int own = change.event.id;
+      rename(change.event);
+      const bool told = std::any_of(changes_.begin(), changes_.end(), [&](const EventChange& c) {
+        return c.happened == change.happened && c.event.id == change.event.id;
+      });
+      if (!told) tell(change.happened, change.event);
+      if (change.happened != Happened::ended) continue;
+      renumbered_.erase(std::remove_if(renumbered_.begin(), renumbered_.end(),
+                                       [&](const Renumbered& known) {
+                                         return known.of == &speaker && known.own == own;
+                                       }),
+                        renumbered_.end());
+    }
+    Result told = r;
+    if (now_ == nullptr && !renumbered_.empty()) {
+      for (std::size_t i = 0; i < r.contacts.size() && i < contacts_.size(); ++i) {
+        contacts_[i] = r.contacts[i];
+        contacts_[i].event = number(whole_, contacts_[i].event);
+      }
+      told.contacts = {contacts_.data(), std::min(r.contacts.size(), contacts_.size())};
+    }
+    told.events = {changes_.data(), changes_.size()};
+    return told;
+  }
+
+  void put_row(const Second& second, const Result& r) {
+    const StandIn& by = second.given;
+    const RowLayout &to = whole_.row_layout(), &from = second.pipeline.row_layout();
+    const double* in = r.estimate.row().data();
+    double* out = row_.data();
+    std::fill(row_.begin(), row_.end(), kUnknown);
+    std::copy_n(in, 4 * from.joints, out);  // torques, own ones, parity, innovations
+    std::copy_n(in + from.joint_settled(), from.joints, out + to.joint_settled());
+    std::copy_n(in + from.joint_gap_std(), from.joints, out + to.joint_gap_std());
+    std::fill_n(out + to.segment_settled(), to.segments, 0.0);
+    for (int s = 0; s < from.sensors; ++s)
+      std::copy_n(in + from.sensor_wrench() + 6 * s, 6, out + to.sensor_wrench() + 6 * by.sensors[s]);
+    for (int g = 0; g < from.segments; ++g) {
+      const int h = by.segments[g];
+      std::copy_n(in + from.segment_wrench() + 6 * g, 6, out + to.segment_wrench() + 6 * h);
+      std::copy_n(in + from.segment_innovation() + 6 * g, 6, out + to.segment_innovation() + 6 * h);
+      out[to.segment_settled() + h] = in[from.segment_settled() + g];
+      std::copy_n(in + from.segment_gap_std() + 2 * g, 2, out + to.segment_gap_std() + 2 * h);
+    }
+    out[to.health()] = static_cast<double>(r.health | kSensorExcluded);
+  }
+
+  Pipeline whole_;
+  std::vector<std::unique_ptr<Second>> stand_ins_;
+  Second *now_ = nullptr, *warming_ = nullptr;  // who speaks, if not the whole; who shall
+  bool any_absent_ = false;
+  std::size_t joints_ = 0;
+  std::vector<char> absent_;  // per sensor, at the last sample
+  std::vector<double> row_, quiet_, normalized_, drift_;
+  std::vector<int> levels_, none_;
+  std::vector<Contact> contacts_;
+  std::vector<EventChange> changes_;
+  std::vector<Renumbered> renumbered_;
+  int next_ = 0;  // number of the next event, as far as told
+};
+
+}  // namespace touchline

@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A force-torque sensor dies: the rest carries on, and what cannot be felt is said."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from free_motion import exact_loads
+
+import touchline as tl
+from touchline.model.description import SensorDescription
+from touchline.model.robot import Robot
+from touchline.observer.samples import Samples
+
+RATE = 1000.0
+DEAD = 0.3  # s at which the sensor dies
+PUSH = 0.6  # s at which the push begins; 5 / K is 50 ms
+END = 1.2  # s
+
+
+def ur5():
+    """A UR5 with a base and a wrist sensor and six joint torques."""
+    try:
+        plain = tl.load_robot("ur5")
+    except tl.InputError as error:
+        pytest.skip(str(error))
+    places = (("base", "shoulder_link"), ("wrist", "wrist_3_link"))
+    sensors = tuple(SensorDescription(name, link) for name, link in places)
+    noise = replace(
+        plain.description.noise, sensors={s.name: (0.05,) * 3 + (0.01,) * 3 for s in sensors}
+    )
+    bandwidths = {s.name: 100.0 for s in sensors}
+    joints = tuple(replace(joint, torque="sensor") for joint in plain.description.joints)
+    description = replace(
+        plain.description, sensors=sensors, noise=noise, bandwidth_sensors=bandwidths, joints=joints
+    )
+    return Robot(description, plain.mechanism)
+
+
+ROBOTS = {
+    "sara": lambda: tl.load_robot("sara"),
+    "sara-full": lambda: tl.load_robot("sara-full"),
+    "ur5": ur5,
+}
+_made = {}
+
+
+def robot_named(name):
+    if name not in _made:
+        _made[name] = ROBOTS[name]()
+    return _made[name]
+
+
+def inboard(robot, node):
+    path = []
+    while node >= 0:
+        path.append(robot.nodes[node])
+        node = robot.nodes[node].parent
+    return path
+
+
+def pushed(robot, q, link, force, begin=PUSH, end=END, seed=0):
+    """The arm stands at q; a force (3,) in world acts on the middle of a link from `begin` on."""
+    time = np.arange(round(END * RATE)) / RATE
+    many = np.tile(q, (len(time), 1))
+    tau, wrench = exact_loads(robot, time, many, np.zeros_like(many))
+    rng = np.random.default_rng(seed)
+    tau = tau + rng.normal(0.0, 0.02, tau.shape)
+    wrench = wrench + rng.normal(0.0, 0.02, wrench.shape)
+    on = (time >= begin) & (time < end)
+    point = middle(robot, q, link)
+    moment = np.cross(point, force)
+    nodes, poses = robot.nodes, robot.poses(q)
+    for node in inboard(robot, robot.places[link].node):
+        i = nodes.index(node)
+        R, p = poses[i][:3, :3], poses[i][:3, 3]
+        if node.coordinate >= 0:
+            axis = R[:, 2]
+            torque = node.multiplier * (axis @ (moment - np.cross(p, force)))
+            tau[on, node.coordinate] -= torque
+        if node.sensor in robot.sensor_names:
+            s = robot.sensor_names.index(node.sensor)
+            local = np.concatenate([R.T @ force, R.T @ (moment - np.cross(p, force))])
+            wrench[on, s] -= local
+    return Samples(time, many, np.zeros_like(many), tau, wrench)
+
+
+def middle(robot, q, link):
+    skin = tl.Skin(robot)
+    patch = next(p for p in skin.patches if p.link == link)
+    return (robot.T_world_links(q)[link] @ [*patch.surface.vertices.mean(axis=0), 1.0])[:3]
+
+
+def run(pipeline, s):
+    return pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+
+
+def without(samples, sensor, begin=DEAD, end=END):
+    wrench = samples.wrench.copy()
+    wrench[(samples.time >= begin) & (samples.time < end), sensor] = np.nan
+    return replace(samples, wrench=wrench)
+
+
+def felt_links(robot, skin_of):
+    return [p.link for p in tl.Skin(skin_of).patches if p.segment is not None]
+
+
+CASES = [
+    (name, k) for name, count in (("sara", 3), ("sara-full", 2), ("ur5", 2)) for k in range(count)
+]
+
+
+@pytest.mark.parametrize(("name", "dead"), CASES)
+def test_a_push_is_felt_on_every_link_that_the_rest_can_feel(name, dead):
+    from touchline.pipeline.stand_ins import robot_without
+
+    robot = robot_named(name)
+    q = np.linspace(0.3, 0.9, len(robot.joint_names))
+    rng = np.random.default_rng(5)
+    rest = robot_without(robot, [dead])
+    whole, late, missed = tl.Pipeline(robot), [], []
+    for link in felt_links(robot, rest):
+        force = rng.normal(size=3)
+        force *= 25.0 / np.linalg.norm(force)
+        samples = pushed(robot, q, link, force)
+        alone = tl.Pipeline(rest)
+        left = np.delete(samples.wrench, dead, axis=1)
+        alone.run(samples.time, samples.q, samples.qd, samples.tau, left)
+        if not alone.events:
+            continue  # this direction cannot be felt by what is left
+        whole.reset()
+        run(whole, samples)
+        clean = min(event.detected for event in whole.events if event.detected >= PUSH)
+        pipeline = tl.Pipeline(robot)
+        run(pipeline, without(samples, dead))
+        found = [event.detected for event in pipeline.events if event.detected >= PUSH]
+        if not found:
+            missed.append(link)
+        elif min(found) > clean + 0.03:
+            late.append((link, min(found) - clean))
+        assert pipeline.lost == [robot.sensor_names[dead]]
+        assert all(event.detected >= PUSH for event in pipeline.events), "an event of the fault"
+    assert not missed and not late
+
+
+@pytest.mark.parametrize(("name", "dead"), CASES)
+def test_a_blind_segment_is_said_and_a_healthy_one_is_watched(name, dead):
+    robot = robot_named(name)
+    q = np.linspace(0.3, 0.9, len(robot.joint_names))
+    link = felt_links(robot, robot)[-1]
+    samples = pushed(robot, q, link, np.zeros(3))
+    pipeline = tl.Pipeline(robot)
+    run(pipeline, without(samples, dead))
+    before, after = pipeline.watch[250], pipeline.watch[-1]
+    assert np.all(before == 0), "all is watched while all sensors are there"
+    g = robot.segment_names.index(robot.sensor_names[dead])
+    assert after[g] != 0
+    live = tl.Pipeline(robot)
+    for i, x in enumerate(zip(*_columns(without(samples, dead)), strict=True)):
+        result = live.update(*x)
+        numbers = [list(tl.Watch).index(state) for state in result.watch]
+        assert numbers == pipeline.watch[i].tolist()
+    assert pipeline.events == [] and live.events == []
+
+
+def _columns(s):
+    return s.time, s.q, s.qd, s.tau, s.wrench
+
+
+def test_the_root_sensor_of_an_arm_without_torques_leaves_it_blind():
+    robot = robot_named("ur5")
+    silent = tuple(replace(joint, torque="none") for joint in robot.description.joints)
+    only = Robot(
+        replace(robot.description, joints=silent, sensors=robot.description.sensors[:1]),
+        robot.mechanism,
+    )
+    q = np.linspace(0.3, 0.9, 6)
+    samples = pushed(only, q, felt_links(only, only)[-1], np.array([0.0, 0.0, -25.0]))
+    pipeline = tl.Pipeline(only)
+    run(pipeline, without(samples, 0))
+    assert pipeline.events == [] and np.all(pipeline.watch[-1] == 2)
+    # The joint inboard of the sensor has no torque: what it moves alone was never felt.
+    assert dict(zip(only.segment_names, pipeline.watch[250], strict=True)) == {"base": 0, "root": 2}
+
+
+def test_it_recovers_within_five_time_constants_of_the_sensor_s_return():
+    robot = robot_named("sara")
+    q = np.linspace(0.3, 0.9, 7)
+    samples = pushed(robot, q, "link5", np.array([0.0, 15.0, -20.0]), begin=0.9)
+    pipeline = tl.Pipeline(robot)
+    run(pipeline, without(samples, 1, 0.3, 0.6))
+    states = pipeline.watch
+    assert np.all(states[604 + 51] == 0) and np.any(states[550] != 0)
+    assert pipeline.lost == []
+    assert len(pipeline.events) == 1 and 0.9 <= pipeline.events[0].detected < 0.93
+
+
+def test_numbers_and_changes_of_events_are_one_story():
+    robot = robot_named("sara")
+    q = np.linspace(0.3, 0.9, 7)
+    force = np.array([0.0, 15.0, -20.0])
+    first = pushed(robot, q, "link5", force, begin=0.1, end=0.2)
+    second = pushed(robot, q, "link5", force, begin=0.5, end=0.6)
+    third = pushed(robot, q, "link5", force, begin=0.8, end=0.86)
+    tau = first.tau + second.tau + third.tau - 2 * pushed(robot, q, "link5", 0 * force).tau
+    wrench = first.wrench + second.wrench + third.wrench
+    wrench -= 2 * pushed(robot, q, "link5", 0 * force).wrench
+    samples = without(replace(first, tau=tau, wrench=wrench), 1, 0.3, 0.7)
+    whole, live = tl.Pipeline(robot), tl.Pipeline(robot)
+    run(whole, samples)
+    told = []
+    for x in zip(*_columns(samples), strict=True):
+        told += [(c.happened, c.event.id) for c in live.update(*x).events]
+    assert [event.id for event in whole.events] == [0, 1, 2]
+    assert whole.events == live.events
+    for number in range(3):
+        own = [str(happened) for happened, i in told if i == number]
+        assert own[0] == "began" and own[-1] == "ended" and own.count("began") == 1
+        assert own.count("ended") == 1
+
+
+@pytest.mark.parametrize("chunks", [1, 7, 64])
+def test_a_recording_in_parts_gives_the_bits_of_single_samples(chunks):
+    robot = robot_named("sara")
+    q = np.linspace(0.3, 0.9, 7)
+    samples = without(pushed(robot, q, "link5", np.array([0.0, 15.0, -20.0])), 1, 0.3, 0.8)
+    live = tl.Pipeline(robot)
+    single = [live.update(*x) for x in zip(*_columns(samples), strict=True)]
+    parts = tl.Pipeline(robot)
+    rows = [
+        parts.run(*x)[0].rows
+        for x in zip(*(np.array_split(c, chunks) for c in _columns(samples)), strict=True)
+    ]
+    np.testing.assert_array_equal(np.concatenate(rows), [r.estimate.rows for r in single])
+    assert parts.events == live.events
+
+
+def test_healthy_samples_are_the_whole_robot_s_to_the_last_bit():
+    robot = robot_named("sara")
+    q = np.linspace(0.3, 0.9, 7)
+    samples = pushed(robot, q, "link5", np.array([0.0, 15.0, -20.0]))
+    plain, ready = tl.Pipeline(robot), tl.Pipeline(robot)
+    ready._core.prepare([0])
+    np.testing.assert_array_equal(run(plain, samples)[0].rows, run(ready, samples)[0].rows)
+    assert plain.events == ready.events
