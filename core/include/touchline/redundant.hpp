@@ -222,7 +222,10 @@ class RedundantPipeline {
       now_ = hand_over(nullptr);
       of_now = of_whole;
     }
-    return now_ != nullptr ? said(*now_, of_now) : with_changes(of_now);
+    if (now_ == nullptr) return with_changes(of_now);
+    // What is wrong with the sample itself, the whole robot tells.
+    of_now.health |= (of_whole.health & ~kSettling) | kSensorExcluded;
+    return said(*now_, of_now);
   }
 
   Result feed(Second& second, const Sample& sample) {
@@ -300,7 +303,6 @@ class RedundantPipeline {
     for (std::size_t i = 0; i < count; ++i)
       contacts_[i].event = number(second.pipeline, contacts_[i].event);
     Result told = with_changes(r);
-    told.health |= kSensorExcluded;
     told.estimate = Estimate(row_.data(), whole_.row_layout());
     told.levels = {levels_.data(), levels_.size()};
     told.normalized = {normalized_.data(), normalized_.size()};
@@ -359,7 +361,7 @@ class RedundantPipeline {
       out[to.segment_settled() + h] = in[from.segment_settled() + g];
       std::copy_n(in + from.segment_gap_std() + 2 * g, 2, out + to.segment_gap_std() + 2 * h);
     }
-    out[to.health()] = static_cast<double>(r.health | kSensorExcluded);
+    out[to.health()] = static_cast<double>(r.health);
   }
 
   Pipeline whole_;
