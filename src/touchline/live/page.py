@@ -11,6 +11,7 @@ from touchline.errors import InputError
 from touchline.health import Health
 from touchline.live.session import Session
 from touchline.live.streams import StreamState
+from touchline.result.kinds import Watch
 from touchline.view.contacts import ContactScene
 from touchline.view.scene import RobotScene, dress
 from touchline.view.server import PageServer
@@ -77,6 +78,12 @@ class RobotPage:
         else:
             bits = [bit.name for bit in Health if result.health & bit and bit.name]
             lines.append(f"health: {', '.join(bits).lower() or 'all is well'}")
+            pipeline = self._session.pipeline
+            if pipeline is not None and pipeline.lost:
+                lines.append(f"<b>without {html.escape(', '.join(pipeline.lost))}</b>")
+            for segment, watch in zip(self._session.robot.segment_names, result.watch, strict=True):
+                if watch != Watch.WATCHED:
+                    lines.append(f"segment {html.escape(segment)}: <b>{watch}</b>")
             for contact in result.contacts:
                 where = contact.link or contact.likely_link or contact.segment
                 lines.append(f"<b>{html.escape(where)}</b>: {contact.size:.1f} N, {contact.status}")

@@ -4,7 +4,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from touchline.detector.thresholds import Thresholds
+from touchline.detector.thresholds import RowThreshold, Thresholds
 from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
 from touchline.native import core
@@ -49,7 +49,7 @@ def stand_in(
     return core.StandIn(list(lost), native, sensors, segments, rows, watch)
 
 
-def _key(robot: Robot, row: core.DetectionRow) -> tuple[str, int]:
+def _key(robot: Robot, row: RowThreshold) -> tuple[str, int]:
     """What a row of the detector tests: a joint's torque or a component of a segment's wrench."""
     if row.component < 0:
         return robot.joint_names[row.joint], -1

@@ -22,7 +22,7 @@ from touchline.report.comparison import Comparison, compare_log
 from touchline.report.curves import Curves
 from touchline.report.event_pictures import EventPoses
 from touchline.report.event_windows import EventWindows
-from touchline.report.facts import bandwidth_warnings, bandwidths
+from touchline.report.facts import bandwidth_warnings, bandwidths, watch_warnings
 from touchline.report.outputs import (
     ANALYSIS,
     NAMES,
@@ -34,6 +34,7 @@ from touchline.report.outputs import (
 )
 from touchline.report.statistics import Statistics
 from touchline.result.event import Event
+from touchline.result.kinds import Watch
 
 Report = Literal["full", "summary", "none"]
 
@@ -126,6 +127,7 @@ def analyze(
                 run.add(part)
             warnings = bandwidth_warnings(bandwidths(model, bandwidth), run.period)
             warnings += [*recording.warnings, *model.warnings, *run.pipeline.skin.lost]
+            warnings += watch_warnings(model, run.statistics)
             analysis = run.finish(log, out, method, bandwidth, warnings, recording.losses)
             write_origin(folder.draft / ANALYSIS, log, robot, _origin(analysis))
             if report != "none":
@@ -139,7 +141,13 @@ def analyze(
 def _origin(analysis: Analysis) -> dict[str, Any]:
     clock = analysis.statistics.clock
     facts = {"method": analysis.method, "bandwidth": analysis.bandwidth, "period": analysis.period}
-    return facts | {"start": clock.first, "end": clock.last, "samples": clock.rows}
+    names = analysis.robot.segment_names
+    watch = {
+        name: dict(zip(map(str, Watch), counts.tolist(), strict=True))
+        for name, counts in zip(names, analysis.statistics.watch, strict=True)
+    }
+    clocked = {"start": clock.first, "end": clock.last, "samples": clock.rows}
+    return facts | clocked | {"watch": watch}
 
 
 def check_options(bandwidth: float | None, method: str) -> None:
@@ -161,7 +169,7 @@ class _Run:
         self.pipeline, self.period = pipeline, period
         robot = pipeline.robot
         self._outputs = Outputs(draft, robot)
-        self._statistics = Statistics.of(len(robot.joint_names), len(robot.segment_names))
+        self.statistics = Statistics.of(len(robot.joint_names), len(robot.segment_names))
         self._curves = Curves(pipeline, self.period)
         self._poses = EventPoses()
         columns = {
@@ -174,7 +182,7 @@ class _Run:
         """Take the next samples."""
         time = part.time
         estimate, detection = self.pipeline.run(time, part.q, part.qd, part.tau, part.wrench)
-        self._statistics.add(time, estimate, detection)
+        self.statistics.add(time, estimate, detection, self.pipeline.watch)
         values = self._curves.values(estimate, detection)
         self._curves.traces.add(time, values)
         self._windows.add(time, values, self.pipeline.events)
@@ -205,7 +213,7 @@ class _Run:
             bandwidth=bandwidth,
             period=self.period,
             thresholds=self.pipeline.thresholds,
-            statistics=self._statistics,
+            statistics=self.statistics,
             curves=self._curves,
             events=events,
             poses=self._poses,

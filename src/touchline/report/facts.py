@@ -10,9 +10,11 @@ from touchline.health import Health
 from touchline.model.robot import Robot
 from touchline.report.statistics import Statistics
 from touchline.result.event import Event
+from touchline.result.kinds import Watch
 
 TUSTIN_LIMIT, RINGING = 0.5, 1.0  # of bandwidth times period
 SUGGESTED = 1 / 3
+UNWATCHED = (Watch.DEGRADED, Watch.BLIND)
 
 HEALTH_MEANING = {
     Health.SETTLING: "less than 5/K after the start, a gap or a reset; no event begins",
@@ -186,3 +188,22 @@ def detection_fact(robot: Robot, thresholds: Thresholds) -> str:
     detection = robot.description.detection
     calibrated = f"calibrated for {detection.false_alarms:g} false alarms an hour"
     return f"{', '.join(detection.method)}; {thresholds.note or calibrated}"
+
+
+def watch_warnings(robot: Robot, statistics: Statistics) -> list[str]:
+    """A line for each segment of which a touch was felt worse than the robot can, or not at all."""
+    lines = []
+    for name, counts in zip(robot.segment_names, statistics.watch, strict=True):
+        settled = max(int(counts.sum()), 1)
+        degraded, blind = (100 * counts[list(Watch).index(w)] / settled for w in UNWATCHED)
+        if degraded:
+            lines.append(
+                f"segment {name}: degraded in {degraded:.3g} % of the settled samples: "
+                "a signal was missing, and others stood in"
+            )
+        if blind:
+            lines.append(
+                f"segment {name}: blind in {blind:.3g} % of the settled samples: "
+                "a touch there moves no signal that is there"
+            )
+    return lines

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from touchline.detector.detector import Detection
 from touchline.health import Health
 from touchline.observer.observer import Estimate
+from touchline.result.kinds import Watch
 
 Array = NDArray[np.float64]
 
@@ -95,12 +96,14 @@ class Statistics:
         quiet_torque: the same while nothing touches.
         wrench: segment wrenches (6 m columns), all settled samples.
         quiet_wrench: the same while nothing touches.
+        watch: (m, 3) settled samples in which each segment was watched, degraded and blind.
     """
 
     torque: Moments
     quiet_torque: Moments
     wrench: Moments
     quiet_wrench: Moments
+    watch: NDArray[np.int64]
     clock: Clock = field(default_factory=Clock)
     health: dict[Health, int] = field(default_factory=lambda: dict.fromkeys(Health, 0))
     healthy: int = 0
@@ -108,10 +111,17 @@ class Statistics:
     @classmethod
     def of(cls, joints: int, segments: int) -> "Statistics":
         """Statistics of nothing yet."""
-        return cls(Moments(joints), Moments(joints), Moments(6 * segments), Moments(6 * segments))
+        torques, wrenches = (Moments(joints), Moments(joints)), (Moments(6 * segments),)
+        watch = np.zeros((segments, len(Watch)), np.int64)
+        return cls(*torques, *wrenches, Moments(6 * segments), watch)
 
-    def add(self, time: Array, estimate: Estimate, detection: Detection) -> None:
-        """Take N samples."""
+    def add(
+        self, time: Array, estimate: Estimate, detection: Detection, watch: NDArray[np.int8]
+    ) -> None:
+        """Take N samples; `watch` (N, m): numbers of `Watch`."""
+        settled = (estimate.health & Health.SETTLING) == 0
+        for state in range(len(Watch)):
+            self.watch[:, state] += np.count_nonzero(watch[settled] == state, axis=0)
         self.clock.add(time)
         health = estimate.health
         self.healthy += int((health == 0).sum())
