@@ -21,7 +21,7 @@ from touchline.model.description import AXES
 
 PART_ROWS = 1 << 18
 PART_SECONDS = 5.0
-_GROUP_ROWS = 1 << 17
+_GROUP_ROWS = 1 << 16
 _RESULTS = ("estimates", "contacts", "postures")
 _DOCUMENTS = ("events.json", "analysis.json", "report.html")
 

@@ -38,7 +38,7 @@ from touchline.result.kinds import Watch
 
 Report = Literal["full", "summary", "none"]
 
-CHUNK = 1 << 15  # samples; bounds the memory
+CHUNK = 1 << 13  # samples; bounds the memory, and stays in the cache
 EPOCH = 1e6  # s; stamps beyond it are dates
 
 
@@ -185,13 +185,13 @@ class _Run:
         self.statistics.add(time, estimate, detection, self.pipeline.watch)
         values = self._curves.values(estimate, detection)
         self._curves.traces.add(time, values)
-        self._windows.add(time, values, self.pipeline.events)
+        events = self.pipeline.events
+        self._windows.add(time, values, events)
         self._outputs.estimates(time, estimate)
-        if self.pipeline.contacts is not None:
-            self._outputs.contacts(time, estimate, self.pipeline.contacts)
-        self._outputs.events(self.pipeline.events)
+        self._outputs.contacts(time, estimate, self.pipeline.contacts)
+        self._outputs.events(events)
         self._outputs.postures(time, part.q)
-        self._poses.add(time, part.q, self.pipeline.events)
+        self._poses.add(time, part.q, events)
 
     def finish(
         self,

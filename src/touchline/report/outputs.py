@@ -55,9 +55,11 @@ def strict(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def write_events(path: Path, events: Sequence[Event]) -> None:
-    """Write `events.json`."""
-    lines = [json.dumps(strict(event.as_json()), allow_nan=False) for event in events]
+def _line(event: Event) -> str:
+    return json.dumps(strict(event.as_json()), allow_nan=False)
+
+
+def _write_lines(path: Path, lines: Sequence[str]) -> None:
     body = ",\n".join(lines)
     write_text(path, f"[\n{body}\n]\n" if lines else "[]\n")
 
@@ -86,6 +88,7 @@ class Outputs:
         self._contacts = TableWriter(directory / CONTACTS, CONTACT_SCHEMA)
         self._postures = PostureWriter(directory / POSTURES, robot)
         self._written: list[Any] | None = None
+        self._lines: dict[int, str] = {}  # of events that have ended, which change no more
         self.events([])
 
     def estimates(self, time: np.ndarray, estimate: Estimate) -> None:
@@ -107,12 +110,20 @@ class Outputs:
         """Bring `events.json` up to date: an event is in it as soon as it begins."""
         state = [(event.cleared, event.level) for event in events]
         if state != self._written:
-            write_events(self.directory / EVENTS, events)
+            _write_lines(self.directory / EVENTS, [self._told(event) for event in events])
             self._written = state
+
+    def _told(self, event: Event) -> str:
+        line = self._lines.get(event.id)
+        if line is None:
+            line = _line(event)
+            if event.cleared is not None:
+                self._lines[event.id] = line
+        return line
 
     def finish(self, events: Sequence[Event]) -> None:
         """Turn the parts into the tables, and write the events for good."""
         self._estimates.close()
         self._contacts.close()
         self._postures.close()
-        write_events(self.directory / EVENTS, events)
+        _write_lines(self.directory / EVENTS, [self._told(event) for event in events])
