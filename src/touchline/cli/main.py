@@ -14,6 +14,7 @@ from touchline.cli.check import check
 from touchline.cli.demo import demo
 from touchline.cli.export import export
 from touchline.cli.init import init
+from touchline.cli.label import label
 from touchline.cli.live import live
 from touchline.cli.reproduce import reproduce
 from touchline.cli.simulate import simulate
@@ -39,6 +40,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "init": init,
     "simulate": simulate,
     "analyze": analyze,
+    "label": label,
     "view": view,
     "live": live,
     "check": check,

@@ -66,6 +66,11 @@ class ContactTable:
         return self._field("event")[:, 0].astype(np.int64)
 
     @property
+    def level(self) -> NDArray[np.int64]:
+        """(M,) index of the level in `touchline.result.native.LEVELS`."""
+        return self._field("level")[:, 0].astype(np.int64)
+
+    @property
     def position(self) -> Array:
         """(M, 3) [m] in world; NaN where there is no honest answer."""
         return self._field("position")

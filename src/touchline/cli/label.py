@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`touchline label`."""
+
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+
+def label(
+    dataset: Annotated[Positional[Path], arg(metavar="DATASET")],
+    /,
+    robot: Annotated[str, arg(metavar="ROBOT")],
+    out: Annotated[Path | None, arg(metavar="PATH")] = None,
+    q: Annotated[str | None, arg(metavar="NAME")] = None,
+    qd: Annotated[str | None, arg(metavar="NAME")] = None,
+    tau: Annotated[str | None, arg(metavar="NAME")] = None,
+    wrench: Annotated[str | None, arg(metavar="NAME")] = None,
+    rate: Annotated[float | None, arg(metavar="HZ")] = None,
+    bandwidth: Annotated[float | None, arg(metavar="K")] = None,
+) -> int:
+    """Adds what the arm feels to a data set for robot learning.
+
+    Example: touchline label droid_100 --robot panda.yaml --out droid_100_touch
+
+    DATASET is a LeRobot data set (v3), a DROID-like HDF5 or a Parquet file, or a folder of such.
+    Added are, per sample: external joint torques, contact on or off, touched link, place, force,
+    level, health, and a mask of the half second before a contact. LeRobot: observation.touch.*,
+    described in meta/info.json and meta/touchline.json; HDF5: a group touch; Parquet: touch.*.
+    Nothing else is changed; each file is replaced as a whole. Prints what the rate costs.
+
+    Args:
+        dataset: With joint positions, and joint torques or wrenches as they were measured.
+        robot: Its robot.yaml, or the name of a robot that ships with Touchline (sara).
+        out: Leaves DATASET alone and labels a copy. Default: in place.
+        q: Array with the joint positions. Default: known names are looked for.
+        qd: With the joint velocities. Default: known names, else from the positions.
+        tau: With the joint torques.
+        wrench: With six numbers for each force-torque sensor.
+        rate: Samples per second. Default: as the data set tells.
+        bandwidth: Of the observer [rad/s]. Default: as described.
+    """
+    from touchline.label.naming import Given
+    from touchline.label.run import label as run
+    from touchline.label.run import labelled_text
+    from touchline.model.robot import load_robot
+
+    model = load_robot(robot)
+    done = run(dataset, model, out, Given(q, qd, tau, wrench, rate, bandwidth))
+    print(labelled_text(done, model))
+    return 0

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Plain Parquet tables, with the column names of the robot's description."""
+
+from pathlib import Path
+
+import numpy as np
+
+from touchline.errors import InputError
+from touchline.folder import replaced_file
+from touchline.label.channel import LEVELS, Feeler, parts
+from touchline.label.labelled import Labelled
+from touchline.label.naming import Given
+from touchline.logs.log import read_log
+from touchline.logs.period import typical_period
+from touchline.model.robot import Robot
+
+PREFIX = "touch."
+
+
+def label_table(path: Path, robot: Robot, given: Given) -> Labelled:
+    """Adds columns `touch.*` to a table, in place; links and levels are words there.
+
+    Raises:
+        InputError: it is damaged, or lacks what is needed.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    samples = read_log(path, robot.description)
+    period = 1.0 / given.rate if given.rate else typical_period(samples.time)
+    feeler = Feeler(robot, period, given.bandwidth)
+    channel = feeler.feel(samples)
+    done = Labelled(1.0 / period)
+    done.add(channel, len(samples) * period)
+    table = pq.read_table(path)
+    if table.num_rows != len(samples):
+        raise InputError(f"{path}: {table.num_rows} rows, but {len(samples)} samples were read")
+    table = table.drop_columns([n for n in table.column_names if n.startswith(PREFIX)])
+    words = {"link": np.array([*feeler.links, None], object), "level": np.array(LEVELS, object)}
+    for name, names in parts(robot).items():
+        values = getattr(channel, name)
+        if name in words:
+            values = words[name][values]
+        for i, part in enumerate(names):
+            column = PREFIX + name + (f".{part}" if values.ndim == 2 else "")
+            table = table.append_column(
+                column, pa.array(values[:, i] if values.ndim == 2 else values)
+            )
+    with replaced_file(path) as draft:
+        pq.write_table(table, draft)
+    return done

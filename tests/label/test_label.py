@@ -1,0 +1,286 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The touch channel in data sets for learning: what was felt is there, all else is as it was."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from free_motion import free_motion
+
+import touchline as tl
+from touchline.cli import main
+from touchline.label.channel import BEFORE
+from touchline.logs import write_table
+
+RATE = 100.0
+EPISODES = 3
+TOUCH = slice(200, 300)  # of the second episode, at RATE
+TOUCHED = 1
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return tl.load_robot("sara")
+
+
+@pytest.fixture(scope="module")
+def episodes(robot):
+    """Free motion; in one episode the wrist sensor feels 40 N for a second."""
+    made = [free_motion(robot, seconds=5.0, rate=RATE, seed=seed) for seed in range(EPISODES)]
+    made[TOUCHED].wrench[TOUCH, -1, 0] -= 40.0
+    return made
+
+
+def vectors(values):
+    return pa.FixedSizeListArray.from_arrays(pa.array(values.ravel()), values.shape[1])
+
+
+def feature(width, dtype="float32"):
+    return {"dtype": dtype, "shape": [width], "names": None}
+
+
+@pytest.fixture
+def lerobot(robot, episodes, tmp_path):
+    """A data set as LeRobot v3 writes it: two files, of two episodes and one."""
+    folder = tmp_path / "set"
+    n, w = len(robot.joint_names), 6 * len(robot.sensor_names)
+    features = {
+        "observation.state.joint_position": feature(n),
+        "observation.state.joint_velocity": feature(n),
+        "observation.effort": feature(n),
+        "observation.wrench": feature(w),
+        "action": feature(n),
+    }
+    features |= {name: feature(1, "int64") for name in ("episode_index", "frame_index", "index")}
+    features |= {"task_index": feature(1, "int64"), "timestamp": feature(1)}
+    info = {"codebase_version": "v3.0", "fps": int(RATE), "features": features, "mine": [1, 2]}
+    for number, members in enumerate(([0, 1], [2])):
+        columns = {}
+        for name in ("q", "qd", "tau"):
+            values = np.concatenate([getattr(episodes[e], name) for e in members])
+            columns[name] = vectors(values.astype(np.float32))
+        wrench = np.concatenate([episodes[e].wrench for e in members]).astype(np.float32)
+        rows = [len(episodes[e].time) for e in members]
+        told = dict(zip(features, columns.values(), strict=False))
+        told |= {"observation.wrench": vectors(wrench.reshape(len(wrench), -1))}
+        told |= {"action": columns["q"], "episode_index": np.repeat(members, rows)}
+        told |= {"frame_index": np.concatenate([np.arange(r) for r in rows])}
+        told |= {"index": np.arange(sum(rows)), "task_index": np.zeros(sum(rows), int)}
+        stamps = np.concatenate([np.arange(r) / RATE for r in rows]).astype(np.float32)
+        path = folder / "data" / "chunk-000" / f"file-{number:03d}.parquet"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        pq.write_table(pa.table(told | {"timestamp": stamps}), path, row_group_size=400)
+    (folder / "meta" / "episodes").mkdir(parents=True)
+    (folder / "meta" / "info.json").write_text(json.dumps(info))
+    (folder / "meta" / "stats.json").write_text(json.dumps({"action": {"mean": [0.0]}}))
+    (folder / "meta" / "episodes" / "notes").write_text("kept")
+    (folder / "videos").mkdir()
+    (folder / "videos" / "a.mp4").write_bytes(b"film")
+    return folder
+
+
+def read(folder):
+    files = sorted((folder / "data").rglob("*.parquet"))
+    return pa.concat_tables([pq.read_table(file) for file in files])
+
+
+def column(table, name, prefix="observation.touch."):
+    return np.array(table[prefix + name].to_pylist())
+
+
+def check_channel(contact, soon, link, force, level, position):
+    """What must be felt of the push on the last sensor's segment, wherever it is stored."""
+    begin = len(contact) // EPISODES * TOUCHED if len(contact) > 500 else 0
+    middle = np.arange(begin + TOUCH.start + 20, begin + TOUCH.stop)
+    assert contact[middle].all()
+    free = np.ones(len(contact), bool)
+    free[begin + TOUCH.start : begin + TOUCH.stop + 50] = False
+    assert not contact[free].any()
+    np.testing.assert_allclose(np.linalg.norm(force[middle], axis=1), 40.0, rtol=0.1)
+    assert not force[~contact].any() and not level[~contact].any() and (level[contact] > 0).all()
+    assert (link[~contact] == -1).all() and not position[link < 0].any()
+    onset = int(np.flatnonzero(contact)[0])
+    expected = np.zeros(len(contact), bool)
+    expected[onset - round(BEFORE * RATE) : onset] = True
+    np.testing.assert_array_equal(soon[begin : begin + 500], expected[begin : begin + 500])
+
+
+def test_lerobot(lerobot, robot, capsys):
+    before, files = read(lerobot), {p: p.read_bytes() for p in lerobot.rglob("*") if p.is_file()}
+    assert main(["label", str(lerobot), "--robot", "sara"]) == 0
+    out = capsys.readouterr().out
+    assert "3 episodes, 1500 samples at 100 Hz" in out and "1 touches" in out
+    assert "95 % of the pushes are felt from" in out
+    after = read(lerobot)
+    assert after.select(before.column_names).equals(before)
+    groups = pq.ParquetFile(lerobot / "data/chunk-000/file-000.parquet").metadata
+    assert [groups.row_group(g).num_rows for g in range(3)] == [400, 400, 200]
+    names = ("contact", "soon", "link", "force", "level", "position")
+    check_channel(*(column(after, name) for name in names))
+    info = json.loads((lerobot / "meta/info.json").read_text())
+    old = json.loads(files[lerobot / "meta/info.json"])
+    added = {k: v for k, v in info["features"].items() if k.startswith("observation.touch.")}
+    assert {k: v for k, v in info["features"].items() if k not in added} == old["features"]
+    assert info | {"features": 0} == old | {"features": 0}
+    assert set(added) == set(after.column_names) - set(before.column_names)
+    for name, entry in added.items():
+        width = np.atleast_2d(after[name][0].as_py()).shape[1]
+        assert entry["shape"] == [width] and len(entry["names"]) == width
+    stats = json.loads((lerobot / "meta/stats.json").read_text())
+    assert stats["action"] == {"mean": [0.0]}
+    share = column(after, "contact").mean()
+    assert stats["observation.touch.contact"]["mean"] == pytest.approx([share])
+    about = json.loads((lerobot / "meta/touchline.json").read_text())
+    link = column(after, "link")
+    assert about["links"][link[link >= 0][0]] in robot.mechanism.links
+    for path in ("videos/a.mp4", "meta/episodes/notes"):
+        assert (lerobot / path).read_bytes() == files[lerobot / path]
+    # Labelled again: the same.
+    again = {p: p.read_bytes() for p in lerobot.rglob("*") if p.is_file()}
+    assert main(["label", str(lerobot), "--robot", "sara"]) == 0
+    assert {p: p.read_bytes() for p in lerobot.rglob("*") if p.is_file()} == again
+
+
+def test_an_episode_does_not_know_of_others(lerobot, episodes):
+    """The third episode reads as one that was felt alone, by a new pipeline."""
+    assert main(["label", str(lerobot), "--robot", "sara"]) == 0
+    table = read(lerobot)
+    rows = np.array(table["episode_index"]) == 2
+    s = episodes[2]
+    single = [np.float64(np.float32(a)) for a in (s.q, s.qd, s.tau, s.wrench)]
+    pipeline = tl.Pipeline("sara", period=1 / RATE)
+    stamps = np.float64(np.float32(np.arange(len(s.time)) / RATE))
+    estimate, _ = pipeline.run(stamps, *single)
+    felt = column(table, "tau_ext")[rows]
+    np.testing.assert_array_equal(felt, estimate.tau_ext.astype(np.float32))
+
+
+def test_a_copy_leaves_the_data_set_alone(lerobot, tmp_path):
+    before = {p: p.read_bytes() for p in lerobot.rglob("*") if p.is_file()}
+    out = tmp_path / "labelled"
+    assert main(["label", str(lerobot), "--robot", "sara", "--out", str(out)]) == 0
+    assert {p: p.read_bytes() for p in lerobot.rglob("*") if p.is_file()} == before
+    assert "observation.touch.force" in read(out).column_names
+    assert main(["label", str(lerobot), "--robot", "sara", "--out", str(out)]) == 2
+
+
+def test_a_damaged_copy_is_none(lerobot, tmp_path, capsys):
+    file = lerobot / "data/chunk-000/file-001.parquet"
+    file.write_bytes(file.read_bytes()[:-9])
+    out = tmp_path / "labelled"
+    assert main(["label", str(lerobot), "--robot", "sara", "--out", str(out)]) == 2
+    assert "file-001.parquet" in capsys.readouterr().err
+    assert not out.exists() and not (tmp_path / ".part.labelled").exists()
+
+
+def edit(folder, **changes):
+    path = folder / "meta/info.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | changes))
+
+
+def test_what_cannot_be_used_is_told(lerobot, tmp_path, capsys):
+    def told(*arguments):
+        assert main(["label", *map(str, arguments), "--robot", "sara"]) == 2
+        return capsys.readouterr().err
+
+    assert "no such array" in told(lerobot, "--tau", "effort")
+    assert "numbers, but" in told(lerobot, "--tau", "observation.wrench")
+    assert "--rate -1" in told(lerobot, "--rate", -1)
+    edit(lerobot, fps=0)
+    assert "fps is 0" in told(lerobot)
+    edit(lerobot, codebase_version="v2.1")
+    assert "v3.x is needed" in told(lerobot)
+    assert "no such file" in told(tmp_path / "none")
+    (tmp_path / "a.txt").write_text("x")
+    assert "must be a LeRobot data set" in told(tmp_path / "a.txt")
+    (tmp_path / "empty").mkdir()
+    assert "neither a LeRobot data set" in told(tmp_path / "empty")
+
+
+def test_plain_parquet(robot, episodes, tmp_path):
+    path = tmp_path / "log.parquet"
+    write_table(path, episodes[TOUCHED], robot.description)
+    before = pq.read_table(path)
+    assert main(["label", str(path), "--robot", "sara"]) == 0
+    after = pq.read_table(path)
+    assert after.select(before.column_names).equals(before)
+    contact = column(after, "contact", "touch.")
+    assert contact[TOUCH][20:].all() and not contact[: TOUCH.start].any()
+    links = {word for word in after["touch.link"].to_pylist() if word}
+    assert links and links <= set(robot.mechanism.links)
+    assert set(after["touch.level"].to_pylist()) <= {"none", "contact", "collision"}
+    assert f"touch.tau_ext.{robot.joint_names[0]}" in after.column_names
+
+
+@pytest.mark.parametrize("layout", ["droid", "robomimic"])
+def test_hdf5(robot, episodes, tmp_path, layout):
+    h5py = pytest.importorskip("h5py", reason="h5py is not installed: touchline[hdf5]")
+    path, s = tmp_path / "trajectory.h5", episodes[TOUCHED]
+    place = "observation/robot_state" if layout == "droid" else "data/demo_0/obs"
+    torques = "motor_torques_measured" if layout == "droid" else "joint_torques"
+    group = "observation/touch" if layout == "droid" else "data/demo_0/obs/touch"
+    wrench = "observation/w" if layout == "droid" else "data/demo_0/obs/w"
+    with h5py.File(path, "w") as file:
+        file[f"{place}/joint_positions"], file[f"{place}/{torques}"] = s.q, s.tau
+        file[f"{place}/joint_velocities"] = s.qd
+        file[wrench] = s.wrench.reshape(len(s.time), -1)
+        file.attrs["mine"] = "kept"
+        if layout == "droid":
+            file["observation/timestamp/robot_state/read_start"] = (5e12 + 1e3 * s.time).astype(int)
+    own = ["--wrench", wrench.removeprefix("data/demo_0/")]
+    own += [] if layout == "droid" else ["--rate", str(RATE)]
+    for _ in range(2):
+        assert main(["label", str(path), "--robot", "sara", *own]) == 0
+        with h5py.File(path) as file:
+            told = {name: file[f"{group}/{name}"][:] for name in file[group]}
+            assert file.attrs["mine"] == "kept"
+            np.testing.assert_array_equal(file[f"{place}/{torques}"][:], s.tau)
+        names = ("contact", "soon", "link", "force", "level", "position")
+        check_channel(*(told[name] for name in names))
+    if layout == "robomimic":
+        assert main(["label", str(path), "--robot", "sara", *own[:2]]) == 2
+
+
+def test_lerobots_own_loader(lerobot):
+    datasets = pytest.importorskip(
+        "lerobot.datasets.lerobot_dataset", reason="lerobot is not installed: pip install lerobot"
+    )
+    shutil.rmtree(lerobot / "meta" / "episodes")
+    assert main(["label", str(lerobot), "--robot", "sara"]) == 0
+    lengths = [500, 500, 500]
+    starts = np.cumsum([0, *lengths])
+    table = {
+        "episode_index": [0, 1, 2],
+        "length": lengths,
+        "tasks": [["t"]] * 3,
+        "dataset_from_index": starts[:-1],
+        "dataset_to_index": starts[1:],
+        "data/chunk_index": [0, 0, 0],
+        "data/file_index": [0, 0, 1],
+        "meta/episodes/chunk_index": [0, 0, 0],
+        "meta/episodes/file_index": [0, 0, 0],
+    }
+    path = lerobot / "meta/episodes/chunk-000/file-000.parquet"
+    path.parent.mkdir(parents=True)
+    pq.write_table(pa.table(table), path)
+    import pandas
+
+    pandas.DataFrame({"task_index": [0]}, index=["t"]).to_parquet(lerobot / "meta/tasks.parquet")
+    edit(
+        lerobot,
+        total_episodes=3,
+        total_frames=1500,
+        total_tasks=1,
+        chunks_size=1000,
+        splits={"train": "0:3"},
+        data_path="data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
+        video_path=None,
+        robot_type="sara",
+    )
+    opened = datasets.LeRobotDataset("local/set", root=Path(lerobot))
+    assert "observation.touch.force" in opened.features
+    assert tuple(opened[0]["observation.touch.force"].shape) == (3,)
