@@ -21,6 +21,7 @@ def analyze(
     workers: Annotated[int, arg(metavar="N")] = 0,
     time_limit: Annotated[float | None, arg(metavar="S")] = None,
     memory_limit: Annotated[float | None, arg(metavar="MB")] = None,
+    cluster: Annotated[str | None, arg(metavar="ADDRESS")] = None,
 ) -> int:
     """Estimates external torques and wrenches in recordings and finds the contacts in them.
 
@@ -35,16 +36,18 @@ def analyze(
     folder touchline.unfinished: events.json, and estimates.parts and contacts.parts with Parquet
     files.
 
-    Several recordings, a folder, a pattern ("runs/*.mcap") or a CSV list with the columns log and
-    robot are analyzed by all cores, each into a folder of its own below DIR. manifest.jsonl there
+    Several recordings, a folder, a pattern ("runs/*.mcap"), a URL (s3://, http://) or a CSV list
+    with the columns log and robot are analyzed by all cores, each into a folder of its own below
+    DIR. fleet.html there tells what they have in common, tables the same as Parquet. manifest.jsonl
     tells what became of each: ok, partial (something in it could not be read), failed or skipped,
     why, and hashes of input, configuration and results. The same command goes on where it was
     stopped, and leaves alone what is unchanged. Without --robot the robot.yaml in the recording's
     folder, or the nearest above it, is taken. Exit status then: 0 all ok, 3 some are not, 1 none.
 
     Args:
-        logs: The recordings: tables (.parquet, .csv, .csv.gz) or rosbag2 (.mcap, .db3, or its
-            folder). Foreign column names are given in the robot description, key `log`.
+        logs: The recordings, or URLs of them: tables (.parquet, .csv, .csv.gz) or rosbag2 (.mcap,
+            .db3, or its folder). Foreign column names are given in the robot description, key
+            `log`.
         out: Directory for the results.
         robot: Its robot.yaml, or the name of a robot that ships with Touchline (sara).
         bandwidth: Of the observer [rad/s]: higher is faster and noisier. Default: as described.
@@ -55,6 +58,8 @@ def analyze(
         workers: Processes for several recordings. Default: one per core.
         time_limit: For each of several recordings [s].
         memory_limit: For each process of several recordings [MB].
+        cluster: Of a dask scheduler, such as tcp://host:8786, for several recordings; its workers
+            see the same folders.
     """
     from touchline.fleet.plan import is_single, make_plan
     from touchline.fleet.run import plan_text
@@ -71,7 +76,7 @@ def analyze(
         return _one(Path(logs[0]), robot, out, options)
     from touchline.fleet.run import Limits
 
-    return _several(logs, robot, out, options, Limits(workers, time_limit, memory_limit))
+    return _several(logs, robot, out, options, Limits(workers, time_limit, memory_limit, cluster))
 
 
 def _one(log: Path, robot: str, out: Path, options: dict[str, Any]) -> int:

@@ -8,11 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from touchline.errors import InputError
+from touchline.fleet.manifest import MANIFEST
+from touchline.fleet.remote import found, is_url
+from touchline.fleet.tables import COMMON
 from touchline.logs.log import BAGS, TABLES
 from touchline.report.outputs import ANALYSIS, NAMES
 
 ROBOT_FILE = "robot.yaml"
 LOG_COLUMN, ROBOT_COLUMN = "log", "robot"
+ENDINGS = (*TABLES, *BAGS)
+NO_ROBOT = f"no robot: give --robot, or put a {ROBOT_FILE} beside it"
 
 
 @dataclass(frozen=True)
@@ -20,11 +25,12 @@ class Recording:
     """One recording to analyze.
 
     Attributes:
-        log: its file, or the folder of a rosbag2.
+        log: its file, or the folder of a rosbag2; of a URL only the name.
         robot: name or description of the robot; empty where none is known.
         name: of its results, a path below the folder of all.
         size: of its files [bytes].
         problem: why it is not analyzed, or empty.
+        url: where it is, if not on this machine.
     """
 
     log: Path
@@ -32,11 +38,17 @@ class Recording:
     name: str
     size: int
     problem: str = ""
+    url: str = ""
+
+    @property
+    def source(self) -> str:
+        """Where it is."""
+        return self.url or str(self.log)
 
 
 def is_single(logs: Sequence[str]) -> bool:
     """Whether what was named is one recording, and neither a folder of several nor a list."""
-    if len(logs) != 1 or glob.has_magic(logs[0]) and not Path(logs[0]).exists():
+    if len(logs) != 1 or is_url(logs[0]) or glob.has_magic(logs[0]) and not Path(logs[0]).exists():
         return False
     path = Path(logs[0])
     return _is_bag_folder(path) or not path.is_dir() and not _is_list(path)
@@ -46,33 +58,50 @@ def make_plan(logs: Sequence[str], robot: str | None) -> list[Recording]:
     """All recordings that were named, in a fixed order, each once.
 
     Args:
-        logs: files, folders, patterns such as `runs/*.mcap`, or CSV lists with the columns `log`
-            and `robot`; paths in a list count from where it is.
+        logs: files, folders, patterns such as `runs/*.mcap`, CSV lists with the columns `log`
+            and `robot` (paths in a list count from where it is), or URLs of files, folders and
+            patterns.
         robot: of all; default: what a list says, else the `robot.yaml` in the recording's folder
             or the nearest above it.
 
     Raises:
         InputError: something does not exist, or nothing was found.
     """
-    found: dict[Path, tuple[str, str]] = {}  # log -> robot, problem
+    local: dict[Path, tuple[str, str]] = {}  # log -> robot, problem
+    remote: dict[str, tuple[int, str]] = {}  # URL -> size, robot
     for word in logs:
         for log, own in _named(word):
-            chosen = robot or own or _nearest_robot(log)
-            problem = "" if chosen else f"no robot: give --robot, or put a {ROBOT_FILE} beside it"
-            found.setdefault(log.resolve(), (chosen, problem))
-    if not found:
+            if is_url(log):
+                remote |= {url: (size, robot or own) for url, size in found(log, ENDINGS)}
+                continue
+            chosen = robot or own or _nearest_robot(Path(log))
+            local.setdefault(Path(log).resolve(), (chosen, "" if chosen else NO_ROBOT))
+    if not local and not remote:
         raise InputError(f"{', '.join(logs)}: no recordings there")
-    names = _names(list(found))
+    paths = {url: _as_path(url) for url in remote}
+    names = _names([*local, *paths.values()])
     plan = []
-    for log, (chosen, problem) in found.items():
+    for log, (chosen, problem) in local.items():
         if not problem and not log.exists():
             problem = "no such file"
         plan.append(Recording(log, chosen, names[log], _size(log), problem))
+    for url, (size, chosen) in remote.items():
+        problem = "" if chosen else NO_ROBOT
+        plan.append(Recording(paths[url], chosen, names[paths[url]], size, problem, url))
     return sorted(plan, key=lambda recording: recording.name)
 
 
-def _named(word: str) -> Iterator[tuple[Path, str]]:
+def _as_path(url: str) -> Path:
+    """A path that stands for a URL where names are made: never one on this machine."""
+    kind, _, rest = url.partition("://")
+    return Path(f"/{kind}:") / rest.lstrip("/")
+
+
+def _named(word: str) -> Iterator[tuple[str, str]]:
     """Recordings that one word of the command line names, and their robots."""
+    if is_url(word):
+        yield word, ""
+        return
     path = Path(word)
     if not path.exists():
         matches = sorted(glob.glob(word, recursive=True)) if glob.has_magic(word) else []
@@ -83,16 +112,17 @@ def _named(word: str) -> Iterator[tuple[Path, str]]:
                 yield from _named(match)
     elif path.is_dir() and not _is_bag_folder(path):
         for log in _below(path):
-            yield log, ""
+            yield str(log), ""
     elif _is_list(path):
         yield from _listed(path)
     else:
-        yield path, ""
+        yield word, ""
 
 
 def _below(folder: Path) -> Iterator[Path]:
     """Recordings in a folder and the folders in it, without results of earlier analyses."""
-    if (folder / ANALYSIS).exists():
+    common = folder.name == COMMON and (folder.parent / MANIFEST).exists()
+    if common or (folder / ANALYSIS).exists():
         return
     for path in sorted(folder.iterdir()):
         if path.name.startswith(".") or path.name.endswith(".parts"):
@@ -107,7 +137,7 @@ def _below(folder: Path) -> Iterator[Path]:
 
 
 def _is_log(path: Path) -> bool:
-    return path.name.lower().endswith((*TABLES, *BAGS))
+    return path.name.lower().endswith(ENDINGS)
 
 
 def _is_bag_folder(path: Path) -> bool:
@@ -126,7 +156,7 @@ def _is_list(path: Path) -> bool:
     return LOG_COLUMN in [name.strip() for name in head]
 
 
-def _listed(path: Path) -> Iterator[tuple[Path, str]]:
+def _listed(path: Path) -> Iterator[tuple[str, str]]:
     with path.open(encoding="utf-8-sig", newline="") as file:
         for number, row in enumerate(csv.DictReader(file, skipinitialspace=True), 2):
             log = (row.get(LOG_COLUMN) or "").strip()
@@ -134,7 +164,8 @@ def _listed(path: Path) -> Iterator[tuple[Path, str]]:
                 raise InputError(f"{path}: line {number}: names no {LOG_COLUMN}")
             robot = (row.get(ROBOT_COLUMN) or "").strip()
             beside = path.parent / robot
-            yield path.parent / log, str(beside) if robot and beside.is_file() else robot
+            place = log if is_url(log) else str(path.parent / log)
+            yield place, str(beside) if robot and beside.is_file() else robot
 
 
 def _nearest_robot(log: Path) -> str:
@@ -154,7 +185,7 @@ def _names(logs: list[Path]) -> dict[Path, str]:
     for log in sorted(logs):
         relative = log.relative_to(shared)
         short = relative.as_posix()
-        for ending in sorted((*TABLES, *BAGS), key=len, reverse=True):
+        for ending in sorted(ENDINGS, key=len, reverse=True):
             short = short.removesuffix(ending)
         name = short if short and short not in taken else relative.as_posix().replace(".", "_")
         while name in taken:

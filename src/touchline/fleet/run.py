@@ -11,9 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from touchline.errors import InputError
+from touchline.fleet.cluster import Cluster
+from touchline.fleet.figures import FIGURES, make_figures
 from touchline.fleet.manifest import Manifest, Row, configuration_hash
+from touchline.fleet.page import write_page
 from touchline.fleet.plan import Recording, make_plan
 from touchline.fleet.pool import Pool
+from touchline.fleet.tables import table_rows, write_tables
 from touchline.fleet.work import Job, blank
 from touchline.folder import ResultsFolder
 
@@ -29,11 +33,13 @@ class Limits:
         workers: number of processes; 0: one per core.
         seconds: for one recording, or None.
         megabytes: of memory for one process, or None.
+        cluster: address of a dask scheduler whose workers take the place of processes, or None.
     """
 
     workers: int = 0
     seconds: float | None = None
     megabytes: float | None = None
+    cluster: str | None = None
 
     def check(self) -> None:
         """Raise an InputError where a limit makes no sense."""
@@ -42,6 +48,18 @@ class Limits:
         for name, value in (("time-limit", self.seconds), ("memory-limit", self.megabytes)):
             if value is not None and not value > 0:
                 raise InputError(f"--{name} {value:g}: must be positive")
+            if value is not None and self.cluster is not None:
+                raise InputError(f"--{name}: not with --cluster: its workers have their own limits")
+        if self.workers and self.cluster is not None:
+            raise InputError("--workers: not with --cluster: it has as many as it has")
+
+    def takers(self, jobs: int) -> "Pool | Cluster":
+        """Who analyzes so many recordings."""
+        if self.cluster is not None:
+            return Cluster(self.cluster)
+        memory = None if self.megabytes is None else int(self.megabytes * 2**20)
+        workers = self.workers or os.cpu_count() or 1
+        return Pool(min(workers, max(jobs, 1)), self.seconds, memory)
 
 
 @dataclass
@@ -78,6 +96,8 @@ def analyze_all(
 ) -> Outcome:
     """Analyze recordings into folders below `out`; what is unchanged there is left alone.
 
+    What they have in common goes into the folder `tables` and into `fleet.html`.
+
     Args:
         logs: as of `make_plan`.
         robot: of all, or None.
@@ -96,8 +116,25 @@ def analyze_all(
         with (out / LOG).open("a", encoding="utf-8") as journal:
             outcome = _run(plan, manifest, journal, out, options, limits)
         manifest.close(recording.name for recording in plan)
-    outcome.rows = [manifest.rows[r.name] for r in plan if r.name in manifest.rows]
+        outcome.rows = [manifest.rows[r.name] for r in plan if r.name in manifest.rows]
+        if not outcome.stopped:
+            _tell(outcome.rows, out)
     return outcome
+
+
+def _tell(rows: list[Row], out: Path) -> None:
+    """Bring the figures of all recordings together."""
+    figures = {row["name"]: _figures(out / row["name"], row) for row in rows if row["outputs"]}
+    found = table_rows(figures)
+    write_tables(out, found)
+    write_page(out, rows, figures, found)
+
+
+def _figures(folder: Path, row: Row) -> dict[str, Any]:
+    path = folder / FIGURES
+    if path.is_file():
+        return json.loads(path.read_text(encoding="utf-8"))
+    return make_figures(folder, row["robot"])  # results of an older version
 
 
 def _run(
@@ -113,14 +150,9 @@ def _run(
     for row in refused:
         manifest.add(row)
         _note(journal, row)
-    memory = None if limits.megabytes is None else int(limits.megabytes * 2**20)
-    workers = limits.workers or os.cpu_count() or 1
     try:
-        with (
-            Pool(min(workers, max(len(jobs), 1)), limits.seconds, memory) as pool,
-            _bar(jobs) as bar,
-        ):
-            for row in pool.rows(jobs):
+        with limits.takers(len(jobs)) as takers, _bar(jobs) as bar:
+            for row in takers.rows(jobs):
                 if row.pop("unchanged", False):
                     outcome.unchanged.add(row["name"])
                 else:

@@ -4,14 +4,17 @@
 import os
 import resource
 import time
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from touchline import __version__
 from touchline.errors import InputError
+from touchline.fleet.figures import FIGURES, make_figures
 from touchline.fleet.manifest import Row, file_hash, stands
 from touchline.fleet.plan import Recording
+from touchline.fleet.remote import fetched
 from touchline.logs.bagfile import first_line
 
 
@@ -56,19 +59,21 @@ def done(job: Job) -> Row:
     began, cpu = time.monotonic(), time.process_time()
     row = blank(job, "failed", "")
     try:
-        row["content"] = file_hash(job.recording.log)
-        known = job.known
-        if known is not None and known.get("status") in ("ok", "partial"):
-            same = all(known.get(key) == row[key] for key in ("content", "configuration", "robot"))
-            if same and stands(known, job.out):
-                return known | {"unchanged": True}
-        row |= _analyzed(job)
+        with _at_hand(job) as log:
+            row["content"] = file_hash(log)
+            known = job.known
+            if known is not None and known.get("status") in ("ok", "partial"):
+                keys = ("content", "configuration", "robot")
+                same = all(known.get(key) == row[key] for key in keys)
+                if same and stands(known, job.out):
+                    return known | {"unchanged": True}
+            row |= _analyzed(job, log)
     except InputError as error:
         row["reason"] = error.problems[0]
     except MemoryError:
         row["reason"] = "not enough memory"
     except OSError as error:
-        row["reason"] = f"{error.filename or job.recording.log}: {error.strerror or error}"
+        row["reason"] = f"{error.filename or job.recording.source}: {error.strerror or error}"
     except Exception as error:  # a recording never stops the others
         row["reason"] = f"{type(error).__name__}: {first_line(error)}"
     row["seconds"] = round(time.monotonic() - began, 3)
@@ -82,7 +87,7 @@ def blank(job: Job, status: str, reason: str) -> Row:
     recording = job.recording
     return {
         "name": recording.name,
-        "log": str(recording.log),
+        "log": recording.source,
         "robot": recording.robot,
         "status": status,
         "reason": reason,
@@ -99,14 +104,23 @@ def blank(job: Job, status: str, reason: str) -> Row:
     }
 
 
-def _analyzed(job: Job) -> Row:
+def _at_hand(job: Job) -> AbstractContextManager[Path]:
+    """The recording as a file of this machine."""
+    if job.recording.url:
+        return fetched(job.recording.url, job.out / job.recording.name)
+    return nullcontext(job.recording.log)
+
+
+def _analyzed(job: Job, log: Path) -> Row:
     from touchline.report.analysis import analyze
     from touchline.report.outputs import NAMES
 
     out = job.out / job.recording.name
-    analysis = analyze(job.recording.log, job.recording.robot, out, **job.options)
+    origin = job.recording.url or None
+    analysis = analyze(log, job.recording.robot, out, **job.options, origin=origin)
+    make_figures(out, analysis.robot.name)
     clock = analysis.statistics.clock
-    files = [out / name for name in NAMES if (out / name).is_file()]
+    files = [out / name for name in (*NAMES, FIGURES) if (out / name).is_file()]
     return {
         "status": "partial" if analysis.losses else "ok",
         "reason": analysis.losses[0] if analysis.losses else "",

@@ -94,6 +94,7 @@ def analyze(
     bandwidth: float | None = None,
     method: str = "segment",
     report: Report = "full",
+    origin: str | None = None,
 ) -> Analysis:
     """Analyze a recording; writes estimates, contacts, events and the report into a directory.
 
@@ -104,6 +105,7 @@ def analyze(
         bandwidth: K [rad/s] of all rows; default: the description's.
         method: of the observer, "segment" or "paper".
         report: "full"; "summary" without a figure for each event; or "none".
+        origin: where the recording really is, if `log` is a copy for a while.
 
     Raises:
         InputError: an input cannot be used, or another process writes into the directory.
@@ -129,7 +131,8 @@ def analyze(
             warnings += [*recording.warnings, *model.warnings, *run.pipeline.skin.lost]
             warnings += watch_warnings(model, run.statistics)
             analysis = run.finish(log, out, method, bandwidth, warnings, recording.losses)
-            write_origin(folder.draft / ANALYSIS, log, robot, _origin(analysis))
+            where = origin or str(log.resolve())
+            write_origin(folder.draft / ANALYSIS, where, robot, _origin(analysis))
             if report != "none":
                 from touchline.report.page import page_text
 

@@ -64,17 +64,17 @@ def _write_lines(path: Path, lines: Sequence[str]) -> None:
     write_text(path, f"[\n{body}\n]\n" if lines else "[]\n")
 
 
-def write_origin(path: Path, log: Path, robot: Path | str, facts: dict[str, Any]) -> None:
+def write_origin(path: Path, log: str, robot: Path | str, facts: dict[str, Any]) -> None:
     """Write `analysis.json`: what the results were made from, for whoever finds them later.
 
     Args:
         path: of the file.
-        log: the recording.
+        log: where the recording is.
         robot: as it was given, a file or the name of a robot that ships with Touchline.
         facts: what else there is to keep.
     """
     where = str(Path(robot).resolve()) if Path(robot).is_file() else str(robot)
-    content = {"touchline": __version__, "log": str(log.resolve()), "robot": where, **facts}
+    content = {"touchline": __version__, "log": log, "robot": where, **facts}
     write_text(path, json.dumps(strict(content), indent=1, allow_nan=False) + "\n")
 
 

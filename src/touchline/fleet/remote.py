@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings that are elsewhere: any URL that fsspec knows, such as s3:// and http://."""
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from touchline.errors import InputError
+from touchline.extras import need
+
+FETCHED = ".fetched"
+
+
+def is_url(word: str) -> bool:
+    """Whether a word of the command line names something that is not a local path."""
+    return "://" in word
+
+
+def found(url: str, endings: tuple[str, ...]) -> list[tuple[str, int]]:
+    """Recordings below a URL or that a pattern matches, with their sizes [bytes].
+
+    Raises:
+        InputError: nothing is there, or it cannot be reached.
+        ModuleNotFoundError: fsspec, or what it needs for this kind of URL, is not installed.
+    """
+    system, path = _system(url)
+    try:
+        if any(mark in path for mark in "*?["):
+            paths = system.glob(path)
+        elif path.lower().endswith(endings) and not _is_folder(system, path):
+            paths = [path]
+        else:
+            paths = system.find(path)
+        names = sorted(p for p in paths if p.lower().endswith(endings))
+        sizes = [
+            (str(system.unstrip_protocol(name)), int(system.size(name) or 0)) for name in names
+        ]
+    except (OSError, ValueError) as error:
+        raise InputError(f"{url}: cannot be read: {error}") from error
+    if not sizes:
+        raise InputError(f"{url}: no recordings there")
+    return sizes
+
+
+@contextmanager
+def fetched(url: str, folder: Path) -> Iterator[Path]:
+    """A copy of a recording below a folder, gone after the block.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    system, path = _system(url)
+    place = folder / FETCHED
+    place.mkdir(parents=True, exist_ok=True)
+    try:
+        copy = place / path.rsplit("/", 1)[-1]
+        try:
+            with system.open(path, "rb") as source, copy.open("wb") as target:
+                shutil.copyfileobj(source, target, 1 << 22)
+        except (OSError, ValueError) as error:
+            raise InputError(f"{url}: cannot be read: {error}") from error
+        yield copy
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+
+
+def _is_folder(system: Any, path: str) -> bool:
+    try:
+        return bool(system.isdir(path))
+    except (OSError, ValueError):
+        return False
+
+
+def _system(url: str) -> tuple[Any, str]:
+    fsspec = need("fsspec")
+    try:
+        return fsspec.core.url_to_fs(url)
+    except ImportError as error:
+        raise ModuleNotFoundError(f"{url}: {error}", name=getattr(error, "name", None)) from error
+    except ValueError as error:
+        raise InputError(f"{url}: {error}") from error
