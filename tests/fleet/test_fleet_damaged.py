@@ -67,7 +67,7 @@ def command(fleet, out, workers):
 
 def children(pid):
     command = ["ps", "--ppid", str(pid), "-o", "pid=,args="]
-    found = subprocess.run(command, check=True, capture_output=True)
+    found = subprocess.run(command, check=False, capture_output=True)
     lines = found.stdout.decode().splitlines()
     return [int(line.split()[0]) for line in lines if "spawn_main" in line]
 
