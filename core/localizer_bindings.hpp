@@ -98,11 +98,13 @@ inline void bind(nb::module_& m) {
       .def_rw("first_entry", &tl::LocalizerSettings::first_entry);
   nb::class_<tl::LinkSurface>(m, "LinkSurface")
       .def("__init__",
-           [](tl::LinkSurface* self, int node, const tl::Mesh& mesh, bool graspable) {
-             new (self) tl::LinkSurface{node, mesh, graspable};
+           [](tl::LinkSurface* self, int node, const tl::Mesh& mesh, bool graspable,
+              bool touchable) {
+             new (self) tl::LinkSurface{node, mesh, graspable, touchable};
            },
-           "node"_a, "mesh"_a, "graspable"_a)
-      .def_ro("node", &tl::LinkSurface::node);
+           "node"_a, "mesh"_a, "graspable"_a, "touchable"_a = true)
+      .def_ro("node", &tl::LinkSurface::node)
+      .def_ro("touchable", &tl::LinkSurface::touchable);
   nb::class_<Localizer>(m, "Localizer")
       .def("__init__",
            [](Localizer* self, guard::Shared<tl::Observer>& observer,

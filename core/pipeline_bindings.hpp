@@ -278,6 +278,14 @@ inline void bind(nb::module_& m) {
       .def_rw("method", &tl::Tuning::method)
       .def_rw("discretization", &tl::Tuning::discretization)
       .def_rw("localizer", &tl::Tuning::localizer);
+  nb::class_<tl::Pushes>(m, "Pushes")
+      .def("__init__",
+           [](tl::Pushes* self, double friction, double reach) {
+             new (self) tl::Pushes{friction, reach};
+           },
+           "friction"_a, "reach"_a)
+      .def_ro("friction", &tl::Pushes::friction)
+      .def_ro("reach", &tl::Pushes::reach);
   nb::class_<tl::Robot>(m, "Robot")
       .def(nb::init<>())
       .def_rw("name", &tl::Robot::name)
@@ -294,6 +302,7 @@ inline void bind(nb::module_& m) {
       .def_rw("segment_zones", &tl::Robot::segment_zones)
       .def_rw("surfaces", &tl::Robot::surfaces)
       .def_rw("links", &tl::Robot::links)
+      .def_rw("pushes", &tl::Robot::pushes)
       .def("set_gravity",
            [](tl::Robot& robot, double x, double y, double z) { robot.gravity = {x, y, z}; })
       .def("check", [](const tl::Robot& robot) { tl::check(robot); })

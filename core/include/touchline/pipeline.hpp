@@ -34,7 +34,7 @@ class Pipeline {
                   tuning.discretization),
         detector_(observer_, robot_.rows, robot_.detection),
         localizer_(observer_, robot_.rows, robot_.noise, std::move(robot_.surfaces),
-                   tuning.localizer),
+                   with_pushes(tuning.localizer, robot_.pushes)),
         classifier_(observer_, robot_.blows),
         recorder_(robot_, observer_, localizer_),
         rest_(observer_.row_layout()),
@@ -92,6 +92,12 @@ class Pipeline {
   std::size_t rows() const { return robot_.rows.size(); }  // of the detector
 
  private:
+  static LocalizerSettings with_pushes(LocalizerSettings settings, const Pushes& pushes) {
+    settings.friction = pushes.friction;
+    settings.finger = pushes.reach;
+    return settings;
+  }
+
   static Robot checked(Robot robot) {
     check(robot);
     return robot;

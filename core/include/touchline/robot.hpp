@@ -29,6 +29,12 @@ struct Link {
   Pose placement;
 };
 
+// What touches: pushes come within the cone of the coefficient `friction`, and need `reach` [m] of
+// free space in front of the surface.
+struct Pushes {
+  double friction = 0.8, reach = 0.03;
+};
+
 // Arrays follow `joints` (n), `sensors` (k) and the segments (m): one per six-axis sensor in their
 // order, then the root's if the robot's root is not on such a sensor.
 struct Robot {
@@ -45,6 +51,7 @@ struct Robot {
   std::vector<Zone> segment_zones;  // per segment; open where it has several
   std::vector<LinkSurface> surfaces;
   std::vector<Link> links;  // one per surface
+  Pushes pushes;
 };
 
 // Do the parts of a robot fit together? Throws std::invalid_argument that names what does not.
@@ -113,6 +120,8 @@ inline void check(const Robot& robot) {
   for (const double window : detection.windows)
     require(window > 0.0 && window <= 1e5 * detection.noise.period, "a window is out of range");
   require(robot.links.size() == robot.surfaces.size(), "needs a name for each surface");
+  for (const double x : {robot.pushes.friction, robot.pushes.reach})
+    require(x > 0.0 && std::isfinite(x), "friction and reach of pushes must be positive");
   for (const LinkSurface& surface : robot.surfaces) {
     require(within(surface.node, 0, nodes), "a surface is carried by a node that is not there");
     for (const Triangle& t : surface.mesh.triangles())

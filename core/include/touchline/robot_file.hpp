@@ -22,7 +22,7 @@
 namespace touchline {
 
 // Of the file; another one is refused. It changes with every part of `Robot`.
-constexpr std::uint32_t kRobotFormat = 1;
+constexpr std::uint32_t kRobotFormat = 3;
 
 // A file that cannot be read or written: it says which, and why.
 struct RobotFileError : std::runtime_error {
@@ -238,8 +238,8 @@ void store(A& file, Triangle& triangle) {
 }
 template <class A>
 void store(A& file, LinkSurface& surface) {
-  auto& [node, mesh, graspable] = surface;
-  store_all(file, node, graspable);
+  auto& [node, mesh, graspable, touchable] = surface;
+  store_all(file, node, graspable, touchable);
   std::vector<Triangle> triangles = mesh.triangles();
   store(file, triangles);
   if constexpr (A::kReads) mesh = Mesh(std::move(triangles));
@@ -252,9 +252,10 @@ void store(A& file, Link& link) {
 template <class A>
 void store(A& file, Robot& robot) {
   auto& [name, nodes, gravity, joints, sensors, joint_names, sensor_names, segment_names, rows,
-         detection, noise, blows, segment_zones, surfaces, links] = robot;
+         detection, noise, blows, segment_zones, surfaces, links, pushes] = robot;
   store_all(file, name, nodes, gravity, joints, sensors, joint_names, sensor_names, segment_names,
-            rows, detection, noise, blows, segment_zones, surfaces, links);
+            rows, detection, noise, blows, segment_zones, surfaces, links,
+            pushes.friction, pushes.reach);
 }
 
 inline std::uint64_t checksum(const char* begin, const char* end) {

@@ -10,7 +10,7 @@ namespace touchline {
 struct Tuning {
   Method method = Method::segment;  // of the observer
   Discretization discretization = Discretization::automatic;
-  LocalizerSettings localizer;
+  LocalizerSettings localizer;  // but for `friction` and `finger`: the robot's `pushes`
 };
 
 }  // namespace touchline

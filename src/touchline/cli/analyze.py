@@ -17,6 +17,8 @@ def analyze(
     bandwidth: Annotated[float | None, arg(metavar="K")] = None,
     method: Literal["segment", "paper"] = "segment",
     report: Literal["full", "summary", "none"] = "full",
+    friction: Annotated[float | None, arg(metavar="MU")] = None,
+    reach: Annotated[float | None, arg(metavar="M")] = None,
     dry_run: bool = False,
     workers: Annotated[int, arg(metavar="N")] = 0,
     time_limit: Annotated[float | None, arg(metavar="S")] = None,
@@ -54,6 +56,8 @@ def analyze(
         method: segment: each segment's own momentum, no ghost contacts in motion; paper: each
             residual in its sensor's frame, as published.
         report: full; summary: without pictures and curves of each event; none: no report.html.
+        friction: Coefficient of friction of what touches. Default: as described (`pushes`).
+        reach: Free space that a push needs: length of a finger or tool [m]. Default: as described.
         dry_run: Print what would be done.
         workers: Processes for several recordings. Default: one per core.
         time_limit: For each of several recordings [s].
@@ -70,6 +74,7 @@ def analyze(
         print(plan_text(make_plan(logs, robot)))
         return 0
     options = {"bandwidth": bandwidth, "method": method, "report": report}
+    options |= {"friction": friction, "reach": reach}
     if is_single(logs):
         if robot is None:
             raise InputError(f"--robot: {logs[0]}: name the robot of this recording")
@@ -93,7 +98,7 @@ def _several(
     from touchline.fleet.run import analyze_all, outcome_text
     from touchline.report.analysis import check_options
 
-    check_options(options["bandwidth"], options["method"])
+    check_options(*(options[name] for name in ("bandwidth", "method", "friction", "reach")))
     outcome = analyze_all(logs, robot, out, options, limits)
     print(outcome_text(outcome, out))
     return outcome.status

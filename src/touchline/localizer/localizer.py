@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where a segment is touched, and how sure that is."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -9,6 +11,8 @@ from touchline.detector.residual_noise import native_noise
 from touchline.detector.thresholds import Thresholds
 from touchline.localizer.region import Region
 from touchline.localizer.skin import Skin
+from touchline.model.description import PushDescription
+from touchline.model.robot import Robot
 from touchline.native import core
 from touchline.observer.observer import Estimate, Observer
 from touchline.result.contact import Contact
@@ -17,12 +21,11 @@ from touchline.result.native import Names
 Array = NDArray[np.float64]
 
 RULES = ("likelihood", "paper")
-FRICTION = 0.8  # coefficient of the friction cone: skin and rubber
 TORQUE_ERROR = 0.02  # a joint's torque sensor is no better, and a touch is no point
 MODEL_ERROR = 0.02  # masses and inertias of a good model from CAD are no better
 
 
-def localizer_settings(rule: str, friction: float) -> core.LocalizerSettings:
+def localizer_settings(rule: str, pushes: PushDescription) -> core.LocalizerSettings:
     """In the words of the native core.
 
     Raises:
@@ -31,9 +34,25 @@ def localizer_settings(rule: str, friction: float) -> core.LocalizerSettings:
     if rule not in RULES:
         raise ValueError(f"rule is '{rule}', allowed: {', '.join(RULES)}")
     settings = core.LocalizerSettings()
-    settings.friction = friction
+    settings.friction, settings.finger = pushes.friction, pushes.reach
     settings.first_entry = rule == "paper"
     return settings
+
+
+def expected_pushes(robot: Robot, friction: float | None = None) -> PushDescription:
+    """The pushes that a robot expects, of another coefficient of friction if one is given."""
+    pushes = robot.description.pushes
+    return pushes if friction is None else replace(pushes, friction=friction)
+
+
+def native_surfaces(robot: Robot, skin: Skin) -> list[core.LinkSurface]:
+    """The surfaces of all links in the words of the native core."""
+    description = robot.description
+    touchable = description.pushes.links or [patch.link for patch in skin.patches]
+    return [
+        core.LinkSurface(p.node, p.mesh, p.link in description.graspable, p.link in touchable)
+        for p in skin.patches
+    ]
 
 
 class Localizer:
@@ -49,7 +68,7 @@ class Localizer:
         thresholds: of the detector, if its offsets are to be taken out (see `locate`).
         period: time between samples [s]: the noise figures are per sample.
         rule: "likelihood", or "paper": the first entry along the line, on no matter which link.
-        friction: coefficient of the friction cone.
+        friction: coefficient of the friction cone; default: the description's.
         wrench_error: of the gains of six-axis sensors and of the model, as a part of the load.
         torque_error: the same of joint torques; what noise figures do not cover.
         skin: the robot's surfaces, if already at hand.
@@ -64,13 +83,13 @@ class Localizer:
         thresholds: Thresholds | None = None,
         period: float = 1e-3,
         rule: str = "likelihood",
-        friction: float = FRICTION,
+        friction: float | None = None,
         wrench_error: float = 0.0,
         torque_error: float = TORQUE_ERROR,
         skin: Skin | None = None,
     ) -> None:
-        settings = localizer_settings(rule, friction)
         self.observer, self.robot = observer, observer.robot
+        settings = localizer_settings(rule, expected_pushes(self.robot, friction))
         self.skin = skin or Skin(self.robot)
         self.skin.check_robot(self.robot)
         self._names = Names.of(
@@ -79,16 +98,12 @@ class Localizer:
             [patch.link for patch in self.skin.patches],
             [patch.body for patch in self.skin.patches],
         )
-        graspable = self.robot.description.graspable
         rows = thresholds.rows if thresholds else ()
         self.core = core.Localizer(
             observer.kernel,
             [core.DetectionRow(**vars(row)) for row in rows],
             native_noise(self.robot, period, wrench_error, torque_error),
-            [
-                core.LinkSurface(patch.node, patch.mesh, patch.link in graspable)
-                for patch in self.skin.patches
-            ],
+            native_surfaces(self.robot, self.skin),
             settings,
         )
 

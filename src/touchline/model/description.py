@@ -171,6 +171,20 @@ class DetectionDescription:
     baseline: BaselineDescription = field(default_factory=BaselineDescription)
 
 
+@dataclass(frozen=True)
+class PushDescription:
+    """What touches the arm.
+
+    Pushes come within the cone of the coefficient `friction`, and need `reach` [m] of free space in
+    front of the surface: the free length of a finger or a tool. `links` may be touched; default:
+    all.
+    """
+
+    friction: float = 0.8
+    reach: float = 0.03
+    links: list[str] = field(default_factory=list)
+
+
 ZONES = ("structure", "end_effector", "handle")
 
 
@@ -294,6 +308,7 @@ class RobotDescription:
     loads: tuple[Load, ...] = ()
     links: dict[str, LinkCorrection] = field(default_factory=dict)
     graspable: tuple[str, ...] = ()
+    pushes: PushDescription = field(default_factory=PushDescription)
     detection: DetectionDescription = field(default_factory=DetectionDescription)
     policy: PolicyDescription = field(default_factory=PolicyDescription)
     interface: dict[str, WidgetDescription] = field(default_factory=dict)

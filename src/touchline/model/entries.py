@@ -11,6 +11,7 @@ from touchline.model.description import (
     LinkCorrection,
     Load,
     PolicyDescription,
+    PushDescription,
     Vector,
     WidgetDescription,
 )
@@ -84,6 +85,7 @@ class RobotFile:
     noise: dict[str, Any] = field(default_factory=dict)
     observer: ObserverEntry = ObserverEntry()
     detection: DetectionDescription = field(default_factory=DetectionDescription)
+    pushes: PushDescription = field(default_factory=PushDescription)
     policy: PolicyDescription = field(default_factory=PolicyDescription)
     interface: dict[str, WidgetDescription] = field(default_factory=dict)
     log: dict[str, Any] = field(default_factory=dict)

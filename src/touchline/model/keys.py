@@ -18,6 +18,7 @@ from touchline.model.description import (
     Onset,
     PolicyDescription,
     PolicyRule,
+    PushDescription,
     RetractDescription,
     RowCalibration,
     TailDescription,
@@ -106,6 +107,7 @@ HOOKS: dict[type, dict[str, Hook]] = {
         "hold": values.non_negative,
         "release": values.fraction,
     },
+    PushDescription: {"friction": values.positive, "reach": values.positive},
     Onset: dict.fromkeys(ZONES, values.positive),
     PolicyRule: {
         "reaction": values.reaction,

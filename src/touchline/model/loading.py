@@ -185,6 +185,7 @@ class _Draft:
             loads=tuple(file.loads),
             links=file.links,
             graspable=tuple(file.graspable),
+            pushes=file.pushes,
             detection=self.detection,
             policy=file.policy,
             interface=file.interface,

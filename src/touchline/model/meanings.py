@@ -74,6 +74,10 @@ MEANINGS: dict[str, tuple[str, str, str]] = {
     "links.NAME.com": (THREE, "m", "Centre of mass, instead of the model's."),
     "links.NAME.inertia": (SIX, "kg m²", f"{INERTIA}, instead of the model's."),
     "graspable": ("list of text", "", "Links that may be pulled and twisted, not only pushed."),
+    "pushes": ("mapping", "", "What touches: where contacts are looked for."),
+    "pushes.friction": ("number", "", "Coefficient of friction: pushes come within its cone."),
+    "pushes.reach": ("number", "m", "Free space that a push needs: length of a finger or tool."),
+    "pushes.links": ("list of text", "", "Links that may be touched; default: all."),
     "noise": (
         "mapping",
         "",

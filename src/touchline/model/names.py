@@ -148,6 +148,7 @@ def _link_names(file: RobotFile, mechanism: Mechanism) -> Iterator[Problem]:
     used += [(f"{place}.link", load.link) for place, load in numbered(file.loads, "loads")]
     used += [(f"links.{name}", name) for name in file.links]
     used += list(numbered(file.graspable, "graspable"))
+    used += list(numbered(file.pushes.links, "pushes.links"))
     for place, link in used:
         if link is not None and link not in links:
             yield place, unknown(link, "link", links)

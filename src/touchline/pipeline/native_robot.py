@@ -8,7 +8,9 @@ from touchline.classifier.zones import Zones
 from touchline.detector.detector import native_rows, native_settings
 from touchline.detector.residual_noise import native_noise
 from touchline.detector.thresholds import Thresholds
+from touchline.localizer.localizer import native_surfaces
 from touchline.localizer.skin import Skin
+from touchline.model.description import PushDescription
 from touchline.model.kernel import joint_row, native_node, sensor_row
 from touchline.model.robot import Robot
 from touchline.native import core
@@ -22,9 +24,10 @@ def native_robot(
     bandwidth: float | None,
     wrench_error: float,
     torque_error: float,
+    pushes: PushDescription,
 ) -> core.Robot:
     """All that the native pipeline has to know of a robot; arguments as of `Pipeline`."""
-    zones, graspable = Zones(robot), robot.description.graspable
+    zones = Zones(robot)
     native = core.Robot()
     native.name = robot.name
     native.nodes = [native_node(node) for node in robot.nodes]
@@ -39,9 +42,8 @@ def native_robot(
     native.noise = native_noise(robot, period, wrench_error, torque_error)
     native.blows = blow_limits(robot, thresholds, zones)
     native.segment_zones = [_zone(zones.of(segment)) for segment in robot.segment_names]
-    native.surfaces = [
-        core.LinkSurface(patch.node, patch.mesh, patch.link in graspable) for patch in skin.patches
-    ]
+    native.surfaces = native_surfaces(robot, skin)
+    native.pushes = core.Pushes(pushes.friction, pushes.reach)
     native.links = [
         core.link(
             patch.link,

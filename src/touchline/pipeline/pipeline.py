@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from touchline.detector.detector import Detection
 from touchline.detector.thresholds import Thresholds, expect_drift, make_thresholds
 from touchline.localizer.localizer import (
-    FRICTION,
     MODEL_ERROR,
     TORQUE_ERROR,
+    expected_pushes,
     localizer_settings,
 )
 from touchline.localizer.region import Region
@@ -67,7 +67,8 @@ class Pipeline:
         wrench_error: of gains and model, as a part of the load, and `torque_error`, for the
             localizer's weights.
         skin: the robot's surfaces, if already at hand.
-        friction: coefficient of the cone in which pushes are looked for.
+        friction: coefficient of the cone in which pushes are looked for; default: that of the
+            description's `pushes`.
         model_error: 1 sigma of the relative error of the model's masses and inertias, for the
             localizer's weights where the robot is not calibrated; 0: the model is right.
         thresholds: of the detector; default: those of the robot's description.
@@ -94,7 +95,7 @@ class Pipeline:
         wrench_error: float = 0.0,
         torque_error: float = TORQUE_ERROR,
         skin: Skin | None = None,
-        friction: float = FRICTION,
+        friction: float | None = None,
         model_error: float = MODEL_ERROR,
         thresholds: Thresholds | None = None,
     ) -> None:
@@ -110,8 +111,9 @@ class Pipeline:
         self.skin.check_robot(robot)
         tuning = core.Tuning()
         tuning.method = getattr(core.Method, method)
-        tuning.localizer = localizer_settings(rule, friction)
-        self._weights = period, bandwidth, wrench_error, torque_error
+        pushes = expected_pushes(robot, friction)
+        tuning.localizer = localizer_settings(rule, pushes)
+        self._weights = period, bandwidth, wrench_error, torque_error, pushes
         self._model_error = model_error
         own = ref(self)  # the native pipeline must not keep this one alive
 

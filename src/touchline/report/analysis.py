@@ -14,6 +14,7 @@ from touchline.errors import InputError
 from touchline.folder import ResultsFolder
 from touchline.logs import Log, open_log
 from touchline.logs.period import sample_period
+from touchline.model.pushes import with_pushes
 from touchline.model.robot import Robot, load_robot
 from touchline.observer.observer import METHODS
 from touchline.observer.samples import Samples
@@ -95,6 +96,8 @@ def analyze(
     method: str = "segment",
     report: Report = "full",
     origin: str | None = None,
+    friction: float | None = None,
+    reach: float | None = None,
 ) -> Analysis:
     """Analyze a recording; writes estimates, contacts, events and the report into a directory.
 
@@ -106,6 +109,8 @@ def analyze(
         method: of the observer, "segment" or "paper".
         report: "full"; "summary" without a figure for each event; or "none".
         origin: where the recording really is, if `log` is a copy for a while.
+        friction: coefficient of friction of what touches; default: the description's `pushes`.
+        reach: free space that a push needs [m]; default: the description's `pushes`.
 
     Raises:
         InputError: an input cannot be used, or another process writes into the directory.
@@ -114,8 +119,8 @@ def analyze(
     """
     import pyarrow.parquet  # noqa: F401  the results need it: told before the work begins
 
-    check_options(bandwidth, method)
-    log, out, model = Path(log), Path(out), load_robot(robot)
+    check_options(bandwidth, method, friction, reach)
+    log, out, model = Path(log), Path(out), with_pushes(load_robot(robot), friction, reach)
     check_inputs(out, log, Path(robot))
     with open_log(log, model.description) as recording:
         parts = recording.chunks(CHUNK)
@@ -143,7 +148,9 @@ def analyze(
 
 def _origin(analysis: Analysis) -> dict[str, Any]:
     clock = analysis.statistics.clock
+    pushes = analysis.robot.description.pushes
     facts = {"method": analysis.method, "bandwidth": analysis.bandwidth, "period": analysis.period}
+    facts |= {"friction": pushes.friction, "reach": pushes.reach}
     names = analysis.robot.segment_names
     watch = {
         name: dict(zip(map(str, Watch), counts.tolist(), strict=True))
@@ -153,14 +160,21 @@ def _origin(analysis: Analysis) -> dict[str, Any]:
     return facts | clocked | {"watch": watch}
 
 
-def check_options(bandwidth: float | None, method: str) -> None:
+def check_options(
+    bandwidth: float | None,
+    method: str,
+    friction: float | None = None,
+    reach: float | None = None,
+) -> None:
     """Make sure that options of an analysis make sense.
 
     Raises:
         InputError: they do not.
     """
-    if bandwidth is not None and not (np.isfinite(bandwidth) and bandwidth > 0):
-        raise InputError(f"--bandwidth {bandwidth}: must be a positive number [rad/s]")
+    given = {"bandwidth": (bandwidth, " [rad/s]"), "friction": (friction, "")}
+    for name, (value, unit) in (given | {"reach": (reach, " [m]")}).items():
+        if value is not None and not (np.isfinite(value) and value > 0):
+            raise InputError(f"--{name} {value}: must be a positive number{unit}")
     if method not in METHODS:
         raise InputError(f"--method {method}: unknown; allowed: {', '.join(METHODS)}")
 

@@ -226,16 +226,27 @@ class Localizer {
     shared_ = links_.known() && tracks_.share_out(links_.shares());
   }
 
+  // Of a body that the last sample alone does not explain, the best patch is a cell.
   void share_out(std::vector<SurfaceCell>& cells) const {
     for (const BodyShare& of : links_.shares()) {
-      double here = 0.0;
-      for (const SurfaceCell& c : cells) here += surfaces()[c.surface].node == of.node ? c.probability : 0.0;
+      const double here = on_body(cells, of.node);
       for (SurfaceCell& c : cells) {
-        if (surfaces()[c.surface].node != of.node || !(here > 0.0)) continue;
+        if (surfaces()[c.surface].node != of.node) continue;
         c.probability *= of.share / here;
-        c.log_density += std::log(std::max(of.share, 1e-300) / here);
+        c.log_density += std::log(std::max(of.share / here, 1e-300));
       }
+      if (here > 0.0 || !(of.share > 0.0)) continue;
+      const LinkSurfaces& all = single_.surfaces();
+      const double area = 12.0 * of.radius * of.radius;
+      cells.push_back({of.surface, all.to_world(of.point, of.node), all.turn_to_world(of.normal, of.node),
+                       area, std::log(of.share / area), of.share});
     }
+  }
+
+  double on_body(const std::vector<SurfaceCell>& cells, int node) const {
+    double sum = 0.0;
+    for (const SurfaceCell& c : cells) sum += surfaces()[c.surface].node == node ? c.probability : 0.0;
+    return sum;
   }
 
   double steady_lag(int g) const {

@@ -18,6 +18,7 @@ struct LinkSurface {
   int node;
   Mesh mesh;
   bool graspable = false;  // may be pulled, along its surface too
+  bool touchable = true;   // else it is only in the way
 };
 
 // A rigid body: measurements cannot tell its surfaces apart.
@@ -40,7 +41,7 @@ class LinkSurfaces {
 
   const std::vector<LinkSurface>& all() const { return surfaces_; }
   const LinkSurface& operator[](int surface) const { return surfaces_[surface]; }
-  // The bodies of segment g that can be felt.
+  // The bodies of segment g that may be touched and can be felt.
   const std::vector<Body>& bodies(int g) const { return bodies_[g]; }
   // Points spread evenly over a surface.
   const std::vector<SurfaceSample>& samples(int surface) const { return samples_[surface]; }
@@ -110,7 +111,7 @@ class LinkSurfaces {
     std::vector<Body> bodies;
     for (std::size_t i = 0; i < surfaces_.size(); ++i) {
       const int node = surfaces_[i].node;
-      if (segment_of(node) != g) continue;
+      if (segment_of(node) != g || !surfaces_[i].touchable) continue;
       auto found = std::find_if(bodies.begin(), bodies.end(),
                                 [node](const Body& b) { return b.node == node; });
       if (found == bodies.end()) {

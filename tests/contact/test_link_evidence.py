@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Joint torques alone, of an arm with friction: the probabilities of links hold what they say."""
+
+import numpy as np
+import pytest
+
+from touchline.bench.localization.scene import FRICTION, arm_and_skin
+from touchline.bench.touches import TouchSampler, resting_signals
+from touchline.pipeline.pipeline import Pipeline
+
+RUNS, BEGIN, DURATION, PERIOD = 60, 0.6, 1.1, 2e-3
+
+
+def touched(run, arm, skin):
+    """Signals of an arm whose gains err by 2 %, and whose torques stray slowly by 0.05 Nm."""
+    rng = np.random.default_rng([14, run])
+    touch = TouchSampler(skin, rng, friction=FRICTION).sample(20.0)
+    s = resting_signals(arm, touch.q, [(touch, BEGIN)], DURATION, rng, PERIOD)
+    rest = s.tau[: int(0.9 * BEGIN / PERIOD)].mean(0)
+    gain = 1.0 + 0.02 * rng.standard_normal(s.tau.shape[1])
+    steps = 0.05 * np.sqrt(PERIOD / 0.3) * rng.standard_normal(s.tau.shape)
+    s.tau[:] = rest + gain * (s.tau - rest) + np.cumsum(steps, 0)
+    return touch, s
+
+
+@pytest.fixture(scope="module")
+def told():
+    """Body touched, probability by body at the end, and as the event has it; for each run."""
+    robot, skin = arm_and_skin("panda-torques", 1)
+    rows = []
+    for run in range(RUNS):
+        touch, s = touched(run, robot, skin)
+        pipeline = Pipeline(robot, period=PERIOD, skin=skin)
+        pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+        for event in pipeline.events:
+            shares = {}
+            for c in event.candidates:
+                shares[c.body] = shares.get(c.body, 0.0) + c.probability
+            rows.append((touch.patch.body, shares, event))
+    return rows
+
+
+def test_each_touch_is_one_event_whose_shares_are_probabilities(told):
+    assert RUNS * 0.9 <= len(told) <= RUNS * 1.05
+    for _, shares, event in told:
+        assert sum(shares.values()) == pytest.approx(1.0, abs=0.02)
+        if event.body is None:  # no single push explains
+            continue
+        assert event.body_probability == pytest.approx(shares[event.body], abs=1e-9)
+        assert event.body == max(shares, key=shares.get)
+
+
+def test_probabilities_hold_what_they_say(told):
+    inside, sure, expected = [], [], []
+    for body, shares, _ in told:
+        order = sorted(shares, key=shares.get, reverse=True)
+        held = np.cumsum([shares[b] for b in order])
+        inside.append(body in order[: int(np.searchsorted(held, 0.9 * held[-1])) + 1])
+        expected.append(shares[order[0]])
+        if shares[order[0]] > 0.9:
+            sure.append(order[0] == body)
+    right = np.mean([max(s, key=s.get) == body for body, s, _ in told])
+    print(f"right {right:.2f}, said {np.mean(expected):.2f}; in the set {np.mean(inside):.2f}")
+    print(f"above 0.9: {len(sure)}, wrong {len(sure) - sum(sure)}")
+    assert np.mean(inside) >= 0.88
+    assert len(sure) > 0.2 * RUNS
+    assert np.mean(sure) >= 0.94
+    assert right >= np.mean(expected) - 0.15
+
+
+def test_parts_of_a_recording_and_single_samples_tell_the_same():
+    robot, skin = arm_and_skin("panda-torques", 1)
+    _, s = touched(0, robot, skin)
+    whole, single = (Pipeline(robot, period=PERIOD, skin=skin) for _ in range(2))
+    whole.run(s.time, s.q, s.qd, s.tau, s.wrench)
+    for i in range(len(s.time)):
+        single.update(s.time[i], s.q[i], s.qd[i], s.tau[i], s.wrench[i])
+    (a,), (b,) = whole.events, single.events
+    assert [(c.link, c.probability, *c.position) for c in a.candidates] == [
+        (c.link, c.probability, *c.position) for c in b.candidates
+    ]
+
+
+def test_the_contact_at_hand_and_its_event_name_the_same_body():
+    robot, skin = arm_and_skin("panda-torques", 1)
+    placed = 0
+    for run in range(6):
+        _, s = touched(run, robot, skin)
+        pipeline = Pipeline(robot, period=PERIOD, skin=skin)
+        for i in range(len(s.time)):
+            result = pipeline.update(s.time[i], s.q[i], s.qd[i], s.tau[i], s.wrench[i])
+        (event,), (contact,) = pipeline.events, result.contacts
+        if contact.body is None or event.body is None:
+            continue
+        placed += 1
+        assert contact.body == event.body
+        assert contact.body_probability == pytest.approx(event.body_probability, abs=0.05)
+        region = pipeline.region()
+        links = {p.link for p in skin.patches if p.body == event.body}
+        inside = np.isin(np.array(region.links)[region.link], list(links))
+        on_body = region.probability[inside].sum()
+        assert region.probability.sum() == pytest.approx(1.0)
+        assert on_body == pytest.approx(contact.body_probability, abs=0.05)
+    assert placed >= 3
