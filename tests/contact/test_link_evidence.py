@@ -84,7 +84,7 @@ def test_parts_of_a_recording_and_single_samples_tell_the_same():
 def test_the_contact_at_hand_and_its_event_name_the_same_body():
     robot, skin = arm_and_skin("panda-torques", 1)
     placed = 0
-    for run in range(6):
+    for run in range(30):
         _, s = touched(run, robot, skin)
         pipeline = Pipeline(robot, period=PERIOD, skin=skin)
         for i in range(len(s.time)):
