@@ -174,13 +174,14 @@ inline void bind(nb::module_& m) {
           "__init__",
           [](tl::DetectionRow* self, int segment, int component, int joint, double contact,
              double collision, double baseline_limit, const std::vector<double>& slow,
-             const std::vector<double>& quick, const std::vector<double>& drift) {
+             const std::vector<double>& quick, const std::vector<double>& drift,
+             double seen) {
             new (self) tl::DetectionRow{segment, component, joint, contact, collision,
                                         baseline_limit, model_error(slow), model_error(quick),
-                                        model_error(drift)};
+                                        model_error(drift), seen};
           },
           "segment"_a, "component"_a, "joint"_a, "contact"_a, "collision"_a, "baseline_limit"_a,
-          "slow"_a, "quick"_a, "drift"_a);
+          "slow"_a, "quick"_a, "drift"_a, "seen"_a = 0.0);
   nb::class_<tl::DetectionTimes>(m, "DetectionTimes")
       .def(
           "__init__",
@@ -215,7 +216,10 @@ inline void bind(nb::module_& m) {
             new (self) tl::Detector(observer.value, std::move(rows), std::move(settings));
           },
           "observer"_a, "rows"_a, "settings"_a, nb::keep_alive<1, 2>())
-      .def("baseline", &tl::Detector::baseline, "row"_a);
+      .def("baseline", &tl::Detector::baseline, "row"_a)
+      .def("limit", &tl::Detector::limit, "row"_a)
+      .def("noise", &tl::Detector::noise, "row"_a)
+      .def("offset", &tl::Detector::offset, "row"_a);
   m.def("row_variances", &row_variances, "observer"_a, "rows"_a, "noise"_a, "q"_a);
   m.def("detect", &detect);
   m.def("detect_run", &detect_run);

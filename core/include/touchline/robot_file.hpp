@@ -22,7 +22,7 @@
 namespace touchline {
 
 // Of the file; another one is refused. It changes with every part of `Robot`.
-constexpr std::uint32_t kRobotFormat = 3;
+constexpr std::uint32_t kRobotFormat = 4;
 
 // A file that cannot be read or written: it says which, and why.
 struct RobotFileError : std::runtime_error {
@@ -203,8 +203,10 @@ void store(A& file, ModelError& error) {
 }
 template <class A>
 void store(A& file, DetectionRow& row) {
-  auto& [segment, component, joint, contact, collision, baseline_limit, slow, quick, drift] = row;
-  store_all(file, segment, component, joint, contact, collision, baseline_limit, slow, quick, drift);
+  auto& [segment, component, joint, contact, collision, baseline_limit, slow, quick, drift, seen] =
+      row;
+  store_all(file, segment, component, joint, contact, collision, baseline_limit, slow, quick, drift,
+            seen);
 }
 template <class A>
 void store(A& file, DetectionTimes& times) {

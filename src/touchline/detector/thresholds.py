@@ -35,7 +35,8 @@ class RowThreshold:
     `contact`, `collision` and `baseline_limit` are in N or Nm; wrenches are those in the frame of
     the segment's own sensor. A joint row has component -1, a wrench row has joint -1. `slow` and
     `quick` are sigmas of the model's errors, see `RowCalibration`; `drift` those that the localizer
-    reckons with: the calibrated `slow` ones, otherwise see `expect_drift`.
+    reckons with: the calibrated `slow` ones, otherwise see `expect_drift`. `contact` is kept `seen`
+    standard deviations of the noise that the detector sees above it; 0: it is given and stays.
     """
 
     segment: int
@@ -47,6 +48,7 @@ class RowThreshold:
     slow: Vector = (0.0, 0.0, 0.0)
     quick: Vector = (0.0, 0.0, 0.0)
     drift: Vector = (0.0, 0.0, 0.0)
+    seen: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -168,6 +170,7 @@ def _calibrated_row(
         slow=known.slow,
         quick=known.quick,
         drift=known.slow,
+        seen=0.0,
     )
 
 
@@ -195,6 +198,7 @@ def _wrench_rows(
         floor = FORCE_FLOOR if is_force else MOMENT_FLOOR
         safe = max(SIGMAS * sigma[component], floor)
         contact = _given(detection.contact, kind, segment)
+        seen = SIGMAS if contact is None else 0.0
         contact = safe if contact is None else contact
         collision = _given(detection.collision, kind, segment)
         if collision is None:
@@ -202,7 +206,9 @@ def _wrench_rows(
             collision = max(COLLISION_RATIO * contact, least)
         limit = detection.baseline.limit * contact
         slow, quick = _unknown_errors(max(safe, contact))
-        rows.append(RowThreshold(g, component, -1, contact, collision, limit, slow, quick))
+        rows.append(
+            RowThreshold(g, component, -1, contact, collision, limit, slow, quick, seen=seen)
+        )
     return rows
 
 
@@ -215,6 +221,7 @@ def _joint_rows(
             continue
         safe = max(SIGMAS * sigma[j], TORQUE_FLOOR)
         contact = _given(detection.contact, "torque", j)
+        seen = SIGMAS if contact is None else 0.0
         contact = safe if contact is None else contact
         collision = _given(detection.collision, "torque", j)
         if collision is None:
@@ -225,7 +232,7 @@ def _joint_rows(
             detection.baseline.limit * contact,
             _unknown_errors(max(safe, contact)),
         )
-        rows.append(RowThreshold(g, -1, j, contact, collision, limit, slow, quick))
+        rows.append(RowThreshold(g, -1, j, contact, collision, limit, slow, quick, seen=seen))
     return rows
 
 

@@ -35,9 +35,10 @@ struct DetectionRow {
   int component;  // 0 to 5 of the segment wrench; -1: a joint
   int joint;
   double contact, collision;  // thresholds [N or Nm]
-  double baseline_limit;      // the largest residual that is taken for an offset [N or Nm]
+  double baseline_limit;      // how far the baseline may go from where it began [N or Nm]
   ModelError slow, quick;     // against the baseline and against the reference of `kReference`
   ModelError drift;           // against the baseline, while a contact lasts
+  double seen = 0.0;          // standard deviations of the noise seen that `contact` is kept above
 };
 
 struct DetectionTimes {

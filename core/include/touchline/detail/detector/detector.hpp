@@ -13,6 +13,8 @@
 #include "touchline/detail/detector/activity.hpp"
 #include "touchline/detail/detector/baseline_posture.hpp"
 #include "touchline/detail/detector/detection_row.hpp"
+#include "touchline/detail/detector/noise_meter.hpp"
+#include "touchline/detail/detector/row_covariance.hpp"
 #include "touchline/detail/detector/segment_tests.hpp"
 #include "touchline/detail/model/posture.hpp"
 #include "touchline/detail/observer/observer.hpp"
@@ -26,6 +28,7 @@ class Detector {
         posture_(observer.tree(), observer.row_layout().joints),
         rows_(std::move(rows)),
         settings_(std::move(settings)),
+        told_(observer, rows_, settings_.noise),
         activity_(observer.row_layout().joints),
         baseline_posture_(settings_.sum_limits.size(), observer.row_layout().joints),
         states_(rows_.size()),
@@ -33,6 +36,7 @@ class Detector {
         segments_(settings_.sum_limits.size()),
         first_(segments_.size() + 1, 0),
         normalized_(rows_.size(), 0.0),
+        limits_(rows_.size(), 1.0),
         drift_(rows_.size(), 0.0),
         levels_(segments_.size(), 0),
         quiet_(segments_.size(), 0.0),
@@ -46,6 +50,8 @@ class Detector {
       tests_.emplace_back(observer, own, settings_);
       joint_tests_ = joint_tests_ || tests_.back().used();
     }
+    for (const DetectionRow& row : rows_)
+      meters_.emplace_back(bandwidth(row), row.contact / std::max(row.seen, 1.0));
   }
 
   // To be called after each step of the observer, with the row it wrote and the sample it took.
@@ -72,6 +78,8 @@ class Detector {
   const std::vector<DetectionRow>& rows() const { return rows_; }
   // Per row: (residual - baseline) / contact threshold; 0 where there is no settled residual.
   const std::vector<double>& normalized() const { return normalized_; }
+  // Per row: what `normalized` must exceed now, at least 1.
+  const std::vector<double>& limits() const { return limits_; }
   // Per row: one sigma of what the model's errors may have added since the baseline [N or Nm].
   const std::vector<double>& drift() const { return drift_; }
   const std::vector<int>& levels() const { return levels_; }  // per segment
@@ -85,12 +93,20 @@ class Detector {
   std::size_t first_row(int segment) const { return first_[segment]; }
   const Activity& activity() const { return activity_.activity(); }
   double baseline(int row) const { return states_[row].baseline; }
+  // What a row's load must exceed now, one sigma of its noise as seen, and what stood there when
+  // observation began or rests there since a contact [N or Nm].
+  double limit(int row) const { return limits_[row] * rows_[row].contact; }
+  double noise(int row) const { return meters_[row].sigma(); }
+  double offset(int row) const { return states_[row].anchor; }
   double reference(int row) const { return states_[row].reference; }
   const Observer& observer() const { return observer_; }
 
  private:
   struct RowState {
     double baseline = 0.0, reference = 0.0;
+    double anchor = 0.0;  // what stood there at the start, or rests there since a contact
+    double shown = 0.0;   // the largest of these so far
+    double trend = 0.0;   // mean of the last moments
     double age = 0.0, referred = 0.0;  // over how long they have been averaged [s]
     bool started = false;
   };
@@ -98,8 +114,14 @@ class Detector {
     double peak = 0.0, sum = 0.0, collision = 0.0;  // of the normalized rows
     double above = 0.0, above_collision = 0.0, below = 0.0;  // for how long [s]
     double score = 0.0;  // of all tests, in thresholds
+    double top = 0.0;    // the largest peak since the event began
+    double rest = 0.0;   // for how long little has been left of it, and that has not changed [s]
     bool pending = false, pending_collision = false;
   };
+  static constexpr double kStanding = 0.02;  // [rad/s]; a hand that pushes an arm moves it, too
+  static constexpr double kLittle = 0.5;  // of an event's peak: what may rest after it
+  static constexpr double kSpike = 5.0;    // samples of calm that one of noise takes away
+  static constexpr double kTrend = 0.02;   // time constant of the mean of the last moments [s]
   static constexpr double kMost = 1.5;  // thresholds that a sum can grow to while all is felt
 
   void follow_motion(const double* q, const double* qd, double dt) {
@@ -108,13 +130,24 @@ class Detector {
     sound_ = sum < kAbsurd;
     if (!sound_) return;
     activity_.add(qd, dt);
-    if (!joint_tests_) return;
     since_ += dt;
     if (placed_ && since_ < kRefresh) return;
     posture_.set(q, nullptr);
-    for (SegmentTests& tests : tests_) tests.weigh(posture_, activity_.activity());
+    tell_noise();
+    if (joint_tests_)
+      for (SegmentTests& tests : tests_) tests.weigh(posture_, activity_.activity());
     since_ = 0.0;
     placed_ = true;
+  }
+
+  // What the noise figures let expect in each row, in this posture.
+  void tell_noise() {
+    told_.evaluate_variances(posture_);
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      const std::size_t at = i * (rows_.size() + 1);
+      const double K = bandwidth(rows_[i]), kept = std::min(1.0, 0.5 * K * settings_.noise.period);
+      meters_[i].tell(kept * told_.reading()[at], K * K * told_.momentum()[at]);
+    }
   }
 
   // The residuals and innovations of a segment's rows.
@@ -157,28 +190,41 @@ class Detector {
     return true;
   }
 
+  double bandwidth(const DetectionRow& row) const {
+    if (row.component < 0) return observer_.joints()[row.joint].bandwidth;
+    return observer_.sensors()[observer_.layout().segments[row.segment].sensor].bandwidth;
+  }
+
   void test_row(std::size_t i) {
     const DetectionRow& row = rows_[i];
     RowState& s = states_[i];
     RowSample& sample = samples_[i];
     normalized_[i] = 0.0;
     if (!sample.known) return;
-    if (!s.started) {  // the first settled residual is taken for an offset, up to the limit
-      s.baseline = std::clamp(sample.residual, -row.baseline_limit, row.baseline_limit);
-      s.reference = sample.residual;
+    if (!s.started) {  // what stands there when observation begins is an offset
+      s.baseline = s.anchor = s.reference = s.trend = sample.residual;
+      s.shown = std::fabs(s.anchor);
       s.started = true;
     }
     sample.offset = s.baseline;
     sample.reference = s.reference;
     sample.referred = s.referred;
-    double limit = row.contact;
-    if (sample.gap_std > 0.0) limit = std::hypot(limit, kGapSigmas * sample.gap_std);
-    const double x = (sample.residual - s.baseline) / limit;
-    normalized_[i] = x;
+    limits_[i] = largest_noise(i) / row.contact;
+    normalized_[i] = (sample.residual - s.baseline) / row.contact;
+    const double x = normalized_[i] / limits_[i];
     Segment& segment = segments_[row.segment];
     segment.peak = std::max(segment.peak, std::fabs(x));
     segment.sum += x * x;
     segment.collision = std::max(segment.collision, std::fabs(x) * row.contact / row.collision);
+  }
+
+  // What a row's load must exceed now [N or Nm]: the larger of what noise as told and as seen would.
+  double largest_noise(std::size_t i) const {
+    const DetectionRow& row = rows_[i];
+    double most = row.contact;
+    if (row.seen > 0.0) most = std::max(most, meters_[i].limit(row.seen));
+    const double gap = samples_[i].gap_std;
+    return gap > 0.0 ? std::hypot(most, kGapSigmas * gap) : most;
   }
 
   // May offsets be followed: is nothing felt, or only by what has been an offset since?
@@ -211,10 +257,59 @@ class Detector {
     Segment& s = segments_[g];
     advance(s.score > 1.0, dt, s.pending, s.above);
     advance(s.collision > 1.0, dt, s.pending_collision, s.above_collision);
-    s.below = s.score < settings_.times.release ? s.below + dt : 0.0;
+    s.below = lasting(s.score < settings_.times.release, dt, s.below);
     if (s.pending && s.above >= settings_.times.min_duration) levels_[g] = std::max(levels_[g], 1);
     if (s.pending_collision && s.above_collision >= settings_.times.min_duration) levels_[g] = 2;
-    if (levels_[g] > 0 && s.below >= settings_.times.hold) levels_[g] = 0;
+    if (levels_[g] == 0) s.top = s.rest = s.below = 0.0;
+    if (levels_[g] == 0) return;
+    s.top = std::max(s.top, s.peak);
+    s.rest = lasting(may_rest(g) && steady(g), dt, s.rest);
+    if (s.below >= settings_.times.hold) levels_[g] = 0;
+    if (levels_[g] > 0 && s.rest >= settings_.times.hold) come_to_rest(g);
+  }
+
+  // For how long something has held, but for single samples of noise.
+  static double lasting(bool holds, double dt, double duration) {
+    return holds ? duration + dt : std::max(0.0, duration - kSpike * dt);
+  }
+
+  // May what the last moments have of a contact be friction or an error of the model? Only if it is
+  // little of the contact's peak, the arm has shown that it is not as told, and stands.
+  bool may_rest(std::size_t g) const {
+    if (activity().speed2 > kStanding * kStanding) return false;
+    bool off = false;
+    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+      const RowState& s = states_[i];
+      off = off || s.shown > rows_[i].contact || meters_[i].contradicts();
+      if (!samples_[i].known) continue;
+      const double limit = limits_[i] * rows_[i].contact;
+      if (std::fabs(s.trend - s.baseline) > kLittle * segments_[g].top * limit) return false;
+    }
+    return off;
+  }
+
+  // Has no row of the segment changed of late by what would matter?
+  bool steady(std::size_t g) const {
+    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+      const double most = settings_.times.release * limits_[i] * rows_[i].contact;
+      if (samples_[i].known && std::fabs(samples_[i].residual - states_[i].trend) > most) return false;
+    }
+    return true;
+  }
+
+  // What is left of a contact and does not change rests there: an offset from now on.
+  void come_to_rest(std::size_t g) {
+    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+      RowState& s = states_[i];
+      s.baseline = s.anchor = s.reference = s.trend;
+      s.shown = std::max(s.shown, std::fabs(s.anchor));
+      s.age = s.referred = kTrend;
+    }
+    quiet_[g] = kTrend;
+    levels_[g] = 0;
+    Segment& s = segments_[g];
+    s.pending = s.pending_collision = false;
+    s.above = s.above_collision = s.below = s.top = s.rest = 0.0;
   }
 
   // For how long a test has held without a break.
@@ -228,17 +323,21 @@ class Detector {
     const DetectionRow& row = rows_[i];
     const double value = samples_[i].residual;
     if (!samples_[i].known) return;
+    s.trend += (value - s.trend) * std::min(1.0, dt / kTrend);
     // Running means first, low-passes once they have seen enough.
     if (adapts(row.segment)) {
       s.referred = std::min(s.referred + dt, kReference);
       if (s.referred > 0.0) s.reference += (value - s.reference) * std::min(1.0, dt / s.referred);
     }
-    if (levels_[row.segment] > 0 || segments_[row.segment].pending) return;
+    if (levels_[row.segment] > 0) return meters_[i].interrupt();
+    if (segments_[row.segment].pending) return;
+    if (dt > 0.0) meters_[i].add(value, dt);
     quiet_[row.segment] = s.age += dt;
     const double tau = std::min(s.age, settings_.times.baseline);
     if (tau <= 0.0) return;
     const double next = s.baseline + (value - s.baseline) * std::min(1.0, dt / tau);
-    s.baseline = std::clamp(next, -row.baseline_limit, row.baseline_limit);
+    s.baseline = std::clamp(next, s.anchor - row.baseline_limit, s.anchor + row.baseline_limit);
+    if (s.age < kTrend) s.anchor = s.baseline;
   }
 
   // Drifts of the rows, from where the arm was while the baselines were averaged.
@@ -259,6 +358,7 @@ class Detector {
   const double* row_ = nullptr;
   std::vector<DetectionRow> rows_;
   DetectionSettings settings_;
+  RowCovariance told_;
   ActivityMeter activity_;
   BaselinePosture baseline_posture_;
   std::vector<RowState> states_;
@@ -266,7 +366,8 @@ class Detector {
   std::vector<Segment> segments_;
   std::vector<std::size_t> first_;  // per segment: its first row; they stand together
   std::vector<SegmentTests> tests_;
-  std::vector<double> normalized_, drift_;
+  std::vector<NoiseMeter> meters_;  // per row
+  std::vector<double> normalized_, limits_, drift_;
   std::vector<int> levels_;
   std::vector<double> quiet_, statistics_;
   double time_ = 0.0, since_ = 0.0;

@@ -37,6 +37,21 @@ class RowCovariance {
   const double* reading() const { return reading_.data(); }
 
   void evaluate(const Posture& posture) {
+    trace(posture);
+    square(by_velocity_, sigma_velocity_, momentum_);
+    square(by_reading_, sigma_reading_, reading_);
+  }
+
+  // The variances alone, without covariances.
+  void evaluate_variances(const Posture& posture) {
+    trace(posture);
+    square(by_velocity_, sigma_velocity_, momentum_, true);
+    square(by_reading_, sigma_reading_, reading_, true);
+  }
+
+ private:
+  // From where the noise of each row comes.
+  void trace(const Posture& posture) {
     std::fill(by_velocity_.begin(), by_velocity_.end(), 0.0);
     std::fill(by_reading_.begin(), by_reading_.end(), 0.0);
     for (std::size_t i = 0; i < rows_.size(); ++i) {
@@ -48,11 +63,8 @@ class RowCovariance {
         enter_joint(posture, rows_[i], velocity, reading);
       }
     }
-    square(by_velocity_, sigma_velocity_, momentum_);
-    square(by_reading_, sigma_reading_, reading_);
   }
 
- private:
   // A component of the segment's wrench in its sensor's frame: the power that the wrench has on
   // the twist that goes with the component.
   void enter_wrench(const Posture& posture, const DetectionRow& row, double* velocity,
@@ -97,10 +109,10 @@ class RowCovariance {
   }
 
   void square(const std::vector<double>& by, const std::vector<double>& sigma,
-              std::vector<double>& out) const {
+              std::vector<double>& out, bool diagonal = false) const {
     const std::size_t sources = sigma.size(), size = rows_.size();
     for (std::size_t i = 0; i < size; ++i) {
-      for (std::size_t j = 0; j <= i; ++j) {
+      for (std::size_t j = diagonal ? i : 0; j <= i; ++j) {
         double sum = 0.0;
         for (std::size_t c = 0; c < sources; ++c)
           sum += by[i * sources + c] * by[j * sources + c] * sigma[c] * sigma[c];

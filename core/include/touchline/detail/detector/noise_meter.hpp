@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+// How noisy a row is, as seen: the scatter of its residual about its own short mean, while nothing
+// touches. No allocation.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+namespace touchline {
+
+class NoiseMeter {
+ public:
+  // `bandwidth` of the row's filter [rad/s]; `least`: a sigma below which noise does not matter
+  // [N or Nm].
+  NoiseMeter(double bandwidth, double least)
+      : bandwidth_(bandwidth), least_(least), told_(least) {}
+
+  // The variance that noise as told has in the row now: of readings, which lasts for 1 / K, and of
+  // velocities, which is nearly white.
+  void tell(double of_readings, double of_velocities) {
+    const double sum = of_readings + of_velocities;
+    told_ = std::max(least_, std::sqrt(sum));
+    passed_ = sum > 0.0 ? (of_readings * kMean / (1.0 + kMean) + of_velocities) / sum : 1.0;
+  }
+
+  // The next value does not follow those before: the mean begins anew, the figure stays.
+  void interrupt() { running_ = false; }
+
+  // A residual [N or Nm], `dt` [s] after the one before.
+  void add(double value, double dt) {
+    if (!running_) {
+      running_ = true;
+      mean_ = value;
+      return;
+    }
+    const double off = value - mean_;
+    mean_ += off * std::min(1.0, dt * bandwidth_ / kMean);
+    double square = off * off / passed_;  // of what lasts the mean takes a part
+    // Squares of filtered noise are like each other for 1 / 2K.
+    double news = std::tanh(bandwidth_ * dt);
+    const double most = kFar * kFar * std::max(variance_, told_ * told_);
+    const bool far = square > most;
+    square = std::min(square, most);
+    if (far) news *= kDoubted;
+    count_ += news * (1.0 - count_ / kMost);
+    variance_ += (square - variance_) * std::min(1.0, news / count_);
+  }
+
+  // One sigma of the noise as seen [N or Nm].
+  double sigma() const { return std::sqrt(variance_); }
+
+  // Does what is seen speak against what is told? A variance of `count_` values has the relative
+  // standard deviation sqrt(2 / count_).
+  bool contradicts() const {
+    return variance_ > told_ * told_ * (1.0 + kSure * std::sqrt(2.0 / std::max(count_, kLeast)));
+  }
+
+  // What noise exceeds as rarely as a normal variable exceeds `sigmas` of its true sigma. Where
+  // seen noise speaks against the told one that is the quantile of Student's t for so many
+  // independent values (Wallace 1959): few values tell little.
+  double limit(double sigmas) const {
+    if (!contradicts()) return sigmas * told_;
+    const double n = std::max(count_, kLeast), z = sigmas * (8.0 * n + 3.0) / (8.0 * n + 1.0);
+    return std::max(sigmas * told_, sigma() * std::sqrt(n * std::expm1(z * z / n)));
+  }
+
+ private:
+  static constexpr double kMean = 2.0;     // times 1 / K: the mean that the scatter is about
+  static constexpr double kMost = 500.0;   // values that are remembered: 5 s at K = 100
+  static constexpr double kFar = 3.0;      // sigmas: an outlier is further off
+  static constexpr double kDoubted = 0.1;  // of a value: as what an outlier counts
+  static constexpr double kSure = 4.0;     // sigmas of a variance, against what is told
+  static constexpr double kLeast = 1.0;
+
+  double bandwidth_, least_, told_, passed_ = 1.0, mean_ = 0.0, variance_ = 0.0, count_ = 0.0;
+  bool running_ = false;
+};
+
+}  // namespace touchline

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The life of an event on an arm that is not as told: offsets, and friction that stays."""
+
+import numpy as np
+import pytest
+from shapes import chain
+from timeline import Push, ramp, signals
+
+from touchline.bench.touches import Signals
+from touchline.pipeline.pipeline import Pipeline
+
+Q = np.array([0.3, -0.5, 0.8, 0.4, -0.6, 0.5])
+ROBOT = chain((0.3,) * 6)
+PLACE, FORCE = np.array([0.10, -0.01, -0.04]), np.array([-1.0, 2.0, 20.0])
+OFFSET = np.array([2.0, -1.0, 1.5, 0.3, 0.0, -0.2])  # [N, Nm] at the base
+
+
+def pushed(*spells: tuple[float, float], left: float = 0.0) -> Push:
+    """A push on link4 in each spell [s]; a part of it is left after the first has begun."""
+
+    def force(t: float) -> np.ndarray:
+        during = sum(ramp(t, begin, 0.05) - ramp(t, end, 0.05) for begin, end in spells)
+        after = left * ramp(t, spells[0][1], 0.05)
+        return FORCE * max(during, after)
+
+    return Push("link4", lambda _: PLACE, force)
+
+
+def felt(s: Signals, offset: np.ndarray | float = 0.0) -> Pipeline:
+    pipeline = Pipeline(ROBOT, torque_error=0.0)
+    pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench + offset)
+    return pipeline
+
+
+def spans(pipeline: Pipeline) -> list[tuple[float, float | None]]:
+    return [(event.detected, event.cleared) for event in pipeline.events]
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_what_stands_there_at_the_start_is_no_event(sign):
+    pipeline = felt(signals(ROBOT, Q, [pushed((1.0, 1.5))], 2.5, 4), sign * OFFSET)
+    ((begin, end),) = spans(pipeline)
+    assert 1.0 < begin < 1.05
+    assert end is not None
+    assert 1.5 < end < 1.8
+    (event,) = pipeline.events
+    assert event.link == "link4"
+    assert event.force_peak == pytest.approx(np.linalg.norm(FORCE), rel=0.25)
+
+
+def test_what_rests_after_a_touch_is_no_event_and_the_next_push_is_one():
+    s = signals(ROBOT, Q, [pushed((1.0, 1.4), (2.0, 2.4), left=0.25)], 3.2, 4)
+    first, second = spans(felt(s, OFFSET))
+    assert 1.4 < first[1] < 1.7
+    assert 2.0 < second[0] < 2.05
+    assert 2.4 < second[1] < 2.7
+
+
+def test_on_an_arm_as_told_what_is_left_of_a_push_is_a_push():
+    """20 N, then 5 N for a second: with nothing wrong with the arm that is one contact."""
+    ((_, end),) = spans(felt(signals(ROBOT, Q, [pushed((1.0, 1.4), left=0.25)], 2.5, 4)))
+    assert end is None
+
+
+def test_a_push_that_is_held_for_a_minute_is_one_event():
+    s = signals(ROBOT, Q, [pushed((0.5, 60.5))], 3.0, None)
+    long = np.concatenate([np.arange(1500), np.full(60000, 1500), np.arange(1500, 3000)])
+    rng = np.random.default_rng(5)
+    time = 1e-3 * np.arange(len(long))
+    noise = ROBOT.description.noise
+    for offset in (0.0, OFFSET):
+        held = Signals(
+            time,
+            s.q[long],
+            s.qd[long] + rng.normal(size=(len(long), 6)) * noise.qd,
+            s.tau[long] + rng.normal(size=(len(long), 6)) * noise.tau,
+            s.wrench[long] + rng.normal(size=(len(long), 1, 6)) * noise.sensors["base"],
+        )
+        (span,) = spans(felt(held, offset))
+        assert span[0] < 0.6
+        assert span[1] is None
