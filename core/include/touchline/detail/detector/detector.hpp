@@ -13,6 +13,7 @@
 #include "touchline/detail/detector/activity.hpp"
 #include "touchline/detail/detector/baseline_posture.hpp"
 #include "touchline/detail/detector/detection_row.hpp"
+#include "touchline/detail/detector/motion_spread.hpp"
 #include "touchline/detail/detector/noise_meter.hpp"
 #include "touchline/detail/detector/row_covariance.hpp"
 #include "touchline/detail/detector/segment_tests.hpp"
@@ -32,6 +33,7 @@ class Detector {
         activity_(observer.row_layout().joints),
         baseline_posture_(settings_.sum_limits.size(), observer.row_layout().joints),
         states_(rows_.size()),
+        spreads_(rows_.size()),
         samples_(rows_.size()),
         segments_(settings_.sum_limits.size()),
         first_(segments_.size() + 1, 0),
@@ -52,6 +54,9 @@ class Detector {
     }
     for (const DetectionRow& row : rows_)
       meters_.emplace_back(bandwidth(row), row.contact / std::max(row.seen, 1.0));
+    slowest_.assign(segments_.size(), kAbsurd);
+    for (const DetectionRow& row : rows_)
+      slowest_[row.segment] = std::min(slowest_[row.segment], bandwidth(row));
   }
 
   // To be called after each step of the observer, with the row it wrote and the sample it took.
@@ -66,6 +71,7 @@ class Detector {
     for (std::size_t g = 0; g < segments_.size(); ++g) {
       Segment& s = segments_[g];
       s.peak = s.sum = s.collision = 0.0;
+      s.off = false;
       read_segment(g);
       for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) test_row(i);
       judge(g, dt);
@@ -117,11 +123,15 @@ class Detector {
     double top = 0.0;    // the largest peak since the event began
     double rest = 0.0;   // for how long little has been left of it, and that has not changed [s]
     bool pending = false, pending_collision = false;
+    bool off = false;  // has the arm shown that it is not as told?
   };
   static constexpr double kStanding = 0.02;  // [rad/s]; a hand that pushes an arm moves it, too
   static constexpr double kLittle = 0.5;  // of an event's peak: what may rest after it
   static constexpr double kSpike = 5.0;    // samples of calm that one of noise takes away
-  static constexpr double kTrend = 0.02;   // time constant of the mean of the last moments [s]
+  static constexpr double kTrend = 2.0;   // times 1 / K: time constant of the mean of the last moments
+  static constexpr double kRest = 5.0;    // times 1 / K: how long rests what has come to rest
+  static constexpr double kMoving = 0.1;  // [rad/s]; slower is an arm that a hand pushes aside
+  static constexpr double kPause = 0.3;   // an arm that stops for less goes on moving [s]
   static constexpr double kMost = 1.5;  // thresholds that a sum can grow to while all is felt
 
   void follow_motion(const double* q, const double* qd, double dt) {
@@ -130,6 +140,7 @@ class Detector {
     sound_ = sum < kAbsurd;
     if (!sound_) return;
     activity_.add(qd, dt);
+    still_ = activity().speed2 > kMoving * kMoving ? 0.0 : still_ + dt;
     since_ += dt;
     if (placed_ && since_ < kRefresh) return;
     posture_.set(q, nullptr);
@@ -171,6 +182,7 @@ class Detector {
         s.gap_std = row_[layout.segment_gap_std() + 2 * g + (row.component < 3 ? 0 : 1)];
       }
       s.known = s.known && std::isfinite(s.residual);
+      segments_[g].off |= states_[i].shown > row.contact || meters_[i].contradicts();
       if (!std::isfinite(s.innovation)) s.innovation = s.residual;  // samples were lost
     }
   }
@@ -223,8 +235,14 @@ class Detector {
     const DetectionRow& row = rows_[i];
     double most = row.contact;
     if (row.seen > 0.0) most = std::max(most, meters_[i].limit(row.seen));
+    if (learns(i)) most = std::max(most, spreads_[i].limit());
     const double gap = samples_[i].gap_std;
     return gap > 0.0 ? std::hypot(most, kGapSigmas * gap) : most;
+  }
+
+  // Does what is seen of a row in motion count: is the arm not as told, and moves?
+  bool learns(std::size_t i) const {
+    return rows_[i].seen > 0.0 && segments_[rows_[i].segment].off && still_ < kPause;
   }
 
   // May offsets be followed: is nothing felt, or only by what has been an offset since?
@@ -265,7 +283,7 @@ class Detector {
     s.top = std::max(s.top, s.peak);
     s.rest = lasting(may_rest(g) && steady(g), dt, s.rest);
     if (s.below >= settings_.times.hold) levels_[g] = 0;
-    if (levels_[g] > 0 && s.rest >= settings_.times.hold) come_to_rest(g);
+    if (levels_[g] > 0 && s.rest >= kRest / slowest_[g]) come_to_rest(g);
   }
 
   // For how long something has held, but for single samples of noise.
@@ -277,15 +295,13 @@ class Detector {
   // little of the contact's peak, the arm has shown that it is not as told, and stands.
   bool may_rest(std::size_t g) const {
     if (activity().speed2 > kStanding * kStanding) return false;
-    bool off = false;
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
       const RowState& s = states_[i];
-      off = off || s.shown > rows_[i].contact || meters_[i].contradicts();
       if (!samples_[i].known) continue;
       const double limit = limits_[i] * rows_[i].contact;
       if (std::fabs(s.trend - s.baseline) > kLittle * segments_[g].top * limit) return false;
     }
-    return off;
+    return segments_[g].off;
   }
 
   // Has no row of the segment changed of late by what would matter?
@@ -297,15 +313,18 @@ class Detector {
     return true;
   }
 
+  // What the last moments have of a row is an offset from now on.
+  void rest(std::size_t i) {
+    RowState& s = states_[i];
+    s.baseline = s.anchor = s.reference = s.trend;
+    s.shown = std::max(s.shown, std::fabs(s.anchor));
+    s.age = s.referred = kTrend / bandwidth(rows_[i]);
+  }
+
   // What is left of a contact and does not change rests there: an offset from now on.
   void come_to_rest(std::size_t g) {
-    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
-      RowState& s = states_[i];
-      s.baseline = s.anchor = s.reference = s.trend;
-      s.shown = std::max(s.shown, std::fabs(s.anchor));
-      s.age = s.referred = kTrend;
-    }
-    quiet_[g] = kTrend;
+    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) rest(i);
+    quiet_[g] = kTrend / slowest_[g];
     levels_[g] = 0;
     Segment& s = segments_[g];
     s.pending = s.pending_collision = false;
@@ -323,21 +342,25 @@ class Detector {
     const DetectionRow& row = rows_[i];
     const double value = samples_[i].residual;
     if (!samples_[i].known) return;
-    s.trend += (value - s.trend) * std::min(1.0, dt / kTrend);
+    s.trend += (value - s.trend) * std::min(1.0, dt * bandwidth(row) / kTrend);
+    if (learns(i) && dt > 0.0) spreads_[i].add(value - s.baseline, dt, levels_[row.segment] > 0);
     // Running means first, low-passes once they have seen enough.
     if (adapts(row.segment)) {
       s.referred = std::min(s.referred + dt, kReference);
       if (s.referred > 0.0) s.reference += (value - s.reference) * std::min(1.0, dt / s.referred);
     }
+    const bool stopped = still_ >= kPause && still_ - dt < kPause;
     if (levels_[row.segment] > 0) return meters_[i].interrupt();
+    if (stopped && segments_[row.segment].off && row.seen > 0.0) rest(i);
     if (segments_[row.segment].pending) return;
     if (dt > 0.0) meters_[i].add(value, dt);
     quiet_[row.segment] = s.age += dt;
     const double tau = std::min(s.age, settings_.times.baseline);
     if (tau <= 0.0) return;
     const double next = s.baseline + (value - s.baseline) * std::min(1.0, dt / tau);
-    s.baseline = std::clamp(next, s.anchor - row.baseline_limit, s.anchor + row.baseline_limit);
-    if (s.age < kTrend) s.anchor = s.baseline;
+    const double most = learns(i) ? std::max(row.baseline_limit, spreads_[i].limit()) : row.baseline_limit;
+    s.baseline = std::clamp(next, s.anchor - most, s.anchor + most);
+    if (s.age < kTrend / bandwidth(row)) s.anchor = s.baseline;
   }
 
   // Drifts of the rows, from where the arm was while the baselines were averaged.
@@ -362,8 +385,10 @@ class Detector {
   ActivityMeter activity_;
   BaselinePosture baseline_posture_;
   std::vector<RowState> states_;
+  std::vector<MotionSpread> spreads_;  // per row
   std::vector<RowSample> samples_;
   std::vector<Segment> segments_;
+  std::vector<double> slowest_;     // per segment: the least bandwidth of its rows [rad/s]
   std::vector<std::size_t> first_;  // per segment: its first row; they stand together
   std::vector<SegmentTests> tests_;
   std::vector<NoiseMeter> meters_;  // per row
@@ -371,6 +396,7 @@ class Detector {
   std::vector<int> levels_;
   std::vector<double> quiet_, statistics_;
   double time_ = 0.0, since_ = 0.0;
+  double still_ = 0.0;  // for how long the arm has stood [s]
   bool timed_ = false, placed_ = false, gap_ = false, joint_tests_ = false, sound_ = false;
 };
 
