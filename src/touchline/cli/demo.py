@@ -22,6 +22,7 @@ def demo(
     host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1",
     port: int = 8080,
     browser: bool = True,
+    interface: bool = False,
 ) -> int:
     """Opens a page with an arm, simulated live: push it, and see what it feels.
 
@@ -46,25 +47,35 @@ def demo(
             and push the arm: it needs the token that is then printed.
         port: The first port that is tried.
         browser: Open the page in the browser.
+        interface: The arm has buttons, a slider and a writing pad; the mouse is a finger.
     """
     check_least(0, seed=seed)
+    if headless and interface:
+        raise InputError("--headless --interface: the interface is on the page; leave one out")
     if headless:
         return _print(HEADLESS_DURATION if duration is None else duration, out, seed, robot)
     if duration is not None:
         check_positive(duration=duration)
-    return _show(host, port, seed, robot, browser, duration)
+    return _show(host, port, seed, robot, browser, duration, interface)
 
 
 def _show(
-    host: str, port: int, seed: int, robot: str, browser: bool, duration: float | None
+    host: str,
+    port: int,
+    seed: int,
+    robot: str,
+    browser: bool,
+    duration: float | None,
+    interface: bool,
 ) -> int:
+    from touchline.view.interface import InterfacePage
     from touchline.view.server import PageServer, open_page
 
     with PageServer("Touchline", host, port) as server:
         from touchline.view.live import LivePage
 
         print("preparing the arm ...", flush=True)
-        page = LivePage(server, seed, robot)
+        page = (InterfacePage if interface else LivePage)(server, seed, robot)
         print(f"the arm is at {server.url}\nCtrl-C ends it.", flush=True)
         if browser:
             open_page(server.url)

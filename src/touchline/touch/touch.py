@@ -87,7 +87,7 @@ Callback = Callable[[TouchEvent], Any]
 
 
 @dataclass
-class _Press:
+class Press:
     """A finger, and what a widget needs of it."""
 
     finger: Finger
@@ -118,9 +118,9 @@ class _Press:
             if self.full is None or _size(mean) >= _size(self.full[1]):
                 self.full = q, mean
 
-    def after(self, finger: Finger) -> "_Press":
+    def after(self, finger: Finger) -> "Press":
         """The next finger on what is still the same contact."""
-        return _Press(
+        return Press(
             finger, self.resting, self.felt, self.before, self.start, True, self.least, self.crest
         )
 
@@ -168,7 +168,7 @@ class Touch:
         self.steps: deque[TorqueStep] = deque(maxlen=KEPT)
         self._callbacks: dict[str, list[Callback]] = {}
         self._gestures = GestureReader()
-        self._presses: dict[int, _Press] = {}
+        self._presses: dict[int, Press] = {}
         self._rest: deque[tuple[float, Array]] = deque()
         self._slides = {
             widget.name: _slide(robot, self._patches[widget.link], widget)
@@ -229,6 +229,11 @@ class Touch:
                 callback(event)
         return found
 
+    @property
+    def presses(self) -> tuple[Press, ...]:
+        """The fingers that press now, with the widgets that they use."""
+        return tuple(p for p in self._presses.values() if p.finger.lifted is None)
+
     def widget_at(self, link: str | None, position_link: Array | None) -> str | None:
         """Name of the widget at a place (3,) [m] in a link's frame, or None."""
         if link is None or position_link is None:
@@ -273,7 +278,7 @@ class Touch:
             return self._use(press, time, None if beside is None else beside[0])
         return self._choose(press, contact, time, q)
 
-    def _is_blow(self, press: _Press, contact: Contact, result: Result) -> bool:
+    def _is_blow(self, press: Press, contact: Contact, result: Result) -> bool:
         """Is it a collision, or too strong for a command?
 
         A contact that was one stays one while it lasts; a finger that presses on it anew does not.
@@ -286,7 +291,7 @@ class Touch:
             return True
         return press.felt and press.finger.now > GESTURE_MOST
 
-    def _ease(self, press: _Press, time: float) -> list[TouchEvent]:
+    def _ease(self, press: Press, time: float) -> list[TouchEvent]:
         """The force falls: the finger lifts, or presses on with less."""
         finger = press.finger
         if press.easing is None:
@@ -300,8 +305,8 @@ class Touch:
         return []
 
     def _begin(
-        self, contact: Contact, time: float, torque: Array, earlier: _Press | None = None
-    ) -> _Press:
+        self, contact: Contact, time: float, torque: Array, earlier: Press | None = None
+    ) -> Press:
         """A finger that lands; `earlier` on what is still the same contact."""
         finger = Finger(contact.event, time, segment=contact.segment)
         if earlier is not None:
@@ -311,7 +316,7 @@ class Touch:
             early = [t for at, t in self._rest if at <= last - BEFORE[1]]
             resting = np.mean(early, axis=0) if early else np.zeros_like(torque)
             felt = contact.wrench is not None
-            press = _Press(finger, resting, felt, self._before(contact, time), resting)
+            press = Press(finger, resting, felt, self._before(contact, time), resting)
         self._presses[contact.event] = press
         return press
 
@@ -322,7 +327,7 @@ class Touch:
             return None
         return np.mean([self._rows(past, contact.segment) for past in early], axis=0)
 
-    def _place(self, press: _Press, contact: Contact, time: float, poses) -> None:
+    def _place(self, press: Press, contact: Contact, time: float, poses) -> None:
         finger = press.finger
         if contact.position is None or contact.link not in self._patches or poses is None:
             return
@@ -345,7 +350,7 @@ class Touch:
                 finger.first = here
             finger.far = max(finger.far, float(np.linalg.norm(here - finger.first)))
 
-    def _choose(self, press: _Press, contact: Contact, time, q) -> list[TouchEvent]:
+    def _choose(self, press: Press, contact: Contact, time, q) -> list[TouchEvent]:
         finger = press.finger
         age = time - finger.begun
         if finger.collision or age < DWELL or (press.felt and age > LATEST):
@@ -363,7 +368,7 @@ class Touch:
             found.append(self._event("toggle", press, time, value, probability))
         return found + self._use(press, time)
 
-    def _on_widget(self, press: _Press, q: Array, time: float) -> tuple[Widget | None, float]:
+    def _on_widget(self, press: Press, q: Array, time: float) -> tuple[Widget | None, float]:
         finger = press.finger
         if press.places and finger.link is not None:
             point = np.mean([place for _, place, _ in press.places], axis=0)
@@ -385,7 +390,7 @@ class Touch:
                 return self.widgets[name], probability
         return None, 0.0
 
-    def _beside(self, press: _Press, result: Result, poses) -> tuple[float, Array] | None:
+    def _beside(self, press: Press, result: Result, poses) -> tuple[float, Array] | None:
         """Way and force (3,) of a slider's finger where others touch its segment, too."""
         widget, finger = press.widget, press.finger
         if widget is None or widget.name not in self._slides or press.before is None:
@@ -416,7 +421,7 @@ class Touch:
             wrench = result.estimate.segment_wrench[self.robot.segment_names.index(segment)]
         return Rows(wrench, torque if alone else np.full_like(torque, np.nan)).values()
 
-    def _use(self, press: _Press, time: float, way: float | None = None) -> list[TouchEvent]:
+    def _use(self, press: Press, time: float, way: float | None = None) -> list[TouchEvent]:
         """What a pressed slider, dial or pad reports."""
         widget, finger = press.widget, press.finger
         if widget is None or finger.last is None or not press.places:
@@ -442,7 +447,7 @@ class Touch:
         self.values[widget.name] = value
         return [self._event("change", press, time, value)]
 
-    def _lift(self, press: _Press, time: float) -> list[TouchEvent]:
+    def _lift(self, press: Press, time: float) -> list[TouchEvent]:
         finger, widget = press.finger, press.widget
         if finger.lifted is not None:
             return []
@@ -461,7 +466,7 @@ class Touch:
                 found.append(self._event("stroke", press, time, stroke))
         return found
 
-    def _event(self, kind, press: _Press, time, value=None, probability=1.0) -> TouchEvent:
+    def _event(self, kind, press: Press, time, value=None, probability=1.0) -> TouchEvent:
         finger = press.finger
         name = press.widget.name if press.widget is not None else None
         return TouchEvent(

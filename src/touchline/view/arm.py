@@ -11,7 +11,7 @@ from touchline.model.robot import Robot
 from touchline.observer.dynamics import mass_matrix
 from touchline.observer.samples import Samples
 from touchline.result.contact import Contact
-from touchline.simulation.control import JointImpedance
+from touchline.simulation.control import JointImpedance, Trajectory
 from touchline.simulation.hands import Hand, Hands, place
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.plant import Plant
@@ -77,16 +77,19 @@ class LiveArm:
         robot: with a torque signal for every joint; its name decides the gains.
         skin: its surfaces.
         seed: of the motion, the noise and random pushes.
+        moving: how it moves; default: about its home.
     """
 
-    def __init__(self, robot: Robot, skin: Skin, seed: int = 1) -> None:
+    def __init__(
+        self, robot: Robot, skin: Skin, seed: int = 1, moving: Trajectory | None = None
+    ) -> None:
         self.robot, self.skin = robot, skin
         self.hands = Hands()
         self._rng = np.random.default_rng(seed)
         self._setup = read_setup(robot)
         self._gains = gains(robot, self._setup)
         self._outermost = "tool" if "tool" in robot.places else robot.bodies[-1].links[0]
-        moving = wandering(self._setup, SPEED, self._rng, reach=0.5)
+        moving = moving or wandering(self._setup, SPEED, self._rng, reach=0.5)
         self._trajectory = Switched(self._setup.home, moving)
         self._plant = Plant(robot, PHYSICS)
         self._plant.reset(self._setup.home)

@@ -60,6 +60,20 @@ class Controls:
             "Unknown load [kg]", 0.0, 1.0, 0.05, 0.0, hint="At the tool; the model lacks it."
         )
 
+    def set(
+        self,
+        force: float | None = None,
+        stiffness: float | None = None,
+        moving: bool | None = None,
+    ) -> None:
+        """Sets the force of pushes [N], the stiffness [%], and whether the arm moves."""
+        if force is not None:
+            self._force.value = force
+        if stiffness is not None:
+            self._stiffness.value = int(stiffness)
+        if moving is not None:
+            self._motion.value = next(name for name, moves in MOTIONS.items() if moves == moving)
+
     @property
     def force(self) -> float:
         """Of the next push [N]."""

@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The visitor's mouse on the arm: a click pushes, a drag pulls."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
-
-from touchline.view.scene import RobotScene
 
 Array = NDArray[np.float64]
 
@@ -33,15 +31,19 @@ class Touching(Protocol):
         ...
 
 
-def let_touch(arm: RobotScene, touching: Touching, post: Callable[[Callable[[], None]], None]):
+def let_touch(
+    drawn: Mapping[str, Sequence[viser.MeshHandle]],
+    touching: Touching,
+    post: Callable[[Callable[[], None]], None],
+) -> None:
     """Connects the mouse.
 
     Args:
-        arm: whose links can be clicked and dragged.
+        drawn: what can be clicked and dragged, by link or widget.
         touching: what then happens.
         post: takes calls to be made between two steps of the simulation.
     """
-    for link, meshes in arm.meshes.items():
+    for link, meshes in drawn.items():
         for mesh in meshes:
             _connect(mesh, link, touching, post)
 

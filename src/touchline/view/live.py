@@ -9,6 +9,7 @@ import traceback
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from html import escape
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +62,7 @@ class LivePage:
         self._full = load_robot("sara-full") if robot == "sara" else fully_measured(self._own)
         self._skin = Skin(self._own)
         self._seed, self.restarts = seed, 0
-        self.arm = LiveArm(self._full, self._skin, seed)
+        self.arm = self._new_arm(seed)
         self._todo: queue.SimpleQueue[Callable[[], object]] = queue.SimpleQueue()
         self._pulls: dict[int, Hand] = {}
         self._page = server.page
@@ -78,8 +79,8 @@ class LivePage:
         )
         self._history = History(self._own.segment_names)
         self._plots = _in_panel_of_their_own(self._page, self._history)
-        let_touch(self._robot, self, self.post)
-        self._method = _Chosen(self._own, self._full, self._skin)
+        let_touch(self._robot.meshes, self, self.post)
+        self._method = self._new_method()
         self._judge = Judge(self._own)
         self.felt: Felt | None = None
         self.verdicts: list[Verdict] = []
@@ -89,6 +90,12 @@ class LivePage:
         self._stopping = threading.Event()
         self._watched = threading.Event()
         self._page.on_client_connect(lambda _: self._watched.set())
+
+    def _new_method(self) -> "Chooser":
+        return _Chosen(self._own, self._full, self._skin)
+
+    def _new_arm(self, seed: int) -> LiveArm:
+        return LiveArm(self._full, self._skin, seed)
 
     def press(self, origin: Array, direction: Array) -> None:
         """A visitor clicks along a ray."""
@@ -160,8 +167,8 @@ class LivePage:
         self._pulls.clear()
         self._history.clear()
         self.felt, self.verdicts = None, []
-        self.arm = LiveArm(self._full, self._skin, self._seed + self.restarts)
-        self._method = _Chosen(self._own, self._full, self._skin)
+        self.arm = self._new_arm(self._seed + self.restarts)
+        self._method = self._new_method()
         self._judge = Judge(self._own)
         self._controls.notice.content = notice(error)
         self._notice_ends = time.monotonic() + NOTICE
@@ -225,6 +232,14 @@ def notice(error: Exception) -> str:
         '<div role="alert" style="font-size:12px;padding:0 0.75em;color:#b00020">'
         f"The simulation failed and the arm was started again. {what}</div>"
     )
+
+
+class Chooser(Protocol):
+    """Which method feels now."""
+
+    def get(self, name: str) -> Method:
+        """The method to use now, for one that is wanted."""
+        ...
 
 
 class _Chosen:
