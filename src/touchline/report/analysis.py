@@ -185,7 +185,7 @@ class _Run:
     def __init__(self, pipeline: Pipeline, draft: Path, period: float) -> None:
         self.pipeline, self.period = pipeline, period
         robot = pipeline.robot
-        self._outputs = Outputs(draft, robot)
+        self._outputs = Outputs(draft, robot, pipeline.skin)
         self.statistics = Statistics.of(len(robot.joint_names), len(robot.segment_names))
         self._curves = Curves(pipeline, self.period)
         self._poses = EventPoses()

@@ -11,11 +11,13 @@ import numpy as np
 from touchline import __version__
 from touchline.errors import InputError
 from touchline.logs import EstimateWriter, TableWriter
+from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
 from touchline.observer.observer import Estimate
 from touchline.pipeline.table import ContactTable, contact_schema
 from touchline.report.postures import PostureWriter
 from touchline.result.event import Event
+from touchline.touch.touch import Touch
 
 ESTIMATES, CONTACTS, POSTURES = "estimates.parquet", "contacts.parquet", "postures.parquet"
 EVENTS, ANALYSIS, REPORT = "events.json", "analysis.json", "report.html"
@@ -55,8 +57,12 @@ def strict(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _line(event: Event) -> str:
-    return json.dumps(strict(event.as_json()), allow_nan=False)
+def _line(event: Event, touch: Touch | None) -> str:
+    """An event as JSON; with a `touch` it names the widget that it is on, or null."""
+    line = event.as_json()
+    if touch is not None:
+        line["widget"] = touch.widget_at(event.link, event.position_link)
+    return json.dumps(strict(line), allow_nan=False)
 
 
 def _write_lines(path: Path, lines: Sequence[str]) -> None:
@@ -81,8 +87,9 @@ def write_origin(path: Path, log: str, robot: Path | str, facts: dict[str, Any])
 class Outputs:
     """The tables of a running analysis and its list of events."""
 
-    def __init__(self, directory: Path, robot: Robot) -> None:
+    def __init__(self, directory: Path, robot: Robot, skin: Skin | None = None) -> None:
         self.directory = directory
+        self._touch = Touch(robot, skin) if robot.description.interface else None
         names = (robot.joint_names, robot.sensor_names, robot.segment_names)
         self._estimates = EstimateWriter(directory, *names)
         self._contacts = TableWriter(directory / CONTACTS, CONTACT_SCHEMA)
@@ -116,7 +123,7 @@ class Outputs:
     def _told(self, event: Event) -> str:
         line = self._lines.get(event.id)
         if line is None:
-            line = _line(event)
+            line = _line(event, self._touch)
             if event.cleared is not None:
                 self._lines[event.id] = line
         return line

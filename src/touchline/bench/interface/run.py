@@ -9,8 +9,9 @@ import numpy as np
 from touchline.bench.interface.gestures import gestures
 from touchline.bench.interface.pressing import buttons, sliders
 from touchline.bench.interface.spots import taught_spots
-from touchline.bench.interface.writing import confusion, pen_digits, write
+from touchline.bench.interface.writing import confusion, draw, pen_digits, write
 from touchline.bench.tables import aligned
+from touchline.errors import InputError
 
 PARTS = ("digits", "buttons", "sliders", "gestures", "spots")
 
@@ -24,6 +25,7 @@ class Plan:
     digits: Path | None
     data: Path | None
     parts: tuple[str, ...] = PARTS
+    picture: Path | None = None
 
 
 def main(plan: Plan) -> None:
@@ -54,3 +56,9 @@ def _print_digits(plan: Plan, rng: np.random.Generator) -> None:
     title = ("digits of 14 unseen writers", "read", "place p50", "as drawn, read")
     print(aligned([title, *(found.row() for found in written)]) + "\n")
     print(aligned(confusion(written[0])) + "\n", flush=True)
+    if plan.picture is not None:
+        try:
+            plan.picture.write_text(draw(written[0]), encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"--picture {plan.picture}: {error.strerror}") from None
+        print(f"digits as the pen drew them and as they were felt: {plan.picture}\n", flush=True)

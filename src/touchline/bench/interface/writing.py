@@ -132,3 +132,23 @@ def confusion(written: Written) -> list[Row]:
         counts = [written.read[label, answer] for answer in (*labels, "")]
         rows.append((label, *(str(count) if count else "." for count in counts)))
     return rows
+
+
+def draw(written: Written) -> str:
+    """An SVG of each digit as the pen drew it, and beside it as the arm felt it."""
+    size, parts = 1e3 * DIGIT * 1.4, []
+    for column, label in enumerate(sorted(written.samples)):
+        pen, stroke = written.samples[label]
+        for row, (way, colour) in enumerate(((pen, "#0072b2"), (stroke.points[:, 1:], "#d95f02"))):
+            x, y = 1e3 * (way - 0.5 * (way.max(axis=0) + way.min(axis=0))).T
+            x, y = x + size * (column + 0.5), size * (row + 0.5) - y
+            points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
+            parts.append(
+                f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="2.5" '
+                'stroke-linecap="round" stroke-linejoin="round"/>'
+            )
+    width = size * len(written.samples)
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {2 * size:.0f}">'
+        f'<rect width="100%" height="100%" fill="white"/>{"".join(parts)}</svg>\n'
+    )
