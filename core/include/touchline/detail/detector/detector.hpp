@@ -396,7 +396,7 @@ class Detector {
   std::vector<int> levels_;
   std::vector<double> quiet_, statistics_;
   double time_ = 0.0, since_ = 0.0;
-  double still_ = 0.0;  // for how long the arm has stood [s]
+  double still_ = kPause;  // for how long the arm has stood [s]
   bool timed_ = false, placed_ = false, gap_ = false, joint_tests_ = false, sound_ = false;
 };
 

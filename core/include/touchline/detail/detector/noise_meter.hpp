@@ -52,7 +52,7 @@ class NoiseMeter {
   // Does what is seen speak against what is told? A variance of `count_` values has the relative
   // standard deviation sqrt(2 / count_).
   bool contradicts() const {
-    return variance_ > told_ * told_ * (1.0 + kSure * std::sqrt(2.0 / std::max(count_, kLeast)));
+    return count_ > kFew && variance_ > told_ * told_ * (1.0 + kSure * std::sqrt(2.0 / count_));
   }
 
   // What noise exceeds as rarely as a normal variable exceeds `sigmas` of its true sigma. Where
@@ -60,7 +60,7 @@ class NoiseMeter {
   // independent values (Wallace 1959): few values tell little.
   double limit(double sigmas) const {
     if (!contradicts()) return sigmas * told_;
-    const double n = std::max(count_, kLeast), z = sigmas * (8.0 * n + 3.0) / (8.0 * n + 1.0);
+    const double n = count_, z = sigmas * (8.0 * n + 3.0) / (8.0 * n + 1.0);
     return std::max(sigmas * told_, sigma() * std::sqrt(n * std::expm1(z * z / n)));
   }
 
@@ -70,7 +70,7 @@ class NoiseMeter {
   static constexpr double kFar = 3.0;      // sigmas: an outlier is further off
   static constexpr double kDoubted = 0.1;  // of a value: as what an outlier counts
   static constexpr double kSure = 4.0;     // sigmas of a variance, against what is told
-  static constexpr double kLeast = 1.0;
+  static constexpr double kFew = 5.0;      // values: fewer may be the beginning of a contact
 
   double bandwidth_, least_, told_, passed_ = 1.0, mean_ = 0.0, variance_ = 0.0, count_ = 0.0;
   bool running_ = false;
