@@ -112,6 +112,7 @@ class Detector {
     double baseline = 0.0, reference = 0.0;
     double anchor = 0.0;  // what stood there at the start, or rests there since a contact
     double shown = 0.0;   // the largest of these so far
+    double seconds = 0.0;  // since the first settled sample
     double trend = 0.0;   // mean of the last moments
     double age = 0.0, referred = 0.0;  // over how long they have been averaged [s]
     bool started = false;
@@ -126,6 +127,8 @@ class Detector {
     bool off = false;  // has the arm shown that it is not as told?
   };
   static constexpr double kStanding = 0.02;  // [rad/s]; a hand that pushes an arm moves it, too
+  static constexpr double kConfirm = 15.0; // times 1 / K: settling leaves nothing of what it began with
+  static constexpr double kAlike = 3.0;    // a factor within which an offset is still the same one
   static constexpr double kLittle = 0.5;  // of an event's peak: what may rest after it
   static constexpr double kSpike = 5.0;    // samples of calm that one of noise takes away
   static constexpr double kTrend = 2.0;   // times 1 / K: time constant of the mean of the last moments
@@ -215,7 +218,6 @@ class Detector {
     if (!sample.known) return;
     if (!s.started) {  // what stands there when observation begins is an offset
       s.baseline = s.anchor = s.reference = s.trend = sample.residual;
-      s.shown = std::fabs(s.anchor);
       s.started = true;
     }
     sample.offset = s.baseline;
@@ -343,6 +345,7 @@ class Detector {
     const double value = samples_[i].residual;
     if (!samples_[i].known) return;
     s.trend += (value - s.trend) * std::min(1.0, dt * bandwidth(row) / kTrend);
+    confirm_start(i, dt);
     if (learns(i) && dt > 0.0) spreads_[i].add(value - s.baseline, dt, levels_[row.segment] > 0);
     // Running means first, low-passes once they have seen enough.
     if (adapts(row.segment)) {
@@ -361,6 +364,18 @@ class Detector {
     const double most = learns(i) ? std::max(row.baseline_limit, spreads_[i].limit()) : row.baseline_limit;
     s.baseline = std::clamp(next, s.anchor - most, s.anchor + most);
     if (s.age < kTrend / bandwidth(row)) s.anchor = s.baseline;
+  }
+
+  // What stood there at the first sample may be a rest of settling, or of an arm that is set going:
+  // it shows that the arm is not as told only if it still stands there a while later.
+  void confirm_start(std::size_t i, double dt) {
+    RowState& s = states_[i];
+    const double end = kConfirm / bandwidth(rows_[i]), before = s.seconds;
+    s.seconds += dt;
+    if (before >= end || s.seconds < end) return;
+    const double least = std::min(std::fabs(s.trend), std::fabs(s.anchor));
+    const double most = std::max(std::fabs(s.trend), std::fabs(s.anchor));
+    if (s.trend * s.anchor > 0.0 && most < kAlike * least) s.shown = std::max(s.shown, least);
   }
 
   // Drifts of the rows, from where the arm was while the baselines were averaged.
