@@ -29,7 +29,11 @@ SARA = REPOSITORY / "src" / "touchline" / "robots" / "sara"
 NAMES = (
     "index tutorial concepts routes glossary benchmarks contributing detection reaction experiments"
 )
-PLAIN = [README, *(REPOSITORY / "docs" / f"{name}.md" for name in NAMES.split())]
+PLAIN = [
+    README,
+    REPOSITORY / "SECURITY.md",
+    *(REPOSITORY / "docs" / f"{name}.md" for name in NAMES.split()),
+]
 PLAIN += sorted((REPOSITORY / "docs" / "howto").glob("*.md"))
 NUMBER = re.compile(r"[-+]?\d+\.\d+")
 
