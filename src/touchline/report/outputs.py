@@ -10,8 +10,8 @@ import numpy as np
 
 from touchline import __version__
 from touchline.errors import InputError
-from touchline.logs import EstimateWriter, TableWriter
 from touchline.localizer.skin import Skin
+from touchline.logs import EstimateWriter, TableWriter
 from touchline.model.robot import Robot
 from touchline.observer.observer import Estimate
 from touchline.pipeline.table import ContactTable, contact_schema
