@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import touchline as tl
-from touchline.check.injected import ERRORS, Case, Tally, findings_of, make_case, trial
+from touchline.check.injected import ERRORS, UR10, Case, Tally, findings_of, make_case, trial
 from touchline.errors import InputError
 
 BY_NAME = {error.name: error for error in ERRORS}
@@ -27,7 +27,19 @@ def test_every_error_changes_the_recording(robot):
         assert case.told and (not same or case.unmounted > 0), error.name
 
 
-@pytest.mark.parametrize("name", ["sensor polarity", "a torque's sign", "samples missing"])
+NAMED_ALONE = (
+    "base tilted",
+    "hand missing in the model",
+    "hand modelled, not mounted",
+    "sensor polarity",
+    "a torque's sign",
+    "samples missing",
+    "a torque stuck later",
+    "a torque clipped",
+)
+
+
+@pytest.mark.parametrize("name", NAMED_ALONE)
 def test_an_error_is_named_and_nothing_else(robot, name):
     case = make_case(robot, (BY_NAME[name],), np.random.default_rng(5))
     findings = findings_of(case)
@@ -38,6 +50,26 @@ def test_an_error_is_named_and_nothing_else(robot, name):
 
 def test_a_clean_recording_is_silent(robot):
     assert findings_of(make_case(robot, (), np.random.default_rng(7))) == []
+
+
+def test_a_coarse_signal_is_neither_stuck_nor_clipped(robot):
+    case = make_case(robot, (), np.random.default_rng(7))
+    case.samples.tau[:] = np.round(case.samples.tau)
+    told = [line for line in findings_of(case) if "stuck" in line or "clipped" in line]
+    assert told == []
+
+
+def test_an_unmounted_hand_is_no_compensated_torque(tmp_path):
+    """Beside a light wrist nearly all of the expected torque is the hand's weight."""
+    path = tmp_path / "robot.yaml"
+    path.write_text(UR10)
+    try:
+        arm = tl.load_robot(path)
+    except InputError as error:
+        pytest.skip(f"model of the UR10: {error}")
+    case = make_case(arm, (BY_NAME["hand modelled, not mounted"],), np.random.default_rng(11))
+    (found,) = findings_of(case)
+    assert abs(float(found.split()[0]) - case.unmounted) < 0.1 and "kg too many" in found
 
 
 def test_what_is_missed_or_false_is_counted(robot):

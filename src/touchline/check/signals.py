@@ -16,6 +16,10 @@ Array = NDArray[np.float64]
 
 ENOUGH = 50  # samples before a constant signal is called dead
 FEW = 0.005  # of the samples may be missing, late or at the end of the range
+RUN = 5  # samples in a row with exactly one value: held, where noise would change them
+STUCK = 100  # samples in a row, and none so long elsewhere, before a live signal is called stuck
+CLIPPED = 0.01  # of the samples held at the largest or the least value
+ALIVE = 0.01  # of the other samples may be held; more is a coarse or a resampled signal
 OUTSIDE = 0.01  # rad or m beyond the limits before it is said
 
 
@@ -57,17 +61,40 @@ class SignalTable:
         self.low, self.high = np.full(count, np.inf), np.full(count, -np.inf)
         self.missing, self.infinite = np.zeros(count, int), np.zeros(count, int)
         self.at_range = np.zeros(count, int)
+        self.held, self.longest = np.zeros(count, int), np.zeros(count, int)
+        self.held_low, self.held_high = np.zeros(count, int), np.zeros(count, int)
 
     def add(self, part: Samples) -> None:
         """Take N samples."""
         self.samples += len(part)
         for i, values in enumerate(self._columns(part)):
             finite = np.isfinite(values)
+            if self.signals[i].kind in ("tau", "wrench"):
+                self._add_runs(i, values[finite])
             self.missing[i] += int(np.isnan(values).sum())
             self.infinite[i] += int(np.isinf(values).sum())
             self.low[i] = min(self.low[i], values.min(where=finite, initial=np.inf))
             self.high[i] = max(self.high[i], values.max(where=finite, initial=-np.inf))
             self.at_range[i] += int((np.abs(values) >= self.signals[i].range).sum())
+
+    def _add_runs(self, i: int, values: Array) -> None:
+        """Counts what is held; called before the least and largest value take these samples."""
+        if not len(values):
+            return
+        edges = np.flatnonzero(np.diff(values, prepend=np.nan, append=np.nan) != 0)
+        length, value = np.diff(edges), values[edges[:-1]]
+        run = np.where(length >= RUN, length, 0)
+        self.held[i] += int(run.sum())
+        self.longest[i] = max(self.longest[i], int(run.max(initial=0)))
+        low, high = float(values.min()), float(values.max())
+        if low <= self.low[i]:
+            self.held_low[i] = int(run[value == low].sum()) + self.held_low[i] * (
+                low == self.low[i]
+            )
+        if high >= self.high[i]:
+            self.held_high[i] = int(run[value == high].sum()) + self.held_high[i] * (
+                high == self.high[i]
+            )
 
     def _columns(self, part: Samples) -> Iterator[Array]:
         for signal in self.signals:
@@ -105,12 +132,36 @@ class SignalTable:
             findings.find(f"{column}: missing in {share:.1f} % of the samples")
         if self.infinite[i]:
             findings.find(f"{column}: infinite in {self.infinite[i]} samples")
-        if self.at_range[i] > few:
+        if self.at_range[i] <= few:
+            self._report_held(i, column, findings)
+        else:
             share = 100 * self.at_range[i] / self.samples
             findings.find(
                 f"{column}: at or beyond its range {signal.range:g} in {share:.1f} % of the "
                 f"samples (it reaches {max(abs(self.low[i]), abs(self.high[i])):.4g}): saturated, "
                 "or in other units"
+            )
+
+    def _report_held(self, i: int, column: str, findings: Findings) -> None:
+        """Clipped or stuck: exactly one value for long in a signal that else never rests."""
+        if self.samples < ENOUGH or self.low[i] == self.high[i]:
+            return
+        for count, value, what in (
+            (self.held_high[i], self.high[i], "largest"),
+            (self.held_low[i], self.low[i], "least"),
+        ):
+            others = self.held[i] - self.held_low[i] - self.held_high[i]
+            if count > max(CLIPPED * self.samples, 2 * RUN) and others < ALIVE * self.samples:
+                findings.find(
+                    f"{column}: {100 * count / self.samples:.1f} % of the samples stand at its "
+                    f"{what} value {value:.4g}: clipped; set range"
+                )
+                return
+        others = self.held[i] - self.longest[i]
+        if self.longest[i] >= STUCK and others < ALIVE * self.samples:
+            findings.find(
+                f"{column}: {self.longest[i]} samples in a row have one value, which else changes "
+                "with every sample: stuck"
             )
 
     def _limits(self, robot: Robot, findings: Findings) -> None:
