@@ -65,5 +65,5 @@ def arm(number: int, tier: int = 1) -> Arm:
     """An arm with so much noise (`bench.localization.arm.TIERS`); numbers repeat after `COUNT`."""
     if number >= COUNT:
         return arm(number % COUNT, tier)
-    robot, real = wrong_model("panda", tier, ERROR, number)
+    robot, real = wrong_model("panda", tier, ERROR, number, identified=True)
     return Arm(robot, real, Skin(robot))

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Arms whose inertias are not as the model says, calibrated on their own motion without contact.
 
-Every so many runs have an arm of their own. Each is calibrated as by `touchline calibrate`: on
-minutes of random motion within its joint limits, with the sensors and the noise of the benchmark.
+Every so many runs have an arm of their own. Each is calibrated as by `touchline calibrate`, with
+or without `--no-identify`: on minutes of random motion within its joint limits, with the sensors
+and the noise of the benchmark.
 """
 
 from functools import lru_cache
@@ -15,6 +16,9 @@ from touchline.bench.detection.free_motion import (
 )
 from touchline.bench.localization.arm import load_arm
 from touchline.detector import calibration as cal
+from touchline.identify.described import identified_robot
+from touchline.identify.evidence import gather
+from touchline.identify.identification import identify
 from touchline.model.robot import Robot
 
 RUNS = 25  # that share an arm
@@ -23,7 +27,9 @@ RATE = 1000.0  # Hz
 
 
 @lru_cache(maxsize=4)
-def wrong_model(arm: str, tier: int, error: float, number: int) -> tuple[Robot, Robot]:
+def wrong_model(
+    arm: str, tier: int, error: float, number: int, identified: bool = False
+) -> tuple[Robot, Robot]:
     """An arm as described, and as it is.
 
     Args:
@@ -31,6 +37,7 @@ def wrong_model(arm: str, tier: int, error: float, number: int) -> tuple[Robot, 
         tier: of noise.
         error: 1 sigma of the relative errors of masses and inertias (see `imperfect`).
         number: of the arm: each has errors of its own.
+        identified: whether inertias are calibrated, too, or thresholds alone.
 
     Returns:
         The robot with the model as it stands in its file, calibrated, and the robot that moves.
@@ -44,6 +51,8 @@ def wrong_model(arm: str, tier: int, error: float, number: int) -> tuple[Robot, 
             rng = generator(number, minute)
             yield [maker.samples(random_trajectory(robot, rng), rng)]
 
+    if identified:
+        robot = identified_robot(identify(gather(robot, recordings())))
     period, methods = 1.0 / RATE, robot.description.detection.method
     rows = cal.fit_rows(robot, period, cal.collect_residuals(robot, period, recordings()))
     robot = cal.with_methods(robot, *methods, min_duration=0.0)
