@@ -24,6 +24,7 @@ LIFTED = 0.25  # of the peak force: below it the finger has lifted
 EASING = 0.08  # s between both levels: a finger that takes as long presses on with less
 GRAB = 0.1  # s; two fingers from opposite sides for as long are a hand
 OPPOSITE = -0.5  # cosine between their forces
+HAND = 0.2  # m; fingers of one hand are no farther apart
 CLAMPED = 0.95  # probability of a hand where the pipeline says so (docs/reaction.md)
 
 
@@ -39,6 +40,7 @@ class Finger:
             no force is known).
         first, last: (3,) places in the link's frame [m]; None where they are not told.
         collision: whether it was a blow, or too strong for a command.
+        doubtful: whether what others do explains it; it is no finger while it is.
         widget: name of the widget it is on.
         grip: by how much a second push misses it [m] (`Grip`); 0 where there is none.
     """
@@ -56,6 +58,7 @@ class Finger:
     lifted: float | None = None
     collision: bool = False
     clamped: bool = False
+    doubtful: bool = False
     widget: str | None = None
     grip: float = 0.0
     told: set[str] = field(default_factory=set)
@@ -93,6 +96,7 @@ class GestureReader:
 
     def follow(self, fingers: list[Finger], time: float) -> list[Gesture]:
         """Takes the fingers of one sample, those that lifted just now included."""
+        fingers = [finger for finger in fingers if not finger.doubtful]
         found = self._grabs([f for f in fingers if f.lifted is None and not f.collision], time)
         for finger in fingers:
             if not finger.collision and "grab" not in finger.told:
@@ -150,7 +154,7 @@ class GestureReader:
                     finger.told.add("grab")
                 continue
             lasting = max((_opposed_for(a, b, time) for a in hand for b in hand), default=0.0)
-            clamped = any(finger.clamped for finger in hand)
+            clamped = any(f.clamped for f in hand) and all(_near(hand[0], f) for f in hand)
             gripped = max(finger.grip for finger in hand)
             if lasting < GRAB and not gripped and not (clamped and hand[0].duration(time) >= GRAB):
                 continue
@@ -185,9 +189,18 @@ def _together(tap: Finger, other: Finger) -> bool:
     return tap.link == other.link and float(np.linalg.norm(tap.first - other.first)) < NEARBY
 
 
+def _near(one: Finger, other: Finger) -> bool:
+    """May they belong to one hand?"""
+    if one.last is None or other.last is None:
+        return True
+    return one.link == other.link and float(np.linalg.norm(one.last - other.last)) < HAND
+
+
 def _opposed_for(one: Finger, other: Finger, time: float) -> float:
     """How long two fingers have pressed against each other [s]; 0 where they do not."""
     if one.force is None or other.force is None:
+        return 0.0
+    if not _near(one, other):
         return 0.0
     size = float(np.linalg.norm(one.force) * np.linalg.norm(other.force))
     if size == 0.0 or float(one.force @ other.force) >= OPPOSITE * size:

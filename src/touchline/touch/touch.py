@@ -17,9 +17,9 @@ from touchline.model.robot import Robot
 from touchline.pipeline.result import Result
 from touchline.result.contact import Contact
 from touchline.suggest import unknown
+from touchline.touch.beside import STEPS, WAVER, Beside, Other, Rows
 from touchline.touch.gesture import EASING, LIFTED, PRESS, Finger, GestureReader
 from touchline.touch.grip import Grip
-from touchline.touch.slide import STEPS, Rows, Slide
 from touchline.touch.spot import TorqueSpots
 from touchline.touch.stroke import Stroke
 from touchline.touch.widget import Widget
@@ -37,6 +37,7 @@ BEFORE = 0.3, 0.03  # s: from when to when before a touch its torques are taken 
 AVERAGE = 0.03  # s, over which the place of a press is averaged
 STROKE_LEAST = 0.01  # m; a shorter way on a pad is a press, no stroke
 BESIDE = 0.1  # s; another contact that began later has to last as long to be more than a doubt
+PAUSE = 0.01  # s between two looks at what is before a finger lands, or at whether it is one
 KEPT = 1000  # events and strokes that are kept; the oldest go
 
 
@@ -86,6 +87,33 @@ class TorqueStep:
 Callback = Callable[[TouchEvent], Any]
 
 
+@dataclass(frozen=True)
+class Touching:
+    """A contact as it was before another finger landed.
+
+    Attributes:
+        node: that carries it.
+        place: (3,) [m] and `force` (3,) [N], in the node's frame.
+    """
+
+    node: int
+    place: Array
+    force: Array
+
+
+@dataclass(frozen=True)
+class Before:
+    """What a segment showed before a finger landed.
+
+    Attributes:
+        rows: `Rows` (6 + n,).
+        touching: the contacts on it, by number of their events.
+    """
+
+    rows: Array
+    touching: dict[int, Touching]
+
+
 @dataclass
 class Press:
     """A finger, and what a widget needs of it."""
@@ -93,7 +121,7 @@ class Press:
     finger: Finger
     resting: Array  # torques (n,) [Nm] without it
     felt: bool  # whether a force-torque sensor feels it, not joint torques alone
-    before: Array | None  # `Rows` of its segment (6 + n,), before it landed
+    before: Before | None  # what its segment showed; None where no sensor feels it
     start: Array  # torques (n,) [Nm] before the contact began
     again: bool = False  # whether another finger pressed on the same contact before
     least: float = 0.0  # by how much `resting` differs from them [Nm]
@@ -106,6 +134,7 @@ class Press:
     value: float | None = None
     turned: float = 0.0
     easing: float | None = None  # since when the force falls
+    looked: float = -np.inf  # [s], when it was last asked whether others explain it
     grip: Grip = field(default_factory=Grip)
 
     def take(self, time: float, q: Array, torque: Array) -> None:
@@ -170,11 +199,12 @@ class Touch:
         self._gestures = GestureReader()
         self._presses: dict[int, Press] = {}
         self._rest: deque[tuple[float, Array]] = deque()
-        self._slides = {
-            widget.name: _slide(robot, self._patches[widget.link], widget)
+        self._paths = {
+            widget.name: _path(self._patches[widget.link], widget)
             for widget in self.widgets.values()
             if widget.kind == "slider" and widget.link in self._patches
         }
+        self._beside = {name: Beside(robot, name) for name in robot.sensor_names}
         self._past: deque[tuple[float, Result]] = deque()
 
     def on(self, name: str, callback: Callback | None = None) -> Any:
@@ -204,7 +234,7 @@ class Touch:
             self._rest.append((time, torque))
             while self._rest[0][0] < time - BEFORE[0]:
                 self._rest.popleft()
-        if self._slides:
+        if self._beside and (not self._past or time - self._past[-1][0] >= PAUSE):
             self._past.append((time, result))
             while self._past[0][0] < time - BEFORE[0]:
                 self._past.popleft()
@@ -251,7 +281,7 @@ class Touch:
         if press is None:
             press = self._begin(contact, time, torque)
         finger = press.finger
-        beside = self._beside(press, result, poses)
+        beside = self._along(press, result, poses)
         if beside is not None:
             size = float(np.linalg.norm(beside[1]))
         elif contact.wrench is not None:
@@ -273,10 +303,12 @@ class Touch:
         press.easing = None
         if not press.felt:
             press.take(time, q, torque)
-        self._place(press, contact, time, poses)
+        alone = sum(c.segment == contact.segment for c in result.contacts) == 1
+        self._place(press, contact, time, poses, alone)
         if press.widget is not None:
             return self._use(press, time, None if beside is None else beside[0])
-        return self._choose(press, contact, time, q)
+        self._doubt(press, result, poses)
+        return [] if finger.doubtful else self._choose(press, contact, time, q)
 
     def _is_blow(self, press: Press, contact: Contact, result: Result) -> bool:
         """Is it a collision, or too strong for a command?
@@ -316,18 +348,86 @@ class Touch:
             early = [t for at, t in self._rest if at <= last - BEFORE[1]]
             resting = np.mean(early, axis=0) if early else np.zeros_like(torque)
             felt = contact.wrench is not None
-            press = Press(finger, resting, felt, self._before(contact, time), resting)
+            before = self._before(contact, time) if felt else None
+            press = Press(finger, resting, felt, before, resting)
         self._presses[contact.event] = press
         return press
 
-    def _before(self, contact: Contact, time: float) -> Array | None:
-        """What the segment of a contact showed before it (6 + n,); None without sliders."""
+    def _before(self, contact: Contact, time: float) -> Before | None:
+        """What the segment of a contact showed before it; None without its sensor."""
         early = [past for at, past in self._past if at <= time - BEFORE[1]]
-        if not early:
+        if not early or contact.segment not in self._beside:
             return None
-        return np.mean([self._rows(past, contact.segment) for past in early], axis=0)
+        rows = np.mean([self._rows(past, contact.segment) for past in early], axis=0)
+        poses, touching = self.robot.poses(np.asarray(early[-1].q, float)), {}
+        for other in early[-1].contacts:
+            if other.segment == contact.segment and other.event != contact.event:
+                found = self._touching(other, poses)
+                if found is not None:
+                    touching[other.event] = found
+        return Before(rows, touching)
 
-    def _place(self, press: Press, contact: Contact, time: float, poses) -> None:
+    def _touching(self, contact: Contact, poses) -> Touching | None:
+        if contact.link not in self._patches or contact.position is None:
+            return None
+        node = self._patches[contact.link].node
+        R, p = poses[node][:3, :3], poses[node][:3, 3]
+        force = np.zeros(3) if contact.force is None else contact.force
+        return Touching(node, (contact.position - p) @ R, force @ R)
+
+    def _others(self, press: Press, result: Result, poses) -> list[Other]:
+        """What else touches a finger's segment, or did when it landed."""
+        finger, before = press.finger, press.before
+        assert before is not None
+        now: dict[int, Touching] = {}
+        for contact in result.contacts:
+            other = self._presses.get(contact.event)
+            if other is None or other is press or contact.segment != finger.segment:
+                continue
+            newer = other.finger.begun > finger.begun
+            if newer and other.finger.duration(result.time) < BESIDE:
+                continue
+            found = self._touching(contact, poses)
+            if found is not None:
+                now[contact.event] = found
+        found = []
+        for event, then in before.touching.items():
+            force = now[event].force if event in now else np.zeros(3)
+            spread = np.hypot(WAVER * _size(then.force), _size(force - then.force))
+            found.append(Other(then.node, then.place, max(float(spread), WAVER)))
+        for event, other in now.items():
+            if event not in before.touching:
+                found.append(Other(other.node, other.place, max(_size(other.force), 1.0)))
+        return found
+
+    def _change(self, press: Press, result: Result) -> Array:
+        """What its segment shows (6 + n,) less what it showed before a finger."""
+        assert press.before is not None
+        segment = press.finger.segment
+        alone = all(contact.segment == segment for contact in result.contacts)
+        return self._rows(result, segment, alone) - press.before.rows
+
+    def _doubt(self, press: Press, result: Result, poses) -> None:
+        """Is there a finger, or does what others do explain all that changed?"""
+        finger, time = press.finger, result.time
+        if press.before is None or not press.places or time - press.looked < PAUSE:
+            return
+        if not DWELL / 2 <= time - finger.begun <= LATEST or finger.link not in self._patches:
+            return
+        press.looked, others = time, self._others(press, result, poses)
+        if not others:
+            finger.doubtful = False
+            return
+        patch = self._patches[finger.link]
+        T = patch.T_node_link
+        point = T[:3, :3] @ press.places[-1][1] + T[:3, 3]
+        change = self._change(press, result)
+        beside = self._beside[str(finger.segment)]
+        force = beside.force_at(poses, patch.node, point, change, others)
+        claimed = np.zeros(3) if finger.force is None else finger.force
+        finger.doubtful = _size(force - claimed) > PRESS * finger.now
+
+    def _place(self, press: Press, contact: Contact, time: float, poses, alone: bool) -> None:
         finger = press.finger
         if contact.position is None or contact.link not in self._patches or poses is None:
             return
@@ -338,7 +438,9 @@ class Touch:
             press.grip = Grip()
             finger.link, finger.first, finger.far = contact.link, None, 0.0
         press.places.append((time, point, contact.position_std or 0.0))
-        if contact.wrench is not None and press.grip.due(time):
+        if not alone:
+            press.grip = Grip()  # what changes on the segment may be the other's doing
+        elif contact.wrench is not None and press.grip.due(time):
             wrench = _in(poses[patch.node] @ patch.T_node_link, contact.wrench)
             finger.grip = max(finger.grip, press.grip.follow(time, wrench, point))
         while press.places[0][0] < time - AVERAGE:
@@ -390,28 +492,17 @@ class Touch:
                 return self.widgets[name], probability
         return None, 0.0
 
-    def _beside(self, press: Press, result: Result, poses) -> tuple[float, Array] | None:
+    def _along(self, press: Press, result: Result, poses) -> tuple[float, Array] | None:
         """Way and force (3,) of a slider's finger where others touch its segment, too."""
         widget, finger = press.widget, press.finger
-        if widget is None or widget.name not in self._slides or press.before is None:
+        if widget is None or widget.name not in self._paths or press.before is None:
             return None
-        others = []
-        for contact in result.contacts:
-            other = self._presses.get(contact.event)
-            if other is None or other is press or contact.segment != finger.segment:
-                continue
-            newer = other.finger.begun > finger.begun
-            if newer and other.finger.duration(result.time) < BESIDE:
-                continue
-            if contact.link in self._patches and contact.position is not None:
-                node = self._patches[contact.link].node
-                force = np.zeros(3) if contact.force is None else contact.force
-                others.append((node, contact.position, force, newer))
+        others = self._others(press, result, poses)
         if not others:
             return None
-        alone = all(contact.segment == finger.segment for contact in result.contacts)
-        change = self._rows(result, finger.segment, alone) - press.before
-        return self._slides[widget.name].at(poses, change, others)
+        node, path = self._paths[widget.name]
+        beside = self._beside[str(finger.segment)]
+        return beside.along(poses, node, path, self._change(press, result), others)
 
     def _rows(self, result: Result, segment: str | None, alone: bool = True) -> Array:
         """What a segment's sensor and the joints show (6 + n,); joints only if all is on it."""
@@ -500,11 +591,11 @@ def make_widget(name: str, given: WidgetDescription, patches: Mapping[str, Patch
     return Widget(name, given, normal)
 
 
-def _slide(robot: Robot, patch, widget: Widget) -> Slide:
+def _path(patch: Patch, widget: Widget) -> tuple[int, Array]:
+    """A slider's path: the node that carries it, and points (STEPS + 1, 3) [m] in its frame."""
     T = patch.T_node_link
     points = np.array([widget.point_at(i / STEPS) for i in range(STEPS + 1)])
-    sensor = patch.segment if patch.segment in robot.sensor_names else None
-    return Slide(robot, patch.node, points @ T[:3, :3].T + T[:3, 3], sensor)
+    return patch.node, points @ T[:3, :3].T + T[:3, 3]
 
 
 def mean_normal(patch, at: Array, radius: float) -> Array:
