@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The trial of `check` puts in what it says, and counts what was said."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -91,3 +93,58 @@ def test_the_whole_trial_is_repeatable():
         pytest.skip(f"models of the Panda and the UR10: {error}")
     assert first.text() == trial(3, 4).text()
     assert first.cases.total() >= 3 and first.clean == 1
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("time in another unit", "gravity compensated"),
+        ("positions in degrees", "a torque's sign"),
+        ("torques in another unit", "hand missing in the model"),
+        ("a position's sign", "sensor polarity"),
+    ],
+)
+def test_one_error_does_not_hide_another(robot, names):
+    case = make_case(robot, tuple(BY_NAME[name] for name in names), np.random.default_rng(5))
+    findings = findings_of(case)
+    tally = Tally()
+    tally.add(case, findings)
+    assert tally.named.total() == 2, findings
+
+
+def test_a_delay_is_told_to_a_fifth_of_a_millisecond(robot):
+    case = make_case(robot, (), np.random.default_rng(5))
+    late = 3  # samples of 10 ms
+    case.samples.tau[late:] = case.samples.tau[:-late].copy()
+    (found,) = findings_of(case)
+    told = re.search(r"come (\S+) \+- \S+ ms late", found)
+    assert told is not None and abs(float(told[1]) - 30.0) < 0.2, found
+
+
+def test_unknown_friction_is_told_with_its_size(robot):
+    case = make_case(robot, (), np.random.default_rng(5))
+    qd = case.samples.qd[:, 1]
+    case.samples.tau[:, 1] += 20.0 * np.tanh(qd / 0.02) + 10.0 * qd
+    (found,) = findings_of(case)
+    told = re.search(r"about (\S+) Nm and (\S+) Nm s/rad", found)
+    assert told is not None and "torque of joint2 follows the sign" in found
+    assert abs(float(told[1]) - 20.0) < 2.0 and abs(float(told[2]) - 10.0) < 3.0
+
+
+def test_noise_is_measured_against_its_figures(robot):
+    case = make_case(robot, (BY_NAME["noise figures too small"],), np.random.default_rng(6))
+    assert [line for line in findings_of(case) if "noise: {tau:" in line]
+
+
+def test_a_scaled_link_is_weighed(robot):
+    case = make_case(robot, (BY_NAME["a link's inertia scaled"],), np.random.default_rng(5))
+    links = robot.mechanism.links
+    (name,) = (
+        name
+        for name, link in case.mechanism.links.items()
+        if abs(link.inertia.mass - links[name].inertia.mass) > 0.1 * links[name].inertia.mass > 0
+    )
+    (found,) = findings_of(case)
+    told = re.search(rf"inertia of {name} is .* weighs (\S+) kg", found)
+    true = case.mechanism.links[name].inertia.mass
+    assert told is not None and abs(float(told[1]) / true - 1) < 0.1, found

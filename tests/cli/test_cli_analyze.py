@@ -219,3 +219,24 @@ def test_impossible_numbers_of_a_simulation(option, tmp_path, capsys):
     out = str(tmp_path / "log.csv")
     assert main(["simulate", "free_motion", "--out", out, option]) == 2
     assert option.partition("=")[0] in capsys.readouterr().err
+
+
+def test_what_is_wrong_with_a_recording_is_told_beside_the_results(
+    recording, robot, tmp_path, capsys
+):
+    tau = recording.tau.copy()
+    tau[:, 1] *= -1.0
+    write_table(tmp_path / "log.parquet", replace(recording, tau=tau), robot.description)
+    out = tmp_path / "r"
+    assert (
+        main(["analyze", str(tmp_path / "log.parquet"), "--robot", "sara-full", "--out", str(out)])
+        == 0
+    )
+    (found,) = strict_json(out / "analysis.json")["findings"]
+    assert "torque of joint2" in found and "opposite sign" in found
+    assert f"note: check: {found}" in capsys.readouterr().out
+    assert "opposite sign" in (out / "report.html").read_text()
+
+
+def test_a_sound_recording_with_touches_has_no_findings(results):
+    assert strict_json(results / "analysis.json")["findings"] == []

@@ -28,6 +28,14 @@ class Findings:
         """Add lines to a section."""
         self.notes.setdefault(section, []).extend(lines)
 
+    def take(self, other: "Findings") -> None:
+        """Add all that another collection holds."""
+        for line in other.findings:
+            self.find(line)
+        for section, lines in other.notes.items():
+            self.note(section, *lines)
+        self.fixes.update(other.fixes)
+
     def text(self) -> str:
         """Everything, the findings last."""
         parts = ["\n".join([f"{title}:", *lines]) for title, lines in self.notes.items() if lines]

@@ -84,7 +84,13 @@ def robust_line(X: Array, y: Array, rounds: int = 30) -> Line | None:
 
 def named_factor(value: float, factors: dict[float, str]) -> str | None:
     """What a factor is known for, None if it is none of them."""
-    for factor, name in factors.items():
-        if abs(abs(value) / factor - 1) < NEAR:
-            return name
-    return None
+    found = factor_words(value, factors)
+    return None if found is None else found[1]
+
+
+def factor_words(
+    value: float, factors: dict[float, str], near: float = NEAR
+) -> tuple[float, str] | None:
+    """The known factor that a value is near, relative, and what it is known for."""
+    known = min(factors, key=lambda factor: abs(np.log(max(abs(value), 1e-300) / factor)))
+    return (known, factors[known]) if abs(abs(value) / known - 1) < near else None

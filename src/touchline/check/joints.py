@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Joint signals beside the model: signs, units and order of velocities and torques."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,12 +25,25 @@ OFF = 0.1  # a velocity's factor may be off by this much
 TELLING = 1.0  # Nm; a smaller expected torque says nothing of a torque's sign
 GAIN_OFF = 0.2  # friction and a payload change a torque's factor by less
 TAKEN_OUT = 0.15  # below this fraction of the expected torque, gravity is not in the signal
+RUBBING = 0.05  # of the largest expected torque; less friction is left to `calibrate`
+LATE = 2e-3  # s; smaller delays are told as a figure, not as a finding
+SURE = 5.0  # standard errors
 CLEARER = 0.3  # another joint explains a torque column so much better
 
 
 @dataclass(frozen=True)
 class TorqueFit:
-    """reading = factor * expected + offset, with 1 sigma errors; `varied`: offset was fitted."""
+    """reading = factor * expected + offset + friction, some time later, with 1 sigma errors.
+
+    Attributes:
+        factor, error: of the torque that the model expects.
+        offset, offset_error: [Nm].
+        scatter: 1 sigma of what is left [Nm].
+        varied: was an offset fitted?
+        coulomb, viscous: friction that the description does not know [Nm], [Nm s/rad], with its
+            part at the speed of most windows, `rubbing` [Nm], and `rubbing_error`.
+        delay, delay_error: of the reading [s]; NaN where it was not fitted.
+    """
 
     factor: float
     error: float
@@ -38,6 +51,12 @@ class TorqueFit:
     offset_error: float
     scatter: float
     varied: bool
+    coulomb: float = 0.0
+    viscous: float = 0.0
+    rubbing: float = 0.0
+    rubbing_error: float = np.inf
+    delay: float = np.nan
+    delay_error: float = np.inf
 
     @property
     def certain(self) -> bool:
@@ -45,8 +64,24 @@ class TorqueFit:
         return not self.varied or self.error < 0.15 * max(abs(self.factor), 0.3)
 
 
-def check_velocities(robot: Robot, windows: Windows, findings: Findings) -> None:
-    """Compare logged velocities with the slopes of the positions."""
+@dataclass(frozen=True)
+class VelocityProblem:
+    """A velocity that is not the slope of its position.
+
+    Attributes:
+        joint: its number.
+        factor: of the logged velocity to the slope; NaN where it does not follow it.
+        words: of the finding.
+    """
+
+    joint: int
+    factor: float
+    words: str
+
+
+def velocity_problems(robot: Robot, windows: Windows) -> list[VelocityProblem]:
+    """Compares logged velocities with the slopes of the positions."""
+    found = []
     for j, name in enumerate(robot.joint_names):
         slope, logged = windows.slope[:, j], windows.qd[:, j]
         moving = np.abs(slope) > MOVED
@@ -58,17 +93,33 @@ def check_velocities(robot: Robot, windows: Windows, findings: Findings) -> None
         factor = float(line.coefficients[0])
         if abs(factor - 1) <= OFF:
             continue
-        findings.find(_velocity_problem(name, factor, line.scatter, scatter_of(slope[moving])))
+        follows = line.scatter <= 0.5 * abs(factor) * scatter_of(slope[moving])
+        words = _velocity_words(name, factor, follows)
+        known = follows and factor != 0.0
+        found.append(VelocityProblem(j, factor if known else np.nan, words))
+    return found
 
 
-def _velocity_problem(name: str, factor: float, scatter: float, size: float) -> str:
+def _velocity_words(name: str, factor: float, follows: bool) -> str:
     start = f"velocity of {name} is {factor:.3g} times the slope of its position"
     unit = named_factor(factor, ANGLE_FACTORS)
-    if scatter > 0.5 * abs(factor) * size:
+    if not follows:
         return f"{start}, and does not follow it: another joint's column?"
     if abs(factor + 1) <= OFF:
         return f"{start}: opposite sign; use factor -1 in log: qd (or in log: q)"
     return f"{start}{': ' + unit if unit else '; check its unit and that of time'}"
+
+
+def judged_joints(robot: Robot, windows: Windows, dead: set[str]) -> list[int]:
+    """Joints whose torque says something of the model."""
+    return [
+        j
+        for j, joint in enumerate(robot.description.joints)
+        if joint.measured
+        and joint.compensated != "model"
+        and joint.name not in dead
+        and np.isfinite(windows.torque[:, j]).any()
+    ]
 
 
 def check_torques(
@@ -78,17 +129,11 @@ def check_torques(
 
     `limits` are the contact thresholds by joint [Nm].
     """
-    measured = [
-        j
-        for j, joint in enumerate(robot.description.joints)
-        if joint.measured
-        and joint.compensated != "model"
-        and joint.name not in dead
-        and np.isfinite(windows.torque[:, j]).any()
-    ]
+    measured = judged_joints(robot, windows, dead)
     if not measured or not len(windows):
         return
-    swapped = _swapped(windows, measured)
+    fits: dict[int, TorqueFit] = {}
+    swapped = swapped_torques(windows, measured)
     for i, k in swapped:
         a, b = robot.joint_names[i], robot.joint_names[k]
         findings.find(f"torques of {a} and {b} fit each other's joint: the columns seem swapped")
@@ -105,28 +150,49 @@ def check_torques(
             continue
         _note_fit(name, fit, findings)
         if j not in inside:
+            fits[j] = fit
             _judge(name, fit, size, limits.get(j, np.inf), findings)
+    _judge_delays(robot, fits, findings)
 
 
 def fit_torque(windows: Windows, j: int) -> TorqueFit | None:
-    """The line that leads from a joint's expected torque to its reading."""
+    """What leads from a joint's expected torque to its reading."""
     expected, reading, qd = windows.expected_torque[:, j], windows.torque[:, j], windows.qd[:, j]
-    usable = np.isfinite(expected) & np.isfinite(reading)
+    rate = windows.expected_rate[:, j]
+    usable = np.isfinite(expected) & np.isfinite(reading) & np.isfinite(rate) & np.isfinite(qd)
     if not usable.any():
         return None
-    expected, reading, qd = expected[usable], reading[usable], qd[usable]
+    expected, reading, qd, rate = (x[usable] for x in (expected, reading, qd, rate))
     level = max(float(np.abs(np.median(expected))), TELLING)
     varied = float(np.std(expected)) > 0.1 * level
-    columns = [expected, np.ones(len(expected))] if varied else [expected]
+    columns = {"expected": expected, "one": np.ones(len(expected))} if varied else {"e": expected}
     if varied and min((qd > MOVED).mean(), (qd < -MOVED).mean()) > 0.1:
-        columns += [np.tanh(qd / MOVED), qd]  # friction that the description does not know
-    line: Line | None = robust_line(np.column_stack(columns), reading)
+        columns |= {"coulomb": np.tanh(qd / MOVED), "viscous": qd, "rate": rate}
+    line: Line | None = robust_line(np.column_stack(list(columns.values())), reading)
     if line is None:
         ratio = float(np.median(reading) / np.median(expected))
         return TorqueFit(ratio, np.inf, 0.0, np.inf, scatter_of(reading), False)
-    offset, error = (line.coefficients[1], line.errors[1]) if varied else (0.0, np.inf)
-    factor = float(line.coefficients[0]), float(line.errors[0])
-    return TorqueFit(*factor, float(offset), float(error), line.scatter, varied)
+    values = dict(zip(columns, line.coefficients.tolist(), strict=True))
+    errors = dict(zip(columns, line.errors.tolist(), strict=True))
+    if not varied:
+        return TorqueFit(values["e"], errors["e"], 0.0, np.inf, line.scatter, False)
+    fit = TorqueFit(
+        values["expected"], errors["expected"], values["one"], errors["one"], line.scatter, True
+    )
+    if "rate" not in columns:
+        return fit
+    speed = float(np.quantile(np.abs(qd), 0.7))
+    factor = fit.factor if abs(fit.factor) > 1e-9 else np.nan
+    return replace(
+        fit,
+        coulomb=values["coulomb"],
+        viscous=values["viscous"],
+        rubbing=values["coulomb"] + speed * values["viscous"],
+        rubbing_error=float(np.hypot(errors["coulomb"], speed * errors["viscous"])),
+        # The expectation is a mean over the interval before each sample, half a period early.
+        delay=0.5 * windows.period - values["rate"] / factor,
+        delay_error=errors["rate"] / abs(factor),
+    )
 
 
 def _note_fit(name: str, fit: TorqueFit, findings: Findings) -> None:
@@ -138,28 +204,76 @@ def _note_fit(name: str, fit: TorqueFit, findings: Findings) -> None:
     findings.note("joint torques", f"{line}, scatter {fit.scatter:.2f} Nm")
 
 
-def _judge(name: str, fit: TorqueFit, size: float, limit: float, findings: Findings) -> None:
+def torque_words(name: str, fit: TorqueFit) -> list[str]:
+    """What is coarsely wrong with a torque: its unit, its sign, or that gravity is not in it."""
     start = f"torque of {name} is {fit.factor:.3g} times what the model expects"
     unit = named_factor(fit.factor, {k: v for k, v in MOMENT_FACTORS.items() if abs(k - 1) > 0.5})
     if not fit.certain:
-        return
+        return []
     if abs(fit.factor) < TAKEN_OUT and unit is None:
-        findings.find(f"{start}: gravity seems taken out already; compensated: gravity (or model)")
-    elif unit is not None:
+        return [f"{start}: gravity seems taken out already; compensated: gravity (or model)"]
+    if unit is not None:
         sign = ", and of opposite sign: sign: -1" if fit.factor < 0 else ""
-        findings.find(f"{start}: in {unit} (or gain){sign}")
-    elif fit.factor < 0:
-        findings.find(f"{start}: opposite sign; set the other sign ({name}: sign)")
-    elif abs(fit.factor - 1) > GAIN_OFF and abs(fit.factor - 1) * size > max(limit, TELLING):
-        findings.find(f"{start}: check gain, unit, and the masses outboard of it")
+        return [f"{start}: in {unit} (or gain){sign}"]
+    if fit.factor < 0:
+        return [f"{start}: opposite sign; set the other sign ({name}: sign)"]
+    return []
+
+
+def _judge(name: str, fit: TorqueFit, size: float, limit: float, findings: Findings) -> None:
+    if not fit.certain:
+        return
+    coarse = torque_words(name, fit)
+    for line in coarse:
+        findings.find(line)
+    if (
+        not coarse
+        and abs(fit.factor - 1) > GAIN_OFF
+        and abs(fit.factor - 1) * size > max(limit, TELLING)
+    ):
+        findings.find(
+            f"torque of {name} is {fit.factor:.3g} times what the model expects: check gain, unit, "
+            "and the masses outboard of it"
+        )
     if abs(fit.offset) > limit and fit.offset_error < 0.3 * abs(fit.offset):
         findings.find(
             f"torque of {name} has an offset of {fit.offset:+.2f} Nm that the description does "
             f"not know, more than its contact threshold {limit:.2f}: set bias"
         )
+    rubs = max(SURE * fit.rubbing_error, RUBBING * size, limit)
+    if not coarse and fit.rubbing > rubs and max(fit.coulomb, fit.viscous) > 0.0:
+        findings.find(
+            f"torque of {name} follows the sign and the size of its speed: friction of about "
+            f"{max(fit.coulomb, 0.0):.2f} Nm and {max(fit.viscous, 0.0):.2f} Nm s/rad that the "
+            "description does not know, as a motor's current shows it: touchline calibrate finds "
+            "friction (and torque: motor the rotor's inertia)"
+        )
 
 
-def _swapped(windows: Windows, measured: list[int]) -> list[tuple[int, int]]:
+def _judge_delays(robot: Robot, fits: dict[int, TorqueFit], findings: Findings) -> None:
+    """A delay that all torques share: a model's errors do not agree on one."""
+    known = [
+        (fit.delay, fit.delay_error)
+        for fit in fits.values()
+        if fit.certain and abs(fit.factor - 1) < GAIN_OFF and np.isfinite(fit.delay)
+    ]
+    if len(known) < 2:
+        return
+    delays, errors = np.array(known).T
+    weight = np.maximum(errors, 1e-6) ** -2.0
+    common = float((weight * delays).sum() / weight.sum())
+    spread = max(1.0, float(np.sqrt((weight * (delays - common) ** 2).sum() / (len(known) - 1))))
+    error = spread * float(weight.sum()) ** -0.5
+    line = f"  delay of the torques: {1e3 * common:.2f} +- {1e3 * max(error, 1e-5):.2f} ms"
+    findings.note("joint torques", line)
+    if common > max(LATE, SURE * error):
+        findings.find(
+            f"the torques come {1e3 * common:.1f} +- {1e3 * max(error, 1e-4):.1f} ms late, beside "
+            f"the positions: delay: {common:.4f} for each of joints"
+        )
+
+
+def swapped_torques(windows: Windows, measured: list[int]) -> list[tuple[int, int]]:
     """Pairs of joints whose readings each fit the other's expected torque far better."""
     if len(windows) < 4:
         return []

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from touchline.check.findings import Findings
 from touchline.identify.evidence import Evidence, gather
+from touchline.identify.fit import main_links
 from touchline.identify.identification import MOST_TOUCHED, touched_instants
 from touchline.identify.payload import payload_link
 from touchline.identify.touches import usual_scatter
@@ -28,9 +29,13 @@ OFFSET_SHARE = 0.01  # the same, as a part of the largest reading
 CENTRE = 0.1  # m, 1 sigma of a payload's centre about a hand's breadth before the flange
 EXPLAINED = 0.6  # of what is off; less is no explanation
 LEAST_MASS, LEAST_TILT = 0.15, np.radians(1.5)  # kg, rad: smaller ones are not told
+LEAST_SCALE = 0.1  # of a link's inertia; models are that good at best
+RARE = 2.0 * np.log(100.0)  # of the cost: of a hundred errors of weights one is a link's, at most
+ALIKE = 3.0  # of the cost; explanations closer than that are both told
 SURE = 4.0  # standard errors
 ONE_POSE = 0.1  # rad
 MOST_FOUND = 3
+COULOMB_WIDTH, MOVED = 0.02, 0.02  # rad/s
 EDGE = 1e-4  # rad; residuals change linearly with so small a tilt
 
 
@@ -40,13 +45,17 @@ class Explanation:
 
     Attributes:
         words: of the finding.
+        short: what else it could be, in a few words.
         share: of the squares that it explains.
+        cost: of what it leaves, and of how much it may choose freely.
         mended: the robot with it.
         fix: key and value of `robot.yaml` that mend it; a list is added to what stands there.
     """
 
     words: str
+    short: str
     share: float
+    cost: float
     mended: Robot
     fix: dict[str, Any]
 
@@ -62,10 +71,13 @@ def explain_weights(robot: Robot, parts: Iterable[Samples], findings: Findings) 
         return robot
     evidence = evidence.part(~touched)
     for _ in range(MOST_FOUND):
-        best = max(_explanations(evidence, robot), key=lambda x: x.share, default=None)
-        if best is None or best.share < EXPLAINED:
+        found = [x for x in _explanations(evidence, robot) if x.share >= EXPLAINED]
+        found.sort(key=lambda x: x.cost)
+        if not found:
             break
-        findings.find(best.words)
+        best = found[0]
+        others = [x.short for x in found[1:] if x.cost < best.cost + ALIKE]
+        findings.find(best.words + (f"; or as well: {others[0]}" if others else ""))
         for key, value in best.fix.items():
             old = findings.fixes.get(key, [])
             findings.fixes[key] = [*old, *value] if isinstance(value, list) else value
@@ -91,6 +103,7 @@ def _explanations(evidence: Evidence, robot: Robot) -> list[Explanation]:
     noise = usual_scatter(left, evidence.used)
     sigma = np.sqrt(np.maximum(OFFSET, OFFSET_SHARE * largest) ** 2 + noise**2)
     found = [_payload(evidence, robot, left, sigma, node) for node in _ends(robot)]
+    found += [_scaled(evidence, robot, left, sigma, node) for node in range(len(robot.nodes))]
     found.append(_tilt(evidence, robot, left, sigma))
     return [x for x in found if x is not None]
 
@@ -113,7 +126,7 @@ def _payload(
     # In terms of the mass and of the way of its centre from where a hand's would be.
     A = np.concatenate([A[..., :1] + A[..., 1:] @ expected[:, None], A[..., 1:]], axis=-1)
     prior = np.array([0.0, *np.full(3, (0.7 * CENTRE) ** -2.0)])
-    values, errors, share = _fit(A, left, sigma, evidence, prior)
+    values, errors, share, cost = _fit(A, left, sigma, evidence, prior)
     mass, error = float(values[0]), float(errors[0])
     if abs(mass) < max(LEAST_MASS, SURE * error):
         return None
@@ -133,12 +146,45 @@ def _payload(
         load = Load(name, round(mass, 3), tuple(float(round(x, 4)) for x in place[:3]))
         six = [round(1e-3 * mass, 6) * (i in (0, 3, 5)) for i in range(6)]
         entry = {"link": name, "mass": load.mass, "com": list(load.com), "inertia": six}
-        return Explanation(words, share, _loaded(robot, load), {"loads": [entry]})
+        short = f"{mass:.2f} kg more at {name}"
+        return Explanation(words, short, share, cost, _loaded(robot, load), {"loads": [entry]})
     words = (
         f"{what} too many at {name} ({100 * share:.0f} % of what is off{pose}): a hand that is "
         f"modelled but not mounted? links: {{LINK: {{mass: 0.0}}}} for what is not there"
     )
-    return Explanation(words, share, _lighter(robot, node, -mass), {})
+    short = f"{-mass:.2f} kg less at {name}"
+    return Explanation(words, short, share, cost, _lighter(robot, node, -mass), {})
+
+
+def _scaled(
+    evidence: Evidence, robot: Robot, left: Array, sigma: Array, node: int
+) -> Explanation | None:
+    """The factor that the inertia of a node's heaviest link would need."""
+    links = main_links(robot)
+    if node not in links:
+        return None
+    name, vector = links[node]
+    A = (evidence.model[:, :, node] @ vector)[..., None]
+    if not np.abs(A[:, evidence.used]).max(initial=0.0) > 0.0:
+        return None
+    values, errors, share, cost = _fit(A, left, sigma, evidence, np.zeros(1))
+    factor, error, mass = 1.0 + float(values[0]), float(errors[0]), float(vector[0])
+    off = abs(factor - 1.0)
+    if factor < 0.0 or off < max(LEAST_SCALE, LEAST_MASS / mass, SURE * error):
+        return None
+    words = (
+        f"the inertia of {name} is {factor:.2f} +- {max(error, 0.01):.2f} times the model's "
+        f"({100 * share:.0f} % of what is off): it weighs {factor * mass:.2f} kg, not {mass:.2f} "
+        f"kg? links: {{{name}: {{mass: {factor * mass:.2f}}}}}, or calibrate"
+    )
+    link = robot.mechanism.links[name]
+    own = link.inertia
+    body = Inertia(factor * own.mass, own.com, factor * own.inertia)
+    links_now = robot.mechanism.links | {name: replace(link, inertia=body)}
+    short = f"{name} weighs {factor * mass:.2f} kg, not {mass:.2f} kg"
+    return Explanation(
+        words, short, share, cost + RARE, _with_links(robot, robot.description, links_now), {}
+    )
 
 
 def _tilt(evidence: Evidence, robot: Robot, left: Array, sigma: Array) -> Explanation | None:
@@ -150,7 +196,7 @@ def _tilt(evidence: Evidence, robot: Robot, left: Array, sigma: Array) -> Explan
     down = g / size
     level = np.linalg.svd(down[None])[2][1:]
     A = np.stack([_turned(evidence, robot, np.cross(axis, g)) for axis in level], axis=-1)
-    values, errors, share = _fit(A, left, sigma, evidence, np.zeros(2))
+    values, errors, share, cost = _fit(A, left, sigma, evidence, np.zeros(2))
     # Loads are linear in gravity, whose level part is the sine of the angle.
     angle = float(np.arcsin(min(1.0, np.linalg.norm(values))))
     error = float(np.linalg.norm(errors))
@@ -166,7 +212,8 @@ def _tilt(evidence: Evidence, robot: Robot, left: Array, sigma: Array) -> Explan
     )
     mechanism = replace(robot.mechanism, gravity=new)
     fix = {"gravity": [round(float(x), 4) for x in new]}
-    return Explanation(words, share, Robot(robot.description, mechanism), fix)
+    short = f"the base is tilted by {np.degrees(angle):.1f} degrees"
+    return Explanation(words, short, share, cost, Robot(robot.description, mechanism), fix)
 
 
 def _turned(evidence: Evidence, robot: Robot, change: Array) -> Array:
@@ -186,9 +233,13 @@ def _weights(evidence: Evidence, robot: Robot, gravity: Array) -> Array:
 
 def _fit(
     A: Array, left: Array, sigma: Array, evidence: Evidence, prior: Array
-) -> tuple[Array, Array, float]:
-    """Values, standard errors and explained share of squares; an instant counts little."""
+) -> tuple[Array, Array, float, float]:
+    """Values, standard errors, explained share of squares, and cost; an instant counts little.
+
+    The cost is the weighed sum of squares and two for each free number (Akaike's criterion).
+    """
     rows = evidence.used
+    A, left = _without_friction(A, evidence), _without_friction(left[..., None], evidence)[..., 0]
     X = (A[:, rows] / sigma[rows][:, None]).reshape(-1, A.shape[-1])
     y = (left[:, rows] / sigma[rows]).ravel()
     poses = _poses(evidence)
@@ -198,7 +249,19 @@ def _fit(
     values = -covariance @ (weight * X.T @ y)
     rest = y + X @ values
     share = 1.0 - float(rest @ rest) / max(float(y @ y), 1e-12)
-    return values, np.sqrt(np.diag(covariance)), share
+    cost = weight * float(rest @ rest) + 2.0 * len(values)
+    return values, np.sqrt(np.diag(covariance)), share, cost
+
+
+def _without_friction(values: Array, evidence: Evidence) -> Array:
+    """Columns (N, R, c) without what friction, which may be unknown, could make of them."""
+    out = values.copy()
+    width = evidence.width_index(0, COULOMB_WIDTH)
+    for j in range(evidence.joints):
+        if evidence.used[j] and np.std(evidence.speed[:, j]) > MOVED:
+            rubbing = np.column_stack([evidence.dry[:, j, width], evidence.speed[:, j]])
+            out[:, j] -= rubbing @ np.linalg.lstsq(rubbing, out[:, j], rcond=None)[0]
+    return out
 
 
 def _poses(evidence: Evidence) -> float:

@@ -1,24 +1,29 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recording beside the description: one pass, then one judgement after another."""
 
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 
+from touchline.check.coarse import is_off, next_step
 from touchline.check.findings import Findings
-from touchline.check.joints import check_torques, check_velocities
-from touchline.check.signals import SignalTable
-from touchline.check.stamps import Stamps
-from touchline.check.windows import WindowMaker
+from touchline.check.joints import check_torques, velocity_problems
+from touchline.check.loads import explain_weights
+from touchline.check.mending import Mending
+from touchline.check.noise import check_noise
+from touchline.check.seen import Seen, look
 from touchline.check.wrenches import check_wrenches
 from touchline.detector.thresholds import make_thresholds
 from touchline.errors import InputError
 from touchline.logs import open_log
-from touchline.logs.period import typical_period
 from touchline.model.robot import Robot
-from touchline.report.facts import bandwidth_warnings, bandwidths
+from touchline.observer.bandwidths import bandwidth_warnings, bandwidths
+from touchline.observer.samples import Samples
 
 STILL = 0.01  # rad/s or m/s
+CHUNK = 1 << 15  # samples that are read at once
+MOST_STEPS = 8  # things that hide each other
 
 
 GROSS = (  # words of findings that must be mended before weights mean anything
@@ -40,34 +45,73 @@ GROSS = (  # words of findings that must be mended before weights mean anything
 def check_recording(robot: Robot, path: Path, findings: Findings) -> None:
     """Judges a log.
 
-    Where weights are off and nothing coarser is wrong, what would explain them (a hand, a tilted
-    base) is found first, and the rest is judged as if that were mended.
+    What hides the rest (units, order, signs) is found first, one thing after the other, and what
+    follows is judged as if it were mended. Where weights are off and nothing coarser is wrong, what
+    would explain them (a hand, a link, a tilted base) is found, and the rest is judged without it.
 
     Raises:
         InputError: the log cannot be read, or holds no samples.
     """
-    from touchline.check.loads import explain_weights
 
-    plain = Findings()
-    _judge_recording(robot, path, plain)
-    coarse = _coarse(plain)
-    explained, mended = Findings(), robot
-    # A weight that is wrong makes a light joint's torque look compensated, turned or scaled.
-    if all(line.startswith("torque of ") and " times what " in line for line in coarse):
+    def read() -> Iterator[Samples]:
         with open_log(path, robot.description) as log:
-            mended = explain_weights(robot, log.chunks(1 << 15), explained)
-    if mended is not robot:
-        again = Findings()
-        _judge_recording(mended, path, again)
-        if _coarse(again):
-            explained = Findings()
-        else:
-            plain = again
-    findings.fixes.update(explained.fixes)
-    for line in (*explained.findings, *plain.findings):
-        findings.find(line)
-    for section, lines in plain.notes.items():
-        findings.note(section, *lines)
+            yield from log.chunks(CHUNK)
+
+    with open_log(path, robot.description) as log:
+        findings.note("recording", *(f"  {line}" for line in log.warnings))
+    mending, seen = _mend(robot, read, findings)
+    if seen is None:
+        raise InputError(f"{path}: holds no samples")
+    plain = Findings()
+    _judge(robot, seen, plain)
+    # A weight that is wrong makes a light joint's torque look compensated, turned or scaled.
+    if all(line.startswith("torque of ") and " times what " in line for line in _coarse(plain)):
+        explained = Findings()
+        mended = explain_weights(robot, mending.apply(read()), explained)
+        again = None if mended is robot else look(mended, read(), mending)
+        if again is not None:
+            better = Findings()
+            _judge(mended, again, better)
+            if not _coarse(better):
+                plain = better
+                findings.take(explained)
+    findings.take(plain)
+
+
+def glance(robot: Robot, parts: list[Samples]) -> list[str]:
+    """What a short look at a recording tells: units, order, signs, unmodelled weights, noise.
+
+    It may hold touches: what these look like (offsets, gains, delays) is not judged.
+
+    Args:
+        robot: as described.
+        parts: some samples, in order.
+    """
+    found = Findings()
+    mending, seen = _mend(robot, lambda: iter(parts), found)
+    if seen is None or not seen.stamps.credible:
+        return found.findings
+    check_noise(robot, seen, found)
+    if is_off(robot, seen):
+        explain_weights(robot, mending.apply(parts), found)
+    return found.findings
+
+
+def _mend(
+    robot: Robot, read: Callable[[], Iterator[Samples]], findings: Findings
+) -> tuple[Mending, Seen | None]:
+    """Finds what hides the rest; the recording without it."""
+    mending = Mending.none(robot)
+    seen = look(robot, read(), mending)
+    for _ in range(MOST_STEPS):
+        step = None if seen is None else next_step(robot, seen, mending)
+        if step is None:
+            break
+        for line in step.words:
+            findings.find(line)
+        mending = step.mending
+        seen = look(robot, read(), mending)
+    return mending, seen
 
 
 def _coarse(findings: Findings) -> list[str]:
@@ -75,40 +119,26 @@ def _coarse(findings: Findings) -> list[str]:
     return [line for line in findings.findings if any(word in line for word in GROSS)]
 
 
-def _judge_recording(robot: Robot, path: Path, findings: Findings) -> None:
-    """Reads a log once and judges it by the robot as it is."""
-    table = SignalTable(robot)
-    stamps = maker = None
-    with open_log(path, robot.description) as log:
-        for part in log.chunks(1 << 15):
-            if stamps is None or maker is None:
-                period = typical_period(part.time)
-                stamps, maker = Stamps(period), WindowMaker(robot, period)
-            stamps.add(part.time)
-            table.add(part)
-            maker.add(part)
-        findings.note("recording", *(f"  {line}" for line in log.warnings))
-    if stamps is None or maker is None or not stamps.samples:
-        raise InputError(f"{path}: holds no samples")
-    stamps.report(findings)
-    table.report(robot, findings)
-    if stamps.credible:
-        for warning in bandwidth_warnings(bandwidths(robot, None), stamps.period):
+def _judge(robot: Robot, seen: Seen, findings: Findings) -> None:
+    """Judges a recording by the robot as it is."""
+    seen.stamps.report(findings)
+    seen.table.report(robot, findings)
+    if seen.stamps.credible:
+        for warning in bandwidth_warnings(bandwidths(robot, None), seen.stamps.period):
             if "> 1)" in warning:
                 findings.find(warning)
             else:
                 findings.note("time stamps", f"  {warning}")
-    _compare(robot, maker, stamps, table, findings)
+    check_noise(robot, seen, findings)
+    _compare(robot, seen, findings)
 
 
-def _compare(
-    robot: Robot, maker: WindowMaker, stamps: Stamps, table: SignalTable, findings: Findings
-) -> None:
+def _compare(robot: Robot, seen: Seen, findings: Findings) -> None:
     """What needs positions and times that can be believed."""
-    if not stamps.credible or table.looks_like_degrees(robot):
+    if not seen.stamps.credible or seen.table.looks_like_degrees(robot):
         findings.note("recording", "  signs, units and weights are compared once this is mended")
         return
-    windows = maker.windows()
+    windows = seen.windows
     if not len(windows):
         line = "  too short, or too many gaps, to compare readings with the model"
         findings.note("recording", line)
@@ -120,11 +150,14 @@ def _compare(
         "of them",
         "  taken as untouched: a contact looks like a wrong gain, load or bias",
     )
-    rows = make_thresholds(robot, stamps.period).rows
+    rows = make_thresholds(robot, seen.stamps.period).rows
     names = robot.segment_names
     joints = {row.joint: row.contact for row in rows if row.joint >= 0}
     components = {(names[r.segment], r.component): r.contact for r in rows if r.component >= 0}
-    dead = {kind: {name for k, name in table.dead() if k == kind} for kind in ("tau", "wrench")}
-    check_velocities(robot, windows, findings)
+    dead = {
+        kind: {name for k, name in seen.table.dead() if k == kind} for kind in ("tau", "wrench")
+    }
+    for problem in velocity_problems(robot, windows):
+        findings.find(problem.words)
     check_torques(robot, windows, dead["tau"], joints, findings)
     check_wrenches(robot, windows, dead["wrench"], components, findings)

@@ -119,9 +119,22 @@ class SignalTable:
             if self.samples < ENOUGH or self.low[i] != self.high[i]:
                 continue
             if signal.kind in ("tau", "wrench") or signal.name in moving:
-                what = f"is always {self.low[i]:g}: dead, or not what the column should hold"
-                findings.find(f"{_column(signal)} {what}")
-        self._limits(robot, findings)
+                findings.find(self._dead_words(i))
+        self.report_limits(robot, findings)
+
+    def _dead_words(self, i: int) -> str:
+        what = f"is always {self.low[i]:g}: dead, or not what the column should hold"
+        return f"{_column(self.signals[i])} {what}"
+
+    def dead_words(self, kind: str, name: str) -> str | None:
+        """What is said of a signal that never changes; None of one that does."""
+        if (kind, name) not in self.dead():
+            return None
+        return next(
+            self._dead_words(i)
+            for i, s in enumerate(self.signals)
+            if (s.kind, s.name) == (kind, name)
+        )
 
     def _report_one(self, i: int, signal: Signal, findings: Findings) -> None:
         column, few = _column(signal), FEW * self.samples
@@ -164,20 +177,17 @@ class SignalTable:
                 "with every sample: stuck"
             )
 
-    def _limits(self, robot: Robot, findings: Findings) -> None:
+    def report_limits(self, robot: Robot, findings: Findings) -> None:
+        """Say which positions leave the model's limits, or are no angles in rad."""
         outside = self.outside_limits(robot)
-        if not outside:
-            return
-        lines = [
-            f"position of {name} goes from {low:.4g} to {high:.4g}, outside the model's limits "
-            f"{lower:.4g} to {upper:.4g}"
-            for name, low, high, lower, upper in outside
-        ]
-        if self.looks_like_degrees(robot):
-            worst = lines[0]
-            findings.find(f"{worst}: the positions look like degrees; use factor 0.01745329 in log")
-            return
-        for line in lines:
+        degrees = self.looks_like_degrees(robot)
+        for name, low, high, lower, upper in outside[: 1 if degrees else None]:
+            line = (
+                f"position of {name} goes from {low:.4g} to {high:.4g}, outside the model's limits "
+                f"{lower:.4g} to {upper:.4g}"
+            )
+            if degrees:
+                line += ": the positions look like degrees; use factor 0.01745329 in log"
             findings.find(line)
 
     def _positions(self, robot: Robot) -> Iterator[tuple[str, float, float, float, float]]:

@@ -67,7 +67,7 @@ class Stamps:
             f"than {GAP:g} steps, {self.invalid} not a number",
         )
         if not self.credible:
-            findings.find(f"time: the median step is {self.period:.4g} s{self._unit()}")
+            findings.find(self.incredible)
             return
         few = FEW * self.samples
         for count, what in (
@@ -87,8 +87,17 @@ class Stamps:
             share = 100 * self.jitter / self.period
             findings.find(f"time: the steps vary by {share:.0f} % of the period (1 sigma)")
 
-    def _unit(self) -> str:
+    @property
+    def incredible(self) -> str:
+        """What is said of a period that no robot has."""
+        start = f"time: the median step is {self.period:.4g} s"
         for factor, name in UNITS:
-            if 1e-4 <= self.period * factor < 0.1:
-                return f"; in {name}? then log: time: {{column: NAME, factor: {factor:g}}}"
-        return ": too fast for a robot's log; check the unit" if self.period < FAST else ""
+            if factor == self.unit_factor:
+                return f"{start}; in {name}? then log: time: {{column: NAME, factor: {factor:g}}}"
+        fast = self.period < FAST
+        return start + (": too fast for a robot's log; check the unit" if fast else "")
+
+    @property
+    def unit_factor(self) -> float | None:
+        """What would make seconds of the stamps; None where no unit does."""
+        return next((f for f, _ in UNITS if 1e-4 <= self.period * f < 0.1), None)

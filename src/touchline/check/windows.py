@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 
 SECONDS, ROWS = 0.25, 8  # at least so long and so many samples is a window
 MOST = 4000
+JOINT_FIELDS = "q", "qd", "slope", "torque", "expected_torque", "expected_rate"
 
 
 @dataclass(frozen=True)
@@ -31,9 +32,11 @@ class Windows:
         slope: (W, n) velocities from the positions.
         torque: (W, n) as the description reads the log: sign, gain, bias and friction applied.
         expected_torque: (W, n) without contact.
+        expected_rate: (W, n) how fast that changes [Nm/s].
         wrench: (W, k, 6) as logged.
         expected_wrench: (W, k, 6) on the outboard side, in the sensor's frame, without contact.
         weightless_wrench: the same for a sensor whose driver has taken the weight out.
+        period: of the samples [s].
     """
 
     q: Array
@@ -41,9 +44,11 @@ class Windows:
     slope: Array
     torque: Array
     expected_torque: Array
+    expected_rate: Array
     wrench: Array
     expected_wrench: Array
     weightless_wrench: Array
+    period: float
 
     def __len__(self) -> int:
         return len(self.q)
@@ -77,6 +82,7 @@ class WindowMaker:
             "weightless_wrench": weightless.sensor_wrench,
         }
         cut = {name: _mean(values, count, rows) for name, values in signals.items()}
+        cut["expected_rate"] = _rate(whole.tau_ext, count, rows) / self._period
         steps, q = self._steps(part.time, count), part.q[: count * rows]
         shape = (count, rows, q.shape[1])
         ends = q.reshape(shape)[:, -1] - q.reshape(shape)[:, 0]
@@ -107,10 +113,11 @@ class WindowMaker:
     def windows(self) -> Windows:
         """All windows."""
         n, k = len(self._robot.joint_names), len(self._robot.sensor_names)
-        shapes = dict.fromkeys(("q", "qd", "slope", "torque", "expected_torque"), (n,))
+        shapes = dict.fromkeys(JOINT_FIELDS, (n,))
         shapes |= dict.fromkeys(("wrench", "expected_wrench", "weightless_wrench"), (k, 6))
         parts = self._parts or [{name: np.empty((0, *s)) for name, s in shapes.items()}]
-        return Windows(**{name: np.concatenate([p[name] for p in parts]) for name in shapes})
+        joined = {name: np.concatenate([p[name] for p in parts]) for name in shapes}
+        return Windows(**joined, period=self._period)
 
 
 def _expecting(robot: Robot, compensated: str) -> Observer:
@@ -132,6 +139,12 @@ def _read_torques(robot: Robot, part: Samples) -> Array:
         torques[:, j] -= friction.coulomb * np.tanh(qd / friction.coulomb_width)
         torques[:, j] -= friction.viscous * qd
     return torques
+
+
+def _rate(values: Array, count: int, rows: int) -> Array:
+    """Change (count, n) per sample, from the ends of the windows."""
+    cut = values[: count * rows].reshape(count, rows, -1)
+    return (cut[:, -1] - cut[:, 0]) / (rows - 1)
 
 
 def _mean(values: Array, count: int, rows: int) -> Array:

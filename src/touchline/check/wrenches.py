@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.check.findings import Findings
-from touchline.check.fit import FORCE_FACTORS, MOMENT_FACTORS, named_factor
+from touchline.check.fit import FORCE_FACTORS, MOMENT_FACTORS, factor_words
 from touchline.check.model import outboard_mass
 from touchline.check.windows import Windows
 from touchline.model.description import SensorDescription
@@ -31,12 +31,14 @@ class Explanation:
         kind: "described", "polarity", "frame", "axes" or "compensated".
         words: what would have to be changed.
         forces, moments: (W, 3) expected, in the log's axes and with its sign.
+        columns: (3, 3) what leads from the logged axes to the described ones, where that is all.
     """
 
     kind: str
     words: str
     forces: Array
     moments: Array
+    columns: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -53,19 +55,36 @@ class Fit:
 Limits = dict[tuple[str, int], float]
 
 
+@dataclass(frozen=True)
+class WrenchMend:
+    """What is wrong with a sensor's columns, and what mends it.
+
+    Attributes:
+        sensor: its number.
+        matrix: (6, 6) that leads from the logged columns to those that it should have.
+        words: of the findings.
+    """
+
+    sensor: int
+    matrix: Array
+    words: tuple[str, ...]
+
+
 def check_wrenches(
     robot: Robot, windows: Windows, dead: set[str], limits: Limits, findings: Findings
-) -> None:
-    """Polarity, axes, frame, units, weight and bias of every sensor.
+) -> list[WrenchMend]:
+    """Polarity, axes, frame, units, weight and bias of every sensor; returns what can be mended.
 
     `limits` are the contact thresholds by segment and component [N, Nm].
     """
+    mends: list[WrenchMend] = []
     if len(windows) < 1:
-        return
+        return mends
     for k, sensor in enumerate(robot.description.sensors):
         names = {f"{sensor.name}.{axis}" for axis in sensor.axes}
         if not names & dead and np.isfinite(windows.wrench[:, k]).any():
-            _SensorCheck(robot, windows, k, limits, findings).run()
+            mends += _SensorCheck(robot, windows, k, limits, findings).run()
+    return mends
 
 
 class _SensorCheck:
@@ -84,20 +103,39 @@ class _SensorCheck:
         self.poses = poses
         self.reading = windows.wrench[:, k]
 
-    def run(self) -> None:
+    def run(self) -> list[WrenchMend]:
+        """Judges the sensor; returns what a change of its columns would mend."""
         weight = self.mass * float(np.linalg.norm(self.robot.gravity))
         if weight < LEAST_WEIGHT:
             line = f"  {self.sensor.name}: carries {weight:.2g} N, too little to tell anything"
             self.findings.note("wrenches", line)
-            return
+            return []
         explanations = list(self._explanations())
         costs = np.array([self._cost(e) for e in explanations])
         own = costs[0]
         order = [i for i in range(len(costs)) if costs[i] <= max(1.3 * costs.min(), 1e-12)]
         best = explanations[0] if costs.min() > CLEARER * own else explanations[order[0]]
+        words = []
         if best.kind != "described":
-            self.findings.find(f"sensor {self.sensor.name}: {best.words}")
-        self._judge(best, weight)
+            words.append(f"sensor {self.sensor.name}: {best.words}")
+        force, force_words = self._factor("forces", best.forces, FORCE_FACTORS)
+        moment, moment_words = self._factor("moments", best.moments, MOMENT_FACTORS)
+        for line in (*words, *force_words, *moment_words):
+            self.findings.find(line)
+        self._judge(best)
+        if best.columns is None:
+            return []
+        matrix = np.zeros((6, 6))
+        matrix[:3, :3], matrix[3:, 3:] = best.columns / force, best.columns / moment
+        if np.array_equal(matrix, np.eye(6)):
+            return []
+        mended = words + [
+            line
+            for factor, lines in ((force, force_words), (moment, moment_words))
+            for line in lines
+            if factor != 1.0
+        ]
+        return [WrenchMend(self.k, matrix, tuple(mended))]
 
     def _cost(self, explanation: Explanation) -> float:
         """Misfit relative to the readings, forces and moments alike, unit and bias left free."""
@@ -123,10 +161,10 @@ class _SensorCheck:
         sign = 1.0 if self.sensor.polarity == "outboard" else -1.0
         R = self._to_log(self.sensor.frame)
         own = self._expected(described)
-        yield Explanation("described", "", *self._turned(own, R, sign))
+        yield Explanation("described", "", *self._turned(own, R, sign), np.eye(3))
         other = "inboard" if sign > 0 else "outboard"
         words = f"reads the opposite of what it carries: set polarity: {other}"
-        yield Explanation("polarity", words, *self._turned(own, R, -sign))
+        yield Explanation("polarity", words, *self._turned(own, R, -sign), -np.eye(3))
         if described == "gravity":
             words = "the weight is still in the signal: compensated: none"
             yield Explanation("compensated", words, *self._turned(self._expected("none"), R, sign))
@@ -139,7 +177,7 @@ class _SensorCheck:
                 yield Explanation("frame", words, *self._turned(own, R_other, -sign))
         if self.has.all():
             for P, words in axis_mixes():
-                yield Explanation("axes", words, *self._turned(own, P @ R, sign))
+                yield Explanation("axes", words, *self._turned(own, P @ R, sign), P.T)
 
     def _expected(self, compensated: str) -> Array:
         w = self.windows
@@ -162,12 +200,10 @@ class _SensorCheck:
         ]
         return np.einsum("wji,wjk->wik", np.array(R), self.R_world_sensor)
 
-    def _judge(self, best: Explanation, weight: float) -> None:
+    def _judge(self, best: Explanation) -> None:
         name = self.sensor.name
         force = self._fit(best.forces, slice(0, 3))
         moment = self._fit(best.moments, slice(3, 6))
-        self._judge_factor("forces", force, FORCE_FACTORS)
-        self._judge_factor("moments", moment, MOMENT_FACTORS)
         if force is None or not force.telling or best.kind == "compensated":
             return
         if self.sensor.compensated == "gravity":
@@ -187,17 +223,20 @@ class _SensorCheck:
         if near:
             self._judge_bias(force, moment)
 
-    def _judge_factor(self, what: str, fit: Fit | None, factors: dict[float, str]) -> None:
+    def _factor(
+        self, what: str, expected: Array, factors: dict[float, str]
+    ) -> tuple[float, list[str]]:
+        """The factor of a known unit (1 where it is none), and what is said of it."""
+        fit = self._fit(expected, slice(0, 3) if what == "forces" else slice(3, 6))
         if fit is None or not fit.telling or 0.5 < fit.factor < 2.0:
-            return
-        name = named_factor(fit.factor, factors)
+            return 1.0, []
+        found = factor_words(fit.factor, factors)
         start = f"sensor {self.sensor.name}: {what} are {fit.factor:.3g} times those expected"
-        if name is not None:
-            self.findings.find(f"{start}: in {name}")
-        elif abs(fit.factor) < 0.2:
-            self.findings.find(f"{start}: the weight seems taken out already; compensated: gravity")
-        else:
-            self.findings.find(f"{start}: check the unit, and what is mounted on it")
+        if found is not None:
+            return found[0] * float(np.sign(fit.factor)), [f"{start}: in {found[1]}"]
+        if abs(fit.factor) < 0.2:
+            return 1.0, [f"{start}: the weight seems taken out already; compensated: gravity"]
+        return 1.0, [f"{start}: check the unit, and what is mounted on it"]
 
     def _judge_bias(self, force: Fit, moment: Fit | None) -> None:
         name = self.sensor.name

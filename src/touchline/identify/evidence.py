@@ -27,6 +27,7 @@ PER_CONSTANT = 2.5  # equations that are kept in each time constant of the filte
 WIDTHS = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8)  # rad/s, of the Coulomb friction's tanh
 PIECE = 4096  # samples worked on at once
 MOST = 8000  # equations in time that are kept; longer recordings are thinned
+LEAST = 10  # samples of a recording
 PRESENT = 0.5  # of the samples a row must have, or it counts as not measured
 
 
@@ -142,7 +143,7 @@ def _gather_one(robot: Robot, parts: list[Samples], bandwidth: float) -> Evidenc
     time, q, qd, tau, wrench = (np.concatenate([getattr(p, n) for p in parts]) for n in names)
     forward = _forward(time)
     time, q, qd, tau, wrench = (x[forward] for x in (time, q, qd, tau, wrench))
-    if len(time) < 10:
+    if len(time) < LEAST:
         return None
     bare = bare_robot(robot)
     rows = rows_of(bare)
@@ -150,8 +151,12 @@ def _gather_one(robot: Robot, parts: list[Samples], bandwidth: float) -> Evidenc
     q, qd = (np.where(usual[:, None], x, 0.0) for x in (q, qd))
     reading = _read(bare, q, qd, tau, wrench)
     used = np.isfinite(reading).mean(axis=0) > PRESENT
-    there = np.isfinite(reading[:, used]).all(axis=1)
-    present = np.logical_and(usual, there)
+    there = np.logical_and(usual, np.isfinite(reading[:, used]).all(axis=1))
+    if there.sum() < LEAST:
+        return None
+    # What is missing lengthens the interval, which is bridged as long as it stays short.
+    time, q, qd, reading = (x[there] for x in (time, q, qd, reading))
+    present = np.ones(len(time), dtype=bool)
     steps = make_steps(time, bandwidth, present)
     ready = settled(steps, bandwidth)
     period = float(np.median(steps.dt))

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from touchline.check.recording import glance
 from touchline.detector.thresholds import Thresholds
 from touchline.errors import InputError
 from touchline.folder import ResultsFolder
@@ -16,6 +17,7 @@ from touchline.logs import Log, open_log
 from touchline.logs.period import sample_period
 from touchline.model.pushes import with_pushes
 from touchline.model.robot import Robot, load_robot
+from touchline.observer.bandwidths import bandwidth_warnings, bandwidths
 from touchline.observer.observer import METHODS
 from touchline.observer.samples import Samples
 from touchline.pipeline.pipeline import Pipeline
@@ -23,7 +25,7 @@ from touchline.report.comparison import Comparison, compare_log
 from touchline.report.curves import Curves
 from touchline.report.event_pictures import EventPoses
 from touchline.report.event_windows import EventWindows
-from touchline.report.facts import bandwidth_warnings, bandwidths, watch_warnings
+from touchline.report.facts import watch_warnings
 from touchline.report.outputs import (
     ANALYSIS,
     NAMES,
@@ -40,6 +42,7 @@ from touchline.result.kinds import Watch
 Report = Literal["full", "summary", "none"]
 
 CHUNK = 1 << 13  # samples; bounds the memory, and stays in the cache
+LOOKED_AT = 20_000  # samples that are checked for wrong units, signs and weights
 EPOCH = 1e6  # s; stamps beyond it are dates
 
 
@@ -130,20 +133,39 @@ def analyze(
         with ResultsFolder(out, NAMES) as folder:
             period = sample_period(recording, first.time)
             run = _Run(Pipeline(model, bandwidth, method, period), folder.draft, period)
+            glanced = Glance()
             for part in _with_progress(recording, chain([first], parts)):
                 run.add(part)
+                glanced.add(part)
+            found = glance(model, glanced.parts)
             warnings = bandwidth_warnings(bandwidths(model, bandwidth), run.period)
             warnings += [*recording.warnings, *model.warnings, *run.pipeline.skin.lost]
             warnings += watch_warnings(model, run.statistics)
+            warnings += [f"check: {line}" for line in found]
             analysis = run.finish(log, out, method, bandwidth, warnings, recording.losses)
             where = origin or str(log.resolve())
-            write_origin(folder.draft / ANALYSIS, where, robot, _origin(analysis))
+            facts = _origin(analysis) | {"findings": found}
+            write_origin(folder.draft / ANALYSIS, where, robot, facts)
             if report != "none":
                 from touchline.report.page import page_text
 
                 write_text(folder.draft / REPORT, page_text(analysis, report == "full"))
             folder.commit()
     return analysis
+
+
+class Glance:
+    """Keeps the first samples of a recording, for a check of what they are."""
+
+    def __init__(self) -> None:
+        self.parts: list[Samples] = []
+        self._kept = 0
+
+    def add(self, part: Samples) -> None:
+        """Take the next samples, as long as there is room."""
+        if self._kept < LOOKED_AT:
+            self.parts.append(part.where(np.arange(len(part)) < LOOKED_AT - self._kept))
+            self._kept += len(part)
 
 
 def _origin(analysis: Analysis) -> dict[str, Any]:

@@ -1,0 +1,310 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What hides everything else in a recording, found and mended one after the other.
+
+Units of time and of positions come first, then velocities, which the positions tell; then units,
+order and signs of the torques and the sense of the positions, whichever leaves least; then the
+axes and units of force-torque sensors.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.check.findings import Findings
+from touchline.check.fit import MOMENT_FACTORS, factor_words, robust_line
+from touchline.check.joints import (
+    TELLING,
+    TorqueFit,
+    fit_torque,
+    judged_joints,
+    swapped_torques,
+    torque_words,
+    velocity_problems,
+)
+from touchline.check.loads import explain_weights
+from touchline.check.mending import Mending
+from touchline.check.seen import Seen, windows_of
+from touchline.check.windows import Windows
+from touchline.check.wrenches import check_wrenches
+from touchline.model.robot import Robot
+from touchline.observer.dynamics import gravity_loads
+
+Array = NDArray[np.float64]
+
+OFF = 0.35  # of a row's size: beyond it something coarse may be wrong with its sign or order
+WEIGHTS_OFF = 0.05  # the same, of weights
+BETTER = 0.8  # a change that leaves more than this part of what is off explains nothing
+CLEARLY = 0.2  # nor does one that mends less; a wrong sign of one row is 1
+LARGE = 5.0  # a factor beyond it, or below its inverse, is a unit, whatever else is wrong
+UNIT_NEAR = 0.4  # relative, of the common factor of all torques, which loads may change
+MOVED = 0.05  # rad or m; a joint that moved less tells nothing of the sense of its position
+FOLLOWS = 0.3  # of its own size may be left of a reading that is a multiple of what is expected
+SHARED = 0.6  # of the joints must show a common factor
+
+
+@dataclass(frozen=True)
+class Step:
+    """One thing that is wrong, and the recording without it.
+
+    Attributes:
+        words: of the findings.
+        mending: with that mended too.
+        left: what is still off then, as `total_misfit` has it.
+    """
+
+    words: tuple[str, ...]
+    mending: Mending
+    left: float = 0.0
+
+
+def next_step(robot: Robot, seen: Seen, mending: Mending) -> Step | None:
+    """What is to be mended next; None where nothing hides the rest."""
+    if not seen.stamps.credible:
+        factor = seen.stamps.unit_factor
+        words = (seen.stamps.incredible,)
+        return None if factor is None else Step(words, replace(mending, time=mending.time * factor))
+    if seen.table.looks_like_degrees(robot):
+        return _degrees(robot, seen, mending)
+    if not len(seen.windows):
+        return None
+    problems = velocity_problems(robot, seen.windows)
+    if problems:
+        velocity = mending.velocity.copy()
+        for problem in problems:
+            velocity[problem.joint] /= problem.factor
+        names = [robot.joint_names[problem.joint] for problem in problems]
+        words = [
+            seen.table.dead_words("qd", name) or problem.words
+            for name, problem in zip(names, problems, strict=True)
+        ]
+        return Step(tuple(words), replace(mending, velocity=velocity))
+    return _torques(robot, seen, mending) or _wrenches(robot, seen, mending)
+
+
+def _degrees(robot: Robot, seen: Seen, mending: Mending) -> Step:
+    told = Findings()
+    seen.table.report_limits(robot, told)
+    factor = np.pi / 180
+    turned = mending.scaled("position", _revolute(robot), factor)
+    windows = windows_of(robot, seen, mending)
+    moving = np.abs(windows.slope).max(axis=1, initial=0.0) > MOVED
+    slope, qd = windows.slope[moving].ravel(), windows.qd[moving].ravel()
+    known = np.isfinite(slope) & np.isfinite(qd)
+    line = robust_line(slope[known, None], qd[known])
+    # Velocities that follow from the positions have the same unit; that is one error, not two.
+    if line is not None and abs(float(line.coefficients[0]) - 1.0) < 0.1:
+        turned = turned.scaled("velocity", _revolute(robot), factor)
+    return Step(tuple(told.findings), turned)
+
+
+def _revolute(robot: Robot) -> list[int]:
+    joints = robot.mechanism.joints
+    return [j for j, name in enumerate(robot.joint_names) if joints[name].kind != "prismatic"]
+
+
+def _torques(robot: Robot, seen: Seen, mending: Mending) -> Step | None:
+    windows = seen.windows
+    dead = {name for kind, name in seen.table.dead() if kind == "tau"}
+    measured = judged_joints(robot, windows, dead)
+    telling = telling_joints(robot, seen)
+    units = _units(robot, windows, telling, mending)
+    if units is not None:
+        return units
+    rows = misfit(robot, windows, telling)
+    outside = {p[0] for p in seen.table.outside_limits(robot)}
+    if max(rows, default=0.0) < OFF and not outside:
+        return None
+    before = windows_of(robot, seen, mending)
+    now = total_misfit(robot, before, telling)
+    steps = list(_orders(robot, before, measured, telling, mending))
+    wrenches = _wrenches(robot, seen, mending)
+    if wrenches is not None:
+        left = total_misfit(robot, windows_of(robot, seen, wrenches.mending), telling)
+        steps.append(replace(wrenches, left=left))
+    steps += _weightless(robot, before, telling, mending)
+    steps += _positions(robot, seen, mending, telling)
+    best = min(steps, key=lambda step: step.left, default=None)
+    if best is None or best.left > min(BETTER * now, now - CLEARLY):
+        return None
+    return None if _weights_do(robot, seen, mending, telling, best.left) else best
+
+
+def misfit(robot: Robot, windows: Windows, measured: list[int]) -> list[float]:
+    """What is off of every joint's torque and every sensor, 0 to 1: of its size.
+
+    A sensor is judged by how its readings change, for it may have any bias; torques as they are.
+    """
+    found = []
+    for j in measured:
+        r, e = windows.torque[:, j], windows.expected_torque[:, j]
+        known = np.isfinite(r) & np.isfinite(e)
+        if known.any():
+            found.append(_relative(r[known, None], e[known, None], 0.0))
+    for k, sensor in enumerate(robot.description.sensors):
+        if sensor.frame != "sensor" or len(sensor.axes) < 6 or sensor.compensated != "none":
+            continue
+        sign = 1.0 if sensor.polarity == "outboard" else -1.0
+        r, e = windows.wrench[:, k, :3], sign * windows.expected_wrench[:, k, :3]
+        known = np.isfinite(r).all(axis=1) & np.isfinite(e).all(axis=1)
+        if known.any():
+            r, e = r[known], e[known]
+            found.append(_relative(r - np.median(r, axis=0), e - np.median(e, axis=0), TELLING))
+    return found
+
+
+def _relative(reading: Array, expected: Array, least: float) -> float:
+    sizes = [float(np.median(np.linalg.norm(x, axis=1))) for x in (reading, expected)]
+    off = float(np.median(np.linalg.norm(reading - expected, axis=1)))
+    return off / max(sum(sizes), least, 1e-9)
+
+
+def telling_joints(robot: Robot, seen: Seen) -> list[int]:
+    """Joints whose torque says something, as large as the model expects it."""
+    dead = {name for kind, name in seen.table.dead() if kind == "tau"}
+    size = np.nanmax(np.abs(seen.windows.expected_torque), axis=0, initial=0.0)
+    return [j for j in judged_joints(robot, seen.windows, dead) if size[j] > TELLING]
+
+
+def is_off(robot: Robot, seen: Seen) -> bool:
+    """Is some row farther off than weights that are right would leave it?"""
+    if not len(seen.windows):
+        return False
+    rows = misfit(robot, seen.windows, telling_joints(robot, seen))
+    return max(rows, default=0.0) > WEIGHTS_OFF
+
+
+def total_misfit(robot: Robot, windows: Windows, measured: list[int]) -> float:
+    """The sum over all rows."""
+    return float(sum(misfit(robot, windows, measured)))
+
+
+def _units(robot: Robot, windows: Windows, measured: list[int], mending: Mending) -> Step | None:
+    """A unit that all torques share, or those of single joints."""
+    ratios = {}
+    for j in measured:
+        e, r = windows.expected_torque[:, j], windows.torque[:, j]
+        known = np.isfinite(e) & np.isfinite(r)
+        if known.any() and np.abs(e[known]).max() > TELLING:
+            size = float(np.sqrt(np.mean(e[known] ** 2)))
+            fit = fit_torque(windows, j)
+            shown = float(np.sqrt(np.mean(r[known] ** 2))) / size
+            ratios[j] = shown, fit is not None and fit.certain and _follows(fit, e[known], shown)
+    if not ratios:
+        return None
+    common = float(np.exp(np.median([np.log(max(x, 1e-12)) for x, _ in ratios.values()])))
+    found = factor_words(common, LARGE_FACTORS, UNIT_NEAR)
+    follow = [j for j, (_, follows) in ratios.items() if follows]
+    if found is not None and len(follow) >= SHARED * len(ratios) and len(ratios) > 1:
+        factor, words = found
+        start = f"torque of every joint is about {common:.3g} times what the model expects"
+        changed = mending.scaled("torque", measured, 1.0 / factor)
+        return Step((f"{start}: in {words} (or gain)",), changed)
+    told, changed = [], mending
+    for j in follow:
+        fit = fit_torque(windows, j)
+        own = None if fit is None else factor_words(abs(fit.factor), LARGE_FACTORS)
+        if fit is not None and own is not None:
+            told += torque_words(robot.joint_names[j], fit)
+            changed = changed.scaled("torque", [j], np.sign(fit.factor) / own[0])
+    return Step(tuple(told), changed) if told else None
+
+
+def _follows(fit: TorqueFit, expected: Array, shown: float) -> bool:
+    """Is the reading a multiple of what is expected, whatever else is in it?"""
+    size = abs(fit.factor) * float(np.std(expected))
+    return abs(fit.factor) > 0.5 * shown and fit.scatter < FOLLOWS * size
+
+
+LARGE_FACTORS = {f: w for f, w in MOMENT_FACTORS.items() if not 1 / LARGE < f < LARGE}
+
+
+def _orders(
+    robot: Robot, windows: Windows, measured: list[int], telling: list[int], mending: Mending
+) -> Iterator[Step]:
+    """Torques in another order, or of opposite sign."""
+    count = len(robot.joint_names)
+    whole = {
+        "reversed order": np.arange(count)[::-1],
+        "alphabetical order of the joints' names": np.argsort(np.argsort(robot.joint_names)),
+    }
+    for name, order in whole.items():
+        if len(measured) < count or np.array_equal(order, np.arange(count)):
+            continue
+        changed = replace(mending, order=mending.order[order], torque=mending.torque[order])
+        left = total_misfit(robot, replace(windows, torque=windows.torque[:, order]), telling)
+        yield Step((f"torques of all joints seem to be in {name}: mend log: tau",), changed, left)
+    pairs = swapped_torques(windows, measured)
+    if pairs:
+        order = np.arange(len(robot.joint_names))
+        for a, b in pairs:
+            order[[a, b]] = order[[b, a]]
+        words = tuple(
+            f"torques of {robot.joint_names[a]} and {robot.joint_names[b]} fit each other's joint: "
+            "the columns seem swapped"
+            for a, b in pairs
+        )
+        changed = replace(mending, order=mending.order[order], torque=mending.torque[order])
+        left = total_misfit(robot, replace(windows, torque=windows.torque[:, order]), telling)
+        yield Step(words, changed, left)
+    fits = [(j, fit_torque(windows, j)) for j in telling]
+    negative = {j: fit for j, fit in fits if fit is not None and fit.certain and fit.factor < 0}
+    groups = [[j] for j in negative] + ([list(negative)] if len(negative) > 1 else [])
+    for group in groups:
+        torque = windows.torque.copy()
+        torque[:, group] *= -1.0
+        left = total_misfit(robot, replace(windows, torque=torque), telling)
+        told = [line for j in group for line in torque_words(robot.joint_names[j], negative[j])]
+        yield Step(tuple(told), mending.scaled("torque", group, -1.0), left)
+
+
+def _weightless(
+    robot: Robot, windows: Windows, measured: list[int], mending: Mending
+) -> Iterator[Step]:
+    """Torques of all joints from which their driver has taken the weights."""
+    joints = robot.description.joints
+    if mending.weights is not None or any(joints[j].compensated != "none" for j in measured):
+        return
+    expected = windows.expected_torque - gravity_loads(robot, windows.q).torque
+    left = total_misfit(robot, replace(windows, expected_torque=expected), measured)
+    words = (
+        "torque of every joint fits the model without weights: gravity seems taken out already; "
+        "compensated: gravity"
+    )
+    yield Step((words,), replace(mending, weights=robot), left)
+
+
+def _positions(robot: Robot, seen: Seen, mending: Mending, measured: list[int]) -> Iterator[Step]:
+    """Positions, with their velocities, of opposite sign."""
+    for j in np.flatnonzero(np.ptp(seen.windows.q, axis=0) > MOVED).tolist():
+        changed = mending.scaled("position", [j], -1.0).scaled("velocity", [j], -1.0)
+        left = total_misfit(robot, windows_of(robot, seen, changed), measured)
+        name = robot.joint_names[j]
+        words = (
+            f"position of {name} seems of opposite sign, and so its velocity: the readings fit the "
+            "model once they are turned; use factor -1 in log: q and qd"
+        )
+        yield Step((words,), changed, left)
+
+
+def _weights_do(
+    robot: Robot, seen: Seen, mending: Mending, measured: list[int], left: float
+) -> bool:
+    """Would a missing body, a surplus one or a tilted base leave no more than a change of sign?"""
+    mended = explain_weights(robot, mending.apply(seen.first), Findings())
+    if mended is robot:
+        return False
+    return total_misfit(robot, windows_of(mended, seen, mending), measured) < left
+
+
+def _wrenches(robot: Robot, seen: Seen, mending: Mending) -> Step | None:
+    dead = {name for kind, name in seen.table.dead() if kind == "wrench"}
+    found = check_wrenches(robot, seen.windows, dead, {}, Findings())
+    if not found:
+        return None
+    wrench = mending.wrench.copy()
+    for mend in found:
+        wrench[mend.sensor] = mend.matrix @ wrench[mend.sensor]
+    words = tuple(line for mend in found for line in mend.words)
+    return Step(words, replace(mending, wrench=wrench))
