@@ -87,7 +87,13 @@ def _follow(session: Any, duration: float | None, page: Any) -> None:
     """Tells what happens until it is over."""
     import time
 
-    from touchline.live.telling import began_line, ended_line, notice_line, summary_lines
+    from touchline.live.telling import (
+        began_line,
+        ended_line,
+        notice_line,
+        summary_lines,
+        touch_line,
+    )
 
     events, origin = 0, session.origin
     try:
@@ -96,6 +102,9 @@ def _follow(session: Any, duration: float | None, page: Any) -> None:
                 print(notice_line(notice, session), flush=True)
             for event in news.began:
                 print(began_line(event, origin), flush=True)
+            for touch in news.touches:
+                if touch.kind != "change":  # a slider that moves changes with every sample
+                    print(touch_line(touch, origin), flush=True)
             for event in news.ended:
                 print(ended_line(event, origin), flush=True)
             events += len(news.began)

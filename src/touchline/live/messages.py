@@ -20,6 +20,7 @@ from touchline.live.streams import Stream, StreamState
 from touchline.model.robot import Robot
 from touchline.pipeline.pipeline import Result
 from touchline.result.contact import Contact
+from touchline.touch.touch import TouchEvent
 
 Array = NDArray[np.float64]
 
@@ -28,6 +29,7 @@ SHAFT, HEAD, POINT = 0.008, 0.02, 0.02  # m
 SIGMAS = 2.0  # of the region that is drawn
 FELT, BLOW = (0.84, 0.37, 0.0, 0.9), (0.8, 0.1, 0.1, 0.9)  # colours: red, green, blue, opacity
 REGION = (0.84, 0.37, 0.0, 0.25)
+TOUCH = "~/touch"  # presses, values, strokes and gestures, where the robot has an `interface`
 SHOWN = 0.5  # s for which a marker is shown that is not renewed
 
 
@@ -59,6 +61,7 @@ class Messages:
             "~/external_joint_torques": self._state,
             **{wrench_topic(name): self._wrench for name in self._forces},
             "~/contacts": self._text,
+            **({TOUCH: self._text} if self._robot.description.interface else {}),
             "~/collision": self._flag,
             "~/markers": self._markers,
             "/diagnostics": self._array,
@@ -79,6 +82,10 @@ class Messages:
     def collision(self, collision: bool) -> Any:
         """Whether there was one since the last reset."""
         return self._flag(data=collision)
+
+    def touch(self, event: TouchEvent) -> Any:
+        """What a person did with the arm's interface, as JSON."""
+        return self._text(data=json.dumps(event.as_json()))
 
     def _head(self, header: Any, sample: Sample, frame: str) -> None:
         seconds, rest = divmod(whole_nanoseconds(sample.time), 10**9)

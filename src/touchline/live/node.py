@@ -5,7 +5,8 @@
     python -m touchline.live.node --ros-args -p robot:=robot.yaml -p source:=ros2://
 
 Publishes `~/external_joint_torques`, `~/SEGMENT/wrench`, `~/contacts`, `~/collision`,
-`~/markers` and `/diagnostics`; offers `~/reset`, `~/tare` and `~/set_load`. It commands nothing.
+`~/markers`, `/diagnostics` and, of a robot with an `interface`, `~/touch`; offers `~/reset`,
+`~/tare` and `~/set_load`. It commands nothing.
 """
 
 import sys
@@ -17,7 +18,7 @@ from typing import Any
 from touchline.errors import InputError
 from touchline.live.connection import Connection
 from touchline.live.loopback import keep_local
-from touchline.live.messages import Messages
+from touchline.live.messages import TOUCH, Messages
 from touchline.live.session import EventNews, Session
 from touchline.live.sources import make_source
 from touchline.live.streams import StreamState
@@ -251,6 +252,8 @@ class TouchlineNode:
                 self.node.get_logger().warning(notice.text)
         if any(event.level == "collision" for event in news.began):
             self._publish_collision(True)
+        for touch in news.touches:
+            self._publishers[TOUCH].publish(self._messages.touch(touch))
         result, sample = session.result, session.sample
         now = time.monotonic()
         if now - self._told >= DIAGNOSTICS:

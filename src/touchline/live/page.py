@@ -15,6 +15,7 @@ from touchline.result.kinds import Watch
 from touchline.view.contacts import ContactScene
 from touchline.view.scene import RobotScene, dress
 from touchline.view.server import PageServer
+from touchline.view.widgets import WidgetScene
 
 FRAME = 0.05  # s between two pictures: a browser gets no more, however fast the robot is
 READOUT = 0.25  # s between two of them
@@ -36,6 +37,9 @@ class RobotPage:
         dress(self._page)
         self._robot = RobotScene(self._page.scene, session.robot)
         self._contacts = ContactScene(self._page.scene, self._robot)
+        self._widgets: WidgetScene | None = None
+        if session.touch is not None:
+            self._widgets = WidgetScene(self._page.scene, session.touch, session.touch.patches)
         self._readout = self._page.gui.add_html("")
         self._asked: list[Callable[[], str]] = []
         self._answer = ""
@@ -62,6 +66,8 @@ class RobotPage:
         with self._page.atomic():
             self._robot.place(q)
             self._contacts.show([] if result is None else result.contacts, [], q)
+            if self._widgets is not None and session.touch is not None:
+                self._widgets.show(session.touch)
         if now - self._written >= READOUT:
             self._written = now
             self._readout.content = self._text(now)

@@ -92,12 +92,14 @@ class ParquetRecorder(_Closing):
             q=np.array([sample.q for sample in samples], dtype=float).reshape(-1, n),
             qd=np.array([sample.qd for sample in samples], dtype=float).reshape(-1, n),
             tau=np.array([sample.tau for sample in samples], dtype=float).reshape(-1, n),
-            wrench=np.array([sample.wrench for sample in samples], dtype=float).reshape(-1, k, 6),
+            wrench=np.array([sample.wrench for sample in samples], dtype=float).reshape(
+                len(samples), k, 6
+            ),
         )
         columns = table_columns(signals, self._description)
         columns["arrival"] = np.array([sample.arrival for sample in samples], dtype=float)
         columns["sequence"] = np.array([sample.sequence for sample in samples], dtype=np.int64)
-        ages = np.array([sample.ages for sample in samples], dtype=float).reshape(-1, k)
+        ages = np.array([sample.ages for sample in samples], dtype=float).reshape(len(samples), k)
         return columns | dict(zip(self._ages, ages.T, strict=True))
 
     def add(self, sample: Sample) -> None:

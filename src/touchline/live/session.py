@@ -24,6 +24,7 @@ from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
 from touchline.pipeline.pipeline import Pipeline, Result
 from touchline.result.event import Event
+from touchline.touch.touch import Touch, TouchEvent
 
 SILENT = 5.0  # s without a sample, after which `duration` is over on this machine's clock too
 LONGEST_START = 3.0  # s in which the first second has to come
@@ -33,10 +34,17 @@ MOST_RECENT = 40_000  # of them: 5 s at 8 kHz
 
 @dataclass
 class EventNews:
-    """What is new of the events: each is told once when it begins and once when it ends."""
+    """What is new of the events: each is told once when it begins and once when it ends.
+
+    Attributes:
+        began: events that began.
+        ended: events that ended, with the `widget` that they were on.
+        touches: what people did with the arm's interface.
+    """
 
     began: list[Event] = field(default_factory=list)
     ended: list[Event] = field(default_factory=list)
+    touches: list[TouchEvent] = field(default_factory=list)
 
 
 class Session:
@@ -50,6 +58,7 @@ class Session:
 
     Attributes:
         pipeline: that takes the samples; None before `start`.
+        touch: that follows the robot's `interface`; None where it has none.
         reasons: that spoke against going live.
         samples: number of samples so far.
         result: of the last sample; None while there is no honest one, as when nothing arrives.
@@ -66,6 +75,8 @@ class Session:
         self._record, self._force = record, force
         self._skin = Skin(robot)
         self.pipeline: Pipeline | None = None
+        self.touch = Touch(robot, self._skin) if robot.description.interface else None
+        self._widgets: dict[int, str] = {}  # that events which last are on
         self._attached: Pipeline | None = None  # the one that a native source feels with
         self._recorder: Recorder | None = None
         self._kept = ExitStack()
@@ -224,11 +235,24 @@ class Session:
         while sample.time - self._recent[0].time > RECENT:
             self._recent.popleft()
         self.samples += 1
+        if self.touch is not None:
+            for event in self.touch.update(result):
+                self._fresh.touches.append(event)
+                if event.kind == "press" and event.contact is not None and event.widget:
+                    self._widgets[event.contact] = event.widget
         for change in result.events:
             if change.happened == "began":
                 self._fresh.began.append(change.event)
             elif change.happened == "ended":
-                self._fresh.ended.append(change.event)
+                self._fresh.ended.append(self._named(change.event))
+
+    def _named(self, event: Event) -> Event:
+        """An event that has ended with the widget that it was on, if any."""
+        if self.touch is None:
+            return event
+        pressed = self._widgets.pop(event.id, None)
+        place = self.touch.widget_at(event.link, event.position_link)
+        return event.replace(widget=place or pressed)
 
     def _attach(self) -> None:
         """Lets a source that can do so feel in native threads, after the samples of the start."""

@@ -6,6 +6,8 @@ import numpy as np
 from touchline.live.connection import Notice
 from touchline.live.session import Session
 from touchline.result.event import Event
+from touchline.touch.stroke import Stroke
+from touchline.touch.touch import TouchEvent
 
 WITHHELD = {"stale", "invalid", "not received"}
 
@@ -25,6 +27,17 @@ def ended_line(event: Event, origin: float) -> str:
         f"{event.cleared - origin:10.3f} s  {event.level} {event.id} over after {lasted:.2f} s: "
         f"{_where(event)}{_size(event)}"
     )
+
+
+def touch_line(event: TouchEvent, origin: float) -> str:
+    """Something that a person did with the arm."""
+    value = ""
+    if isinstance(event.value, Stroke):
+        value = f" of {100 * event.value.length:.1f} cm"
+    elif event.value is not None:
+        value = f": {event.value:.3g}" if isinstance(event.value, float) else f": {event.value}"
+    where = event.widget or event.link or "the arm"
+    return f"{event.time - origin:10.3f} s  {where}: {event.kind}{value}"
 
 
 def notice_line(notice: Notice, session: Session) -> str:

@@ -228,6 +228,7 @@ class _Run:
         self._windows.add(time, values, events)
         self._outputs.estimates(time, estimate)
         self._outputs.contacts(time, estimate, self.pipeline.contacts)
+        self._outputs.pressed(time, part.q, estimate)
         self._outputs.events(events)
         self._outputs.postures(time, part.q)
         self._poses.add(time, part.q, events)

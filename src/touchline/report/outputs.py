@@ -17,11 +17,14 @@ from touchline.observer.observer import Estimate
 from touchline.pipeline.table import ContactTable, contact_schema
 from touchline.report.postures import PostureWriter
 from touchline.result.event import Event
-from touchline.touch.touch import Touch
+from touchline.touch.spot import BEFORE
+from touchline.touch.touch import SURE, Touch
 
 ESTIMATES, CONTACTS, POSTURES = "estimates.parquet", "contacts.parquet", "postures.parquet"
 EVENTS, ANALYSIS, REPORT = "events.json", "analysis.json", "report.html"
 NAMES = (ESTIMATES, CONTACTS, POSTURES, EVENTS, ANALYSIS, REPORT)
+LONGEST = 10.0  # s; the first seconds of a longer touch tell its widget no more
+MOST = 500  # samples of a touch that are looked at
 CONTACT_SCHEMA = {"time": "f8", "health": "u4"} | contact_schema()
 
 
@@ -57,12 +60,36 @@ def strict(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _line(event: Event, touch: Touch | None) -> str:
-    """An event as JSON; with a `touch` it names the widget that it is on, or null."""
-    line = event.as_json()
-    if touch is not None:
-        line["widget"] = touch.widget_at(event.link, event.position_link)
-    return json.dumps(strict(line), allow_nan=False)
+class _Pressed:
+    """Names the widgets that events are on.
+
+    Where a place is told, by the place; a spot that was taught by joint torques, by their step.
+    """
+
+    def __init__(self, robot: Robot, skin: Skin | None) -> None:
+        self._touch = Touch(robot, skin)
+        self._recent: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+
+    def samples(self, time: np.ndarray, q: np.ndarray, torque: np.ndarray) -> None:
+        """Takes time (N,), joint positions and external torques (N, n)."""
+        if self._touch.spots is None:
+            return
+        self._recent.append((time, q, torque))
+        while len(self._recent) > 1 and self._recent[1][0][0] < time[-1] - LONGEST:
+            self._recent.pop(0)
+
+    def named(self, event: Event) -> Event:
+        """The event with its widget, if it is on one."""
+        name = self._touch.widget_at(event.link, event.position_link)
+        if name is None and self._touch.spots is not None and self._recent:
+            time, q, torque = (np.concatenate(part) for part in zip(*self._recent, strict=True))
+            end = float(time[-1]) if event.cleared is None else event.cleared
+            near = (time > event.detected - BEFORE[0]) & (time <= end)
+            thin = slice(None, None, max(1, int(near.sum()) // MOST))
+            rows = time[near][thin], q[near][thin], torque[near][thin]
+            found, sure = self._touch.spots.read_event(*rows, event.detected, end)[0]
+            name = found if sure >= SURE else None
+        return event.replace(widget=name)
 
 
 def _write_lines(path: Path, lines: Sequence[str]) -> None:
@@ -89,7 +116,7 @@ class Outputs:
 
     def __init__(self, directory: Path, robot: Robot, skin: Skin | None = None) -> None:
         self.directory = directory
-        self._touch = Touch(robot, skin) if robot.description.interface else None
+        self._pressed = _Pressed(robot, skin) if robot.description.interface else None
         names = (robot.joint_names, robot.sensor_names, robot.segment_names)
         self._estimates = EstimateWriter(directory, *names)
         self._contacts = TableWriter(directory / CONTACTS, CONTACT_SCHEMA)
@@ -103,6 +130,11 @@ class Outputs:
         self._estimates.write(
             time, estimate.health, estimate.tau_ext, estimate.sensor_wrench, estimate.segment_wrench
         )
+
+    def pressed(self, time: np.ndarray, q: np.ndarray, estimate: Estimate) -> None:
+        """Take what tells of widgets in N samples, before the events that end in them."""
+        if self._pressed is not None:
+            self._pressed.samples(time, q, np.asarray(estimate.tau_ext))
 
     def postures(self, time: np.ndarray, q: np.ndarray) -> None:
         """Append how the arm stood in N samples, thinned."""
@@ -123,7 +155,8 @@ class Outputs:
     def _told(self, event: Event) -> str:
         line = self._lines.get(event.id)
         if line is None:
-            line = _line(event, self._touch)
+            named = event if self._pressed is None else self._pressed.named(event)
+            line = json.dumps(strict(named.as_json()), allow_nan=False)
             if event.cleared is not None:
                 self._lines[event.id] = line
         return line

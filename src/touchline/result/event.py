@@ -42,6 +42,7 @@ class Event(Value):
         clamped: whether forces on two sides opposed each other; None where that is not known.
         rate: largest rate of the segment's force [N/s].
         rank: where no equation is left over: independent ones at hand, for the `unknowns`.
+        widget: of the robot's `interface` that it was on; None for none, or if nobody looked.
     """
 
     id: int
@@ -68,6 +69,7 @@ class Event(Value):
     rate: float | None = None
     rank: int | None = None
     unknowns: int | None = None
+    widget: str | None = None
 
     @property
     def at_least(self) -> int | None:
@@ -79,7 +81,8 @@ class Event(Value):
         return {name: _plain(value) for name, value in self._known().items()}
 
 
-lazily(Event, decoders(EVENT, Candidate))
+# The core knows no widgets: who follows a `Touch` names them.
+lazily(Event, decoders(EVENT, Candidate) | {"widget": lambda row, names: None})
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -23,6 +23,8 @@ REPEAT_COUNT = 5  # touches that this prior counts for
 ELSEWHERE = 0.5  # rad: spread of the directions of touches elsewhere, in parts of the lever arms
 POSTURE = 0.1  # rad (rms over the joints): farther from where it was taught a spot is not told
 STEP_NOISE = 0.05  # Nm: what noise and stiction leave in a step of one joint
+BEFORE = 0.3, 0.03  # s: from when to when before a touch its torques are taken as those at rest
+AVERAGE = 0.05  # s, over which the direction of a torque step is averaged
 LEAST_STEP = 0.3  # Nm; smaller steps have no direction worth the name
 LEAST_LEVER = 0.05  # m, of a joint about whose axis everything outboard is close
 
@@ -86,6 +88,29 @@ class TorqueSpots:
         around = (np.diag((ELSEWHERE * levers) ** 2) + noise)[part]
         scores.append((None, _log_normal(unit[known], around)))
         return _shares(scores)
+
+    def read_event(
+        self, time: Array, q: Array, torque: Array, begin: float, end: float
+    ) -> list[tuple[str | None, float]]:
+        """Which spot a touch between two instants [s] was on, as `read`.
+
+        Args:
+            time: (N,) [s], from before the touch to its end or later.
+            q: joint positions (N, n) [rad or m].
+            torque: (N, n) external torques [Nm].
+            begin: when it was detected.
+            end: when it was cleared, or the last instant.
+        """
+        before = (time >= begin - BEFORE[0]) & (time <= begin - BEFORE[1])
+        during = np.flatnonzero((time >= begin) & (time <= end))
+        if not before.any() or not len(during):
+            return [(None, 1.0)]
+        steps = torque[during] - torque[before].mean(axis=0)
+        mean = np.array(
+            [steps[np.abs(time[during] - time[row]) <= AVERAGE / 2].mean(axis=0) for row in during]
+        )
+        largest = int(np.argmax(np.linalg.norm(np.nan_to_num(mean), axis=1)))
+        return self.read(q[during[largest]], mean[largest])
 
     def _spread(self, q: Array) -> tuple[Array, Array]:
         """Lever arms (n,) in parts of the longest, and the spread (n, n) of a spot's direction."""

@@ -3,7 +3,7 @@
 
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,8 @@ from touchline.suggest import unknown
 from touchline.touch.beside import STEPS, WAVER, Beside, Other, Rows
 from touchline.touch.gesture import EASING, LIFTED, PRESS, Finger, GestureReader
 from touchline.touch.grip import Grip
-from touchline.touch.spot import TorqueSpots
+from touchline.touch.spot import AVERAGE as TORQUE_AVERAGE
+from touchline.touch.spot import BEFORE, TorqueSpots
 from touchline.touch.stroke import Stroke
 from touchline.touch.widget import Widget
 
@@ -28,12 +29,10 @@ Array = NDArray[np.float64]
 
 DWELL = 0.03  # s; by then 99 % of the collisions are called so (docs/reaction.md), and no command
 TORQUE_DWELL = 0.1  # s; a torque step has its direction once the force no longer rises
-TORQUE_AVERAGE = 0.05  # s, over which that direction is averaged
 FULL = 0.8  # of the largest step of a press; a smaller mean is of a force that rises or falls
 LATEST = 0.25  # s; a finger that is not on a widget by then only passes over it
 SURE = 0.9  # probability of being on a widget, or of a taught spot, from which it counts
 GESTURE_MOST = 60.0  # N; what presses harder means no gesture
-BEFORE = 0.3, 0.03  # s: from when to when before a touch its torques are taken as those at rest
 AVERAGE = 0.03  # s, over which the place of a press is averaged
 STROKE_LEAST = 0.01  # m; a shorter way on a pad is a press, no stroke
 BESIDE = 0.1  # s; another contact that began later has to last as long to be more than a doubt
@@ -66,6 +65,18 @@ class TouchEvent:
     probability: float = 1.0
     direction: Array | None = None
     contact: int | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """For JSON: vectors as lists, a stroke as `Stroke.as_json`."""
+        value = self.value.as_json() if isinstance(self.value, Stroke) else self.value
+        vectors = {
+            name: None if vector is None else [float(x) for x in vector]
+            for name, vector in (("position", self.position), ("direction", self.direction))
+        }
+        return asdict(replace(self, value=None, position=None, direction=None)) | {
+            "value": value,
+            **vectors,
+        }
 
 
 @dataclass(frozen=True)
@@ -178,15 +189,16 @@ class Touch:
         events: the last `TouchEvent`s.
         strokes: the last finished ones, as felt; `Stroke.cleaned` is what a `Recognizer` likes.
         steps: what finished presses did to the joint torques, where these alone tell.
+        patches: the links' surfaces, by link.
         values: of toggles (bool), sliders and dials (float), by name.
     """
 
     def __init__(self, robot: Robot, skin: Skin | None = None) -> None:
         self.robot = robot
         skin = skin or Skin(robot)
-        self._patches = {patch.link: patch for patch in skin.patches}
+        self.patches = {patch.link: patch for patch in skin.patches}
         given = robot.description.interface
-        self.widgets = {name: make_widget(name, given[name], self._patches) for name in given}
+        self.widgets = {name: make_widget(name, given[name], self.patches) for name in given}
         taught = {name: entry.taught for name, entry in given.items() if entry.taught}
         self._spots = TorqueSpots(taught, skin) if taught else None
         self.values: dict[str, Any] = {
@@ -200,9 +212,9 @@ class Touch:
         self._presses: dict[int, Press] = {}
         self._rest: deque[tuple[float, Array]] = deque()
         self._paths = {
-            widget.name: _path(self._patches[widget.link], widget)
+            widget.name: _path(self.patches[widget.link], widget)
             for widget in self.widgets.values()
-            if widget.kind == "slider" and widget.link in self._patches
+            if widget.kind == "slider" and widget.link in self.patches
         }
         self._beside = {name: Beside(robot, name) for name in robot.sensor_names}
         self._past: deque[tuple[float, Result]] = deque()
@@ -274,6 +286,11 @@ class Touch:
             if widget.link == link and not widget.given.taught
         ]
         return min(inside)[1] if inside and min(inside)[0] <= 0.0 else None
+
+    @property
+    def spots(self) -> TorqueSpots | None:
+        """What tells spots that were taught by joint torques; None where there are none."""
+        return self._spots
 
     def _follow(self, contact: Contact, result: Result, q, torque, poses) -> list[TouchEvent]:
         time = result.time
@@ -368,9 +385,9 @@ class Touch:
         return Before(rows, touching)
 
     def _touching(self, contact: Contact, poses) -> Touching | None:
-        if contact.link not in self._patches or contact.position is None:
+        if contact.link not in self.patches or contact.position is None:
             return None
-        node = self._patches[contact.link].node
+        node = self.patches[contact.link].node
         R, p = poses[node][:3, :3], poses[node][:3, 3]
         force = np.zeros(3) if contact.force is None else contact.force
         return Touching(node, (contact.position - p) @ R, force @ R)
@@ -412,13 +429,13 @@ class Touch:
         finger, time = press.finger, result.time
         if press.before is None or not press.places or time - press.looked < PAUSE:
             return
-        if not DWELL / 2 <= time - finger.begun <= LATEST or finger.link not in self._patches:
+        if not DWELL / 2 <= time - finger.begun <= LATEST or finger.link not in self.patches:
             return
         press.looked, others = time, self._others(press, result, poses)
         if not others:
             finger.doubtful = False
             return
-        patch = self._patches[finger.link]
+        patch = self.patches[finger.link]
         T = patch.T_node_link
         point = T[:3, :3] @ press.places[-1][1] + T[:3, 3]
         change = self._change(press, result)
@@ -429,9 +446,9 @@ class Touch:
 
     def _place(self, press: Press, contact: Contact, time: float, poses, alone: bool) -> None:
         finger = press.finger
-        if contact.position is None or contact.link not in self._patches or poses is None:
+        if contact.position is None or contact.link not in self.patches or poses is None:
             return
-        patch = self._patches[contact.link]
+        patch = self.patches[contact.link]
         point = in_link(patch, poses[patch.node], contact.position)
         if contact.link != finger.link:
             press.places.clear()

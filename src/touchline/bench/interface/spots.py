@@ -20,28 +20,44 @@ from touchline.touch.touch import Touch, TouchEvent
 
 Array = NDArray[np.float64]
 
+FIRST = "panda_touches"  # folder of the recordings that the rules were made with
 TAUGHT = 3  # touches that teach a spot
 MARGIN = 0.15  # s; a press counts for a labelled touch from so long before it to so long after
 
 
 def taught_spots(data: Path) -> list[Row]:
-    """Real recordings: one spot each, taught with its first touches, judged on the others."""
+    """Real recordings: one spot each, taught with its first touches, judged on the others.
+
+    Those of `panda_touches` for themselves, then together with `panda_touches_more`.
+    """
+    files = touched_files(data)
     with TemporaryDirectory() as scratch:
-        found = [read_touched(file, Path(scratch)) for file in touched_files(data)]
+        found = {file: read_touched(file, Path(scratch)) for file in files}
     if not found:
         raise InputError(f"--data {data}: holds no recording (panda_touches/*.csv.gz)")
-    robot, logs = found[0].robot, {recording.name: recording for recording in found}
-    taught = {name: teach(robot, *_first(recording)).widget for name, recording in logs.items()}
+    first = [found[file] for file in files if file.parent.name == FIRST]
     rows: list[Row] = [("real Panda, joint torques alone", "right", "another", "none of them")]
+    rows += _told(first) if first else []
+    if len(first) < len(found):
+        rows += _told(list(found.values()))
+    return rows
+
+
+def _told(recordings: list[Recording]) -> list[Row]:
+    """Of spots that are all taught on one robot."""
+    robot, logs = recordings[0].robot, {recording.name: recording for recording in recordings}
+    taught = {name: teach(robot, *_first(recording)).widget for name, recording in logs.items()}
     known, unknown = np.zeros(3, int), np.zeros(3, int)
     for name, recording in tqdm(logs.items(), file=sys.stderr, leave=False, disable=None):
         others = {other: widget for other, widget in taught.items() if other[0] != name[0]}
         both = _judged(robot, recording, (taught, others))
         known += np.sum(both[0][TAUGHT:], axis=0)
         unknown += np.sum(both[1], axis=0)
-    for what, counts in (("taught, later touches", known), ("links not taught", unknown)):
+    rows: list[Row] = []
+    for what, counts in (("later touches", known), ("on links not taught", unknown)):
         total = counts.sum()
-        rows.append((what, *(f"{count}/{total}" for count in counts)))
+        name = f"{len(logs)} spots: {what}"
+        rows.append((name, *(f"{count}/{total}" for count in counts)))
     return rows
 
 
