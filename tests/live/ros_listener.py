@@ -19,6 +19,7 @@ KINDS = {
     "/touchline/base/wrench": WrenchStamped,
     "/touchline/wrist/wrench": WrenchStamped,
     "/touchline/contacts": String,
+    "/touchline/touch": String,
     "/touchline/collision": Bool,
     "/touchline/markers": MarkerArray,
     "/diagnostics": DiagnosticArray,
@@ -27,7 +28,7 @@ KINDS = {
 
 def main():
     heard = {topic: 0 for topic in KINDS}
-    last, links, shapes = {}, set(), set()
+    last, links, shapes, touches = {}, set(), set(), set()
     rclpy.init()
     node = rclpy.create_node("listener")
 
@@ -37,6 +38,8 @@ def main():
             last[topic] = message
             if topic == "/touchline/contacts":
                 links.update(c["link"] for c in json.loads(message.data)["contacts"])
+            if topic == "/touchline/touch":
+                touches.add(json.loads(message.data)["kind"])
             if topic == "/touchline/markers":
                 shapes.update(marker.ns for marker in message.markers)
 
@@ -70,6 +73,7 @@ def main():
         json.dumps(
             {
                 "heard": heard,
+                "touches": sorted(touches),
                 "links": sorted(link for link in links if link),
                 "shapes": sorted(shapes),
                 "names": list(torques.name) if torques else [],

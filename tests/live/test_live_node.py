@@ -8,14 +8,26 @@ import sys
 import pytest
 from test_live_ros import HERE, environment, needs_ros
 
+import touchline as tl
 from touchline.live.messages import wrench_topic
+from touchline.model.interface_names import GESTURES
 
 
 @needs_ros
-def test_what_is_felt_is_published_and_services_answer():
+def test_what_is_felt_is_published_and_services_answer(tmp_path):
     env = environment(76)
+    robot = tmp_path / "robot.yaml"
+    sara = tl.load_robot("sara").description.path.read_text()
+    robot.write_text(f"{sara.replace('sara.urdf', 'robot:sara')}\n{LAMP}\n")
     listener = [sys.executable, str(HERE / "ros_listener.py"), "10"]
-    parameters = ["-p", "robot:=sara", "-p", "source:=sim://?motion=0", "-p", "publish_rate:=100.0"]
+    parameters = [
+        "-p",
+        f"robot:={robot}",
+        "-p",
+        "source:=sim://?motion=0",
+        "-p",
+        "publish_rate:=100.0",
+    ]
     parameters += [
         "-p",
         "load_link:=tool",
@@ -40,12 +52,14 @@ def test_what_is_felt_is_published_and_services_answer():
     assert told["names"] == [f"joint{i}" for i in range(1, 8)] and told["efforts"] == 7
     assert told["links"] and "force" in told["shapes"]
     assert told["status"][0] == "touchline: simulation" and float(told["facts"]["rate_hz"]) > 0
+    assert set(told["touches"]) <= {*GESTURES, "press", "release", "toggle"} and told["touches"]
     assert told["collision"] in (True, False)
     assert told["answers"]["reset"] == [True, "reset: the estimate starts anew"]
     assert told["answers"]["tare"][1].startswith("tare")  # done, or the arm was not at rest
     assert told["answers"]["set_load"] == [True, LOADED]
 
 
+LAMP = "interface: {lamp: {kind: toggle, link: link3}}"
 LOADED = "set_load: tool carries 0.500 kg at (+0.000, +0.000, +0.040) m of its frame"
 
 

@@ -26,7 +26,7 @@ def told(*fingers, until=5.0, step=0.005):
 def press(begun, length, event=0, way=0.0, force=(0.0, 0.0, -5.0), **more):
     first = np.zeros(3)
     return Finger(
-        event, begun, "link", "base", np.array(force), 5.0, 5.0, first,
+        event, begun, "link", "base", np.array(force), 5.0, 5.0, None, first,
         first + [way, 0.0, 0.0], way, begun + length, **more,
     )  # fmt: skip
 

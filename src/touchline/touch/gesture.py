@@ -38,6 +38,7 @@ class Finger:
         link: touched link, None where that is not told.
         force: (3,) [N] now, in world; `peak` its largest norm (of joint torques [Nm] where
             no force is known).
+        place: (3,) [m] in world now; None where it is not told.
         first, last: (3,) places in the link's frame [m]; None where they are not told.
         collision: whether it was a blow, or too strong for a command.
         doubtful: whether what others do explains it; it is no finger while it is.
@@ -52,6 +53,7 @@ class Finger:
     force: Array | None = None
     peak: float = 0.0
     now: float = 0.0
+    place: Array | None = None
     first: Array | None = None
     last: Array | None = None
     far: float = 0.0
@@ -154,7 +156,7 @@ class GestureReader:
                     finger.told.add("grab")
                 continue
             lasting = max((_opposed_for(a, b, time) for a in hand for b in hand), default=0.0)
-            clamped = any(f.clamped for f in hand) and all(_near(hand[0], f) for f in hand)
+            clamped = any(f.clamped for f in hand) and all(near(hand[0], f) for f in hand)
             gripped = max(finger.grip for finger in hand)
             if lasting < GRAB and not gripped and not (clamped and hand[0].duration(time) >= GRAB):
                 continue
@@ -189,18 +191,18 @@ def _together(tap: Finger, other: Finger) -> bool:
     return tap.link == other.link and float(np.linalg.norm(tap.first - other.first)) < NEARBY
 
 
-def _near(one: Finger, other: Finger) -> bool:
+def near(one: Finger, other: Finger) -> bool:
     """May they belong to one hand?"""
-    if one.last is None or other.last is None:
+    if one.place is None or other.place is None:
         return True
-    return one.link == other.link and float(np.linalg.norm(one.last - other.last)) < HAND
+    return float(np.linalg.norm(one.place - other.place)) < HAND
 
 
 def _opposed_for(one: Finger, other: Finger, time: float) -> float:
     """How long two fingers have pressed against each other [s]; 0 where they do not."""
     if one.force is None or other.force is None:
         return 0.0
-    if not _near(one, other):
+    if not near(one, other):
         return 0.0
     size = float(np.linalg.norm(one.force) * np.linalg.norm(other.force))
     if size == 0.0 or float(one.force @ other.force) >= OPPOSITE * size:

@@ -18,7 +18,7 @@ from touchline.pipeline.result import Result
 from touchline.result.contact import Contact
 from touchline.suggest import unknown
 from touchline.touch.beside import STEPS, WAVER, Beside, Other, Rows
-from touchline.touch.gesture import EASING, LIFTED, PRESS, Finger, GestureReader
+from touchline.touch.gesture import EASING, LIFTED, PRESS, Finger, GestureReader, near
 from touchline.touch.grip import Grip
 from touchline.touch.spot import AVERAGE as TORQUE_AVERAGE
 from touchline.touch.spot import BEFORE, TorqueSpots
@@ -320,8 +320,7 @@ class Touch:
         press.easing = None
         if not press.felt:
             press.take(time, q, torque)
-        alone = sum(c.segment == contact.segment for c in result.contacts) == 1
-        self._place(press, contact, time, poses, alone)
+        self._place(press, contact, time, poses)
         if press.widget is not None:
             return self._use(press, time, None if beside is None else beside[0])
         self._doubt(press, result, poses)
@@ -444,7 +443,20 @@ class Touch:
         claimed = np.zeros(3) if finger.force is None else finger.force
         finger.doubtful = _size(force - claimed) > PRESS * finger.now
 
-    def _place(self, press: Press, contact: Contact, time: float, poses, alone: bool) -> None:
+    def _apart(self, press: Press, time: float) -> bool:
+        """Does another hand touch the segment elsewhere, or did it when this finger landed?"""
+        if press.before is not None and press.before.touching:
+            return True
+        finger = press.finger
+        return any(
+            other.segment == finger.segment
+            and other.lifted is None
+            and other.duration(time) >= BESIDE
+            and not near(finger, other)
+            for other in (p.finger for p in self._presses.values() if p is not press)
+        )
+
+    def _place(self, press: Press, contact: Contact, time: float, poses) -> None:
         finger = press.finger
         if contact.position is None or contact.link not in self.patches or poses is None:
             return
@@ -454,10 +466,11 @@ class Touch:
             press.places.clear()
             press.grip = Grip()
             finger.link, finger.first, finger.far = contact.link, None, 0.0
+        finger.place = contact.position
         press.places.append((time, point, contact.position_std or 0.0))
-        if not alone:
-            press.grip = Grip()  # what changes on the segment may be the other's doing
-        elif contact.wrench is not None and press.grip.due(time):
+        if contact.wrench is not None and press.grip.due(time):
+            if self._apart(press, time):
+                press.grip = Grip()  # what changes on the segment may be the other's doing
             wrench = _in(poses[patch.node] @ patch.T_node_link, contact.wrench)
             finger.grip = max(finger.grip, press.grip.follow(time, wrench, point))
         while press.places[0][0] < time - AVERAGE:

@@ -17,12 +17,13 @@ from touchline.bench.localization.arm import TIERS
 from touchline.bench.tables import Row
 from touchline.errors import InputError
 from touchline.touch.recognizer import Recognizer
-from touchline.touch.stroke import Stroke
+from touchline.touch.stroke import Stroke, resampled
 
 Array = NDArray[np.float64]
 
 WRITERS = 7494  # of the 10,992 pen digits, those of the 30 writers that a recognizer may learn from
 DIGIT = 0.05  # m, of the larger side
+DRAWN = 100  # points of a felt stroke in the picture
 CONDITIONS = ((1, 0.0), (1, 0.3), (2, 0.0))  # tier of noise, speed of the joints [rad/s]
 
 
@@ -139,7 +140,8 @@ def draw(written: Written) -> str:
     size, parts = 1e3 * DIGIT * 1.4, []
     for column, label in enumerate(sorted(written.samples)):
         pen, stroke = written.samples[label]
-        for row, (way, colour) in enumerate(((pen, "#0072b2"), (stroke.points[:, 1:], "#d95f02"))):
+        felt = resampled(stroke.points[:, 1:], DRAWN)
+        for row, (way, colour) in enumerate(((pen, "#0072b2"), (felt, "#d95f02"))):
             x, y = 1e3 * (way - 0.5 * (way.max(axis=0) + way.min(axis=0))).T
             x, y = x + size * (column + 0.5), size * (row + 0.5) - y
             points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
