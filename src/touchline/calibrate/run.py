@@ -13,6 +13,7 @@ from touchline.calibrate.held_out import HeldOut, judge, split
 from touchline.calibrate.noise import measure_noise, noise_keys
 from touchline.calibrate.quiet import LISTED, Suspicion, find_contacts
 from touchline.calibrate.recordings import Recordings
+from touchline.calibrate.short import METHOD, short_thresholds
 from touchline.detector.calibration import (
     Statistics,
     collect_residuals,
@@ -25,9 +26,10 @@ from touchline.detector.calibration import (
 from touchline.detector.tail import Tail
 from touchline.errors import InputError
 from touchline.folder import check_file
+from touchline.identify.delay import Delay, find_delays, with_delays
 from touchline.identify.described import description_changes, identified_robot
 from touchline.identify.evidence import gather
-from touchline.identify.identification import Identification, identify
+from touchline.identify.identification import Identification, identify, rms
 from touchline.model.description import CalibrationDescription, Noise, RowCalibration
 from touchline.model.robot import Robot, load_robot
 from touchline.model.robot_file import write_description
@@ -38,6 +40,10 @@ Array = NDArray[np.float64]
 
 LEAST_SECONDS = 20.0  # shorter recordings have no tail
 MOST_LEFT_OUT = 0.3  # of the time; where more seems touched nobody can tell what is usual
+SHORT = (
+    "written: the largest residual that was seen, and the tail of normal values beyond it; how "
+    "often that is exceeded only a longer recording tells"
+)
 ROUNDS = 4  # of leaving out what seems to be touched
 
 
@@ -76,7 +82,8 @@ class Calibration:
         identification: parameters of the robot; None if they were not asked for.
         left_out: recording, begin and end [s] of what seemed to be touched.
         thresholds: None where the data are too short for them.
-        lacking: why there are none.
+        lacking: why there are none, and what was taken instead.
+        delays: that were found beside it.
     """
 
     robot: Robot
@@ -90,6 +97,7 @@ class Calibration:
     left_out: list[tuple[int, float, float]]
     thresholds: Thresholds | None
     lacking: str = ""
+    delays: tuple[Delay, ...] = ()
 
     @property
     def share(self) -> float:
@@ -134,11 +142,18 @@ def calibrate(
     changes: dict[str, Any] = {}
     found: Identification | None = None
     left_out: list[tuple[int, float, float]] = []
+    delays: list[Delay] = []
     if identification:
-        found = identify(gather(model, recordings.all("equations")), trust)
+        described = model
+        evidence = gather(model, recordings.all("equations"))
+        delays = find_delays(evidence)
+        if delays:
+            model = with_delays(model, delays)
+            recordings = Recordings(model, logs)
+            evidence = gather(model, recordings.all("equations"))
+        found = identify(evidence, trust)
         left_out = found.touches()
         recordings.leave_out(left_out)
-        described = model
         model = identified_robot(found)
         changes = description_changes(described, model)
     model = with_methods(model, *chosen, min_duration=hold, calibration=None, false_alarms=rate)
@@ -153,6 +168,18 @@ def calibrate(
         if found is None or not found.problem.columns + found.problem.bodies:
             raise
         lacking = str(error)
+        if chosen == (METHOD,):
+            short = short_thresholds(
+                quiet,
+                recordings.period,
+                recordings.seconds,
+                recordings.all("residuals"),
+                _grows(found),
+            )
+            if short is not None:
+                lacking += f"\n{SHORT}"
+                changes["detection"] = {"method": list(chosen), "false_alarms": rate}
+                changes["detection"] |= {"min_duration": hold, "calibration": _plain(short)}
     if thresholds is not None:
         detection: dict[str, Any] = {"method": list(chosen), "false_alarms": rate}
         detection |= {"min_duration": hold, "calibration": _plain(thresholds.description)}
@@ -170,7 +197,16 @@ def calibrate(
         sorted(left_out),
         thresholds,
         lacking,
+        tuple(delays),
     )
+
+
+def _grows(found: Identification) -> float:
+    """How much larger residuals are on data that played no part in the fit, at least 1."""
+    used = found.evidence.used
+    whole = rms(found.left()[~found.touched])[used]
+    ratios = found.after[used] / np.maximum(whole, 1e-9)
+    return float(max(1.0, np.max(ratios, initial=1.0)))
 
 
 class NoThresholds(InputError):

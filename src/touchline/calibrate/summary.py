@@ -23,11 +23,15 @@ def summary_text(result: Calibration) -> str:
     )
     parts = [[head], _left_out_lines(result)]
     if result.identification is not None:
-        parts.append(identification_lines(result.identification))
+        late = [
+            f"  {x.name}: {1e3 * x.value:.2f} +- {1e3 * x.error:.2g} ms later than the positions"
+            for x in result.delays
+        ]
+        parts.append(identification_lines(result.identification, late))
     parts.append(_noise_lines(result))
     if result.thresholds is None:
         lines = result.lacking.splitlines()
-        parts.append(["thresholds: left as they are", *(f"  {line}" for line in lines)])
+        parts.append(["thresholds", *(f"  {line}" for line in lines)])
     else:
         parts += [_row_lines(result), _threshold_lines(result), _held_out_lines(result)]
     parts.append([f"written: {result.out}"])

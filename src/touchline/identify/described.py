@@ -92,11 +92,15 @@ def description_changes(robot: Robot, new: Robot) -> dict[str, Any]:
     joints = {a.name: _joint_changes(a, b) for a, b in pairs}
     if any(joints.values()):
         changes["joints"] = joints
-    sensors = {
-        b.name: {"bias": [b.bias[i] for i in _axes(b)]}
-        for a, b in zip(robot.description.sensors, new.description.sensors, strict=True)
-        if a.bias != b.bias
-    }
+    sensors: dict[str, dict[str, Any]] = {}
+    for a, b in zip(robot.description.sensors, new.description.sensors, strict=True):
+        changed: dict[str, Any] = (
+            {} if a.bias == b.bias else {"bias": [b.bias[i] for i in _axes(b)]}
+        )
+        if a.delay != b.delay:
+            changed["delay"] = b.delay
+        if changed:
+            sensors[b.name] = changed
     if sensors:
         changes["force_torque_sensors"] = sensors
     links = {

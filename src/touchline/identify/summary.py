@@ -18,9 +18,9 @@ WORDS = {
 SHORT = 20.0  # s; less is told to be little
 
 
-def identification_lines(found: Identification) -> list[str]:
-    """What was found and what it is worth."""
-    lines = ["identified, with 1 sigma"]
+def identification_lines(found: Identification, beside: list[str] | None = None) -> list[str]:
+    """What was found and what it is worth; `beside` are lines on what was found before it."""
+    lines = ["identified, with 1 sigma", *(beside or [])]
     lines += _column_lines(found) + _body_lines(found)
     if len(lines) == 1:
         lines.append("  nothing that foretells data held out better than the description does")

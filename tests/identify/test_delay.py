@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Delays are told apart from friction, offsets and wrong inertias."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import touchline as tl
+from touchline.check import injected
+from touchline.identify.delay import Delay, find_delays, with_delays
+from touchline.identify.evidence import gather
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return tl.load_robot("sara-full")
+
+
+@pytest.fixture(scope="module")
+def samples(robot):
+    """A minute at 200 Hz of an arm whose inertias are 1.5 % off, with friction and an offset."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(injected, "SECONDS", 60.0)
+        patch.setattr(injected, "RATE", 200.0)
+        found = injected.make_case(robot, (), np.random.default_rng(3)).samples
+    tau = found.tau + 2.0 * np.tanh(found.qd / 0.05) + 1.0 * found.qd + 0.5
+    return replace(found, tau=tau)
+
+
+def test_what_comes_in_time_has_no_delay(robot, samples):
+    assert find_delays(gather(robot, [[samples]])) == []
+
+
+def test_late_torques_are_found_to_a_fifth_of_a_millisecond(robot, samples):
+    tau = samples.tau.copy()
+    tau[1:] = samples.tau[:-1]
+    (found,) = find_delays(gather(robot, [[replace(samples, tau=tau)]]))
+    assert found.name == "torques" and abs(found.value - 0.005) < 2e-4
+    joints = with_delays(robot, [found]).description.joints
+    assert all(joint.delay == pytest.approx(found.value, abs=1e-6) for joint in joints)
+
+
+def test_a_late_sensor_is_found_by_itself(robot, samples):
+    wrench = samples.wrench.copy()
+    wrench[2:, 0] = samples.wrench[:-2, 0]
+    (found,) = find_delays(gather(robot, [[replace(samples, wrench=wrench)]]))
+    assert found.name == "base" and abs(found.value - 0.010) < 4e-4
+    base, *others = with_delays(robot, [found]).description.sensors
+    assert base.delay == pytest.approx(found.value, abs=1e-6)
+    assert all(sensor.delay == 0.0 for sensor in others)
+
+
+def test_delays_add_to_those_of_the_description(robot):
+    once = with_delays(robot, [Delay("wrist", 0.003, 1e-4)])
+    (twice,) = [
+        s
+        for s in with_delays(once, [Delay("wrist", 0.002, 1e-4)]).description.sensors
+        if s.name == "wrist"
+    ]
+    assert twice.delay == pytest.approx(0.005)
