@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -45,7 +46,7 @@ struct Pipeline {
 };
 
 // Where the parts of a snapshot stand: the observer's row with the health of the pipeline, what the
-// detector says, the sample's time and joint positions, how many contacts and changes of events
+// detector says, the faults of channels, the sample's time and joint positions, how many contacts and changes of events
 // follow.
 struct Snapshot {
   explicit Snapshot(const tl::RedundantPipeline& p)
@@ -57,13 +58,16 @@ struct Snapshot {
         drift(normalized + rows),
         quiet(drift + rows),
         watch(quiet + segments),
-        time(watch + segments),
+        faults(watch + segments),
+        ratios(faults + p.channels().count()),
+        time(ratios + p.channels().count()),
         q(time + 1),
         contacts(q + p.row_layout().joints),
         changes(contacts + 1),
         end(changes + 1) {}
   std::size_t width, segments, rows;
-  std::size_t levels, normalized, drift, quiet, watch, time, q, contacts, changes, end;
+  std::size_t levels, normalized, drift, quiet, watch, faults, ratios, time, q, contacts,
+      changes, end;
 };
 
 inline void write_row(const tl::Result& result, const tl::RowLayout& layout, double* out) {
@@ -99,6 +103,9 @@ inline void take_snapshot(Pipeline& of, const tl::Sample& sample, const tl::Resu
   std::copy(result.drift.begin(), result.drift.end(), out.data() + at.drift);
   std::copy(result.quiet.begin(), result.quiet.end(), out.data() + at.quiet);
   write_watch(result, out.data() + at.watch);
+  for (std::size_t c = 0; c < result.faults.size(); ++c)
+    out[at.faults + c] = static_cast<double>(result.faults[c]);
+  std::copy(result.ratios.begin(), result.ratios.end(), out.data() + at.ratios);
   out[at.time] = sample.time;
   std::copy_n(sample.q, at.contacts - at.q, out.data() + at.q);
   out[at.contacts] = static_cast<double>(result.contacts.size());
@@ -113,12 +120,13 @@ inline void take_snapshot(Pipeline& of, const tl::Sample& sample, const tl::Resu
   }
 }
 
-// Makes a stand-in for the sensors that a sample lacks, before the sample is taken.
-inline void prepare(Pipeline& p, const std::vector<int>& lost) {
+// Makes a stand-in for lost sensors. Takes a turn of its own unless one is `held`.
+inline void prepare(Pipeline& p, const std::vector<int>& lost, bool held) {
   if (lost.empty() || p.value->stands_in(lost)) return;
   if (std::find(p.hopeless.begin(), p.hopeless.end(), lost) != p.hopeless.end()) return;
   const nb::object made = p.build.is_none() ? nb::none() : p.build(lost);
-  const guard::Turn turn(p.turn);
+  std::optional<guard::Turn> turn;
+  if (!held) turn.emplace(p.turn);
   if (made.is_none()) {
     p.hopeless.push_back(lost);
   } else {
@@ -134,11 +142,11 @@ inline nb::object update(Pipeline& p, double time, nb::handle q, nb::handle qd, 
   const tl::Sample sample{time, arrays::numbers(q, {n}), arrays::numbers(qd, {n}),
                           arrays::numbers_or(tau, {n}, missing),
                           arrays::numbers_or(wrench, {k, 6}, missing)};
-  if (p.value->absent(sample)) prepare(p, p.value->absent_in(sample));
   std::vector<double> numbers;  // taken out of its turn: a new array may run any code of Python
   {
     const guard::Turn turn(p.turn);
-    const tl::Result result = p.value->update(sample);
+    const tl::Result result = p.value->update(
+        sample, [&p](const std::vector<int>& lost) { prepare(p, lost, true); });
     keep_ended(p, result);
     take_snapshot(p, sample, result, p.snapshot);
     numbers.swap(p.snapshot);
@@ -154,15 +162,11 @@ inline nb::tuple run(Pipeline& p, nb::handle time, nb::handle q, nb::handle qd, 
                      nb::handle wrench) {
   const samples::Many in = samples::many(p.value->row_layout(), time, q, qd, tau, wrench);
   const Snapshot at(*p.value);
-  for (std::size_t i = 0; i < in.rows; ++i) {
-    tl::Sample sample = in.first;
-    sample.wrench += 6 * i * p.value->row_layout().sensors;
-    if (p.value->absent(sample)) prepare(p, p.value->absent_in(sample));
-  }
   arrays::Out rows({in.rows, at.width}), levels({in.rows, at.segments}),
       normalized({in.rows, at.rows}), drift({in.rows, at.rows}), quiet({in.rows, at.segments}),
       watch({in.rows, at.segments});
-  std::vector<double> contacts;
+  std::vector<double> contacts, faults;
+  std::vector<tl::Fault> before(p.value->channels().count(), tl::Fault::none);
   const std::size_t contact = fields::width<tl::Contact>() + 1;
   double *level = levels.data(), *x = normalized.data(), *y = drift.data(), *since = quiet.data(),
          *watched = watch.data();
@@ -170,7 +174,11 @@ inline nb::tuple run(Pipeline& p, nb::handle time, nb::handle q, nb::handle qd, 
     const guard::Turn turn(p.turn);
     nb::gil_scoped_release release;
     std::size_t i = 0;
-    p.value->run(in.rows, in.time, in.first, rows.data(), [&](const tl::Result& result) {
+    const auto lacking = [&p](const std::vector<int>& lost) {
+      const nb::gil_scoped_acquire acquire;
+      prepare(p, lost, true);
+    };
+    const auto each = [&](const tl::Result& result) {
       level = std::copy(result.levels.begin(), result.levels.end(), level);
       x = std::copy(result.normalized.begin(), result.normalized.end(), x);
       y = std::copy(result.drift.begin(), result.drift.end(), y);
@@ -182,14 +190,22 @@ inline nb::tuple run(Pipeline& p, nb::handle time, nb::handle q, nb::handle qd, 
         *to = static_cast<double>(i);
         tl::write_numbers(c, to + 1);
       }
+      for (std::size_t c = 0; c < before.size(); ++c) {
+        if (result.faults[c] == before[c]) continue;
+        before[c] = result.faults[c];
+        faults.insert(faults.end(), {static_cast<double>(i), static_cast<double>(c),
+                                     static_cast<double>(before[c]), result.ratios[c]});
+      }
       keep_ended(p, result);
       const std::size_t health = i * at.width + p.value->row_layout().health();
       rows.data()[health] = static_cast<double>(result.health);
       ++i;
-    });
+    };
+    p.value->run(in.rows, in.time, in.first, rows.data(), each, lacking);
   }
   return nb::make_tuple(rows.release(), levels.release(), normalized.release(), drift.release(),
-                        quiet.release(), watch.release(), arrays::table(contacts, contact));
+                        quiet.release(), watch.release(), arrays::table(contacts, contact),
+                        arrays::table(faults, 4));
 }
 
 // The events that have ended, from number `from` of them on, and those that last.
@@ -248,7 +264,9 @@ inline nb::dict slices(const Pipeline& p) {
   add("normalized", at.normalized, at.drift);
   add("drift", at.drift, at.quiet);
   add("quiet", at.quiet, at.watch);
-  add("watch", at.watch, at.time);
+  add("watch", at.watch, at.faults);
+  add("faults", at.faults, at.ratios);
+  add("ratios", at.ratios, at.time);
   add("time", at.time, at.q);
   add("q", at.q, at.contacts);
   add("counts", at.contacts, at.end);
@@ -324,6 +342,7 @@ inline void bind(nb::module_& m) {
                                    std::move(segments), std::move(rows), std::move(watch)};
           },
           "lost"_a, "robot"_a, "sensors"_a, "segments"_a, "rows"_a, "watch"_a);
+  m.attr("FAULTS") = nb::make_tuple("none", "spike", "wild", "stuck", "disagrees");
   nb::exception<tl::RobotFileError>(m, "RobotFileError", PyExc_ValueError);
   m.def("read_robot", &tl::read_robot, "path"_a);
   nb::class_<Pipeline>(m, "Pipeline")
@@ -337,7 +356,8 @@ inline void bind(nb::module_& m) {
       .def("run", &run, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a)
       .def("events", &events, "since"_a)
       .def("restart", &restart, "robot"_a)
-      .def("prepare", &prepare, "lost"_a)
+      .def("prepare", [](Pipeline& p, const std::vector<int>& lost) { prepare(p, lost, false); },
+           "lost"_a)
       .def_prop_ro("lost", [](const Pipeline& p) { return p.value->lost(); })
       .def("rest", &rest)
       .def_prop_ro("time", [](const Pipeline& p) { return p.value->time(); })

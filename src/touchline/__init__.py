@@ -21,7 +21,8 @@ from touchline.pipeline.pipeline import Pipeline
 from touchline.pipeline.result import Result
 from touchline.result.contact import Candidate, Contact
 from touchline.result.event import Event, EventChange
-from touchline.result.kinds import ContactLevel, Happened, Status, Watch, Zone
+from touchline.result.fault import ChannelFault, FaultChange
+from touchline.result.kinds import ContactLevel, Fault, Happened, Status, Watch, Zone
 
 if TYPE_CHECKING:
     from touchline import live as live
@@ -39,12 +40,15 @@ __version__: str = core.VERSION
 
 __all__ = [
     "Candidate",
+    "ChannelFault",
     "Contact",
     "ContactLevel",
     "Detection",
     "Estimate",
     "Event",
     "EventChange",
+    "Fault",
+    "FaultChange",
     "Happened",
     "Health",
     "InputError",

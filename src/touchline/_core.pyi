@@ -504,6 +504,8 @@ class Watch(enum.Enum):
 class StandIn:
     def __init__(self, lost: Sequence[int], robot: Robot, sensors: Sequence[int], segments: Sequence[int], rows: Sequence[int], watch: Sequence[Watch]) -> None: ...
 
+FAULTS: tuple = ('none', 'spike', 'wild', 'stuck', 'disagrees')
+
 class RobotFileError(ValueError):
     pass
 

@@ -17,3 +17,4 @@ class Health(IntFlag):
     MODEL_LIMIT = 128  # a joint is outside its limits in the model
     PERIOD = 256  # stamps are not as far apart as the pipeline was told: thresholds do not fit
     NO_ROOM = 512  # more events at a time than there is room for: the oldest was ended
+    FAULTY = 1024  # a channel is not believed: `Result.faults` names it

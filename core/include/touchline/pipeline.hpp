@@ -198,7 +198,9 @@ class Pipeline {
             view(detector_.quiet()),
             view(watch_),
             {contacts_.data(), count_},
-            view(recorder_.changes())};
+            view(recorder_.changes()),
+            {},
+            {}};
   }
 
   template <class T>

@@ -4,6 +4,9 @@
 // both sides of the lost sensor are one, and joint torques step in. What is said is put into the
 // words of the whole robot. One belongs to one thread at a time; `update` allocates nothing.
 //
+// Before anything is estimated, each channel is judged (detail/gates): a faulty one is held or left
+// out, told in `Result::faults`, and has no part in what is estimated.
+//
 // A stand-in is warmed up from the first sample without the sensor on, and speaks as soon as it has
 // settled, 5 / K later; the whole robot speaks again 5 / K after the sensor is back. What loads the
 // arm at that moment counts as it does at any start of observation. Events that last end with the
@@ -18,6 +21,7 @@
 #include <utility>
 #include <vector>
 
+#include "touchline/detail/gates/channel_gates.hpp"
 #include "touchline/pipeline.hpp"
 
 namespace touchline {
@@ -35,10 +39,11 @@ struct StandIn {
 class RedundantPipeline {
  public:
   explicit RedundantPipeline(Robot robot, const Tuning& tuning = {})
-      : whole_(std::move(robot), tuning) {
+      : whole_(std::move(robot), tuning), gates_(whole_.robot()) {
     const Robot& own = whole_.robot();
     const std::size_t n = own.joints.size(), k = own.sensors.size();
     absent_.resize(k, 0);
+    lost_.reserve(k);
     row_.resize(whole_.row_layout().width());
     levels_.resize(own.segment_names.size());
     quiet_.resize(levels_.size());
@@ -48,6 +53,8 @@ class RedundantPipeline {
     changes_.reserve(8 * levels_.size() * (Reports::kMost + 1));
     renumbered_.reserve(changes_.capacity());
     joints_ = n;
+    sound_.resize(gates_.layout().count(), Fault::none);
+    ratios_.resize(kAhead * sound_.size());
   }
 
   // Allocates. Throws std::invalid_argument where it does not fit the robot.
@@ -55,51 +62,64 @@ class RedundantPipeline {
     check(given);
     stand_ins_.push_back(std::make_unique<Second>(std::move(given), tuning(), absent_.size()));
   }
-  // Which sensors lack a usable reading in a sample; is there a stand-in without just these?
-  std::vector<int> absent_in(const Sample& sample) const {
-    std::vector<int> found;
-    for (std::size_t s = 0; s < absent_.size(); ++s) {
-      if (absent(sample, s)) found.push_back(static_cast<int>(s));
-    }
-    return found;
-  }
   bool stands_in(const std::vector<int>& lost) const {
     return std::any_of(stand_ins_.begin(), stand_ins_.end(),
                        [&](const auto& second) { return second->given.lost == lost; });
   }
-  bool absent(const Sample& sample) const {
-    for (std::size_t s = 0; s < absent_.size(); ++s) {
-      if (absent(sample, s)) return true;
-    }
-    return false;
-  }
-
   const RowLayout& row_layout() const { return whole_.row_layout(); }
   const Robot& robot() const { return whole_.robot(); }
 
+  const ChannelLayout& channels() const { return gates_.layout(); }
+
   // Takes one sample; see `Pipeline::update`.
   Result update(const Sample& sample) {
-    find_absent(sample);
-    return healthy() ? whole_.update(sample) : step(sample);
+    return update(sample, [](const std::vector<int>&) {});
+  }
+  // The same. Calls `lacking(sensors)` where these are without a usable reading and nothing stands
+  // in for just them: it may `add` that.
+  template <class Lacking>
+  Result update(const Sample& sample, Lacking&& lacking) {
+    const Sample believed = gates_.judge(sample);
+    return take(believed, lacking);
   }
 
   // Takes N samples; see `Pipeline::run`. The bits are those of `update`.
   template <class Each>
   void run(std::size_t samples, const double* time, const Sample& first, double* rows, Each&& each) {
+    run(samples, time, first, rows, each, [](const std::vector<int>&) {});
+  }
+  template <class Each, class Lacking>
+  void run(std::size_t samples, const double* time, const Sample& first, double* rows, Each&& each,
+           Lacking&& lacking) {
     const std::size_t n = joints_, w = 6 * absent_.size(), width = row_.size();
     const auto at = [&](std::size_t i) {
       return Sample{time[i], first.q + i * n, first.qd + i * n, first.tau + i * n,
                     first.wrench + i * w};
     };
     for (std::size_t i = 0; i < samples;) {
-      std::size_t end = i;  // of the samples with all sensors from here on
-      while (healthy() && end < samples && !absent(at(end))) ++end;
-      if (end > i) {
-        whole_.run(end - i, time + i, at(i), rows + i * width, each);
-        i = end;
-        continue;
+      std::size_t end = i;  // of the samples from here on of which all is believed
+      bool judged = false;  // is `believed` what is left of sample `end`?
+      Sample believed{};
+      while (!judged && healthy() && end < samples && end - i < kAhead) {
+        believed = gates_.judge(at(end));
+        find_absent(believed);
+        judged = any_absent_ || !gates_.all_sound();
+        if (judged) break;
+        std::copy(gates_.ratios().begin(), gates_.ratios().end(),
+                  ratios_.begin() + (end - i) * sound_.size());
+        ++end;
       }
-      const Result result = update(at(i));
+      if (end > i) {
+        const double* ratios = ratios_.data();
+        whole_.run(end - i, time + i, at(i), rows + i * width, [&](const Result& result) {
+          each(with_faults(result, sound_, ratios));
+          ratios += sound_.size();
+        });
+        i = end;
+        if (!judged) continue;
+      }
+      if (!judged) believed = gates_.judge(at(i));
+      const Result result = take(believed, lacking);
       std::copy(result.estimate.row().begin(), result.estimate.row().end(), rows + i * width);
       each(result);
       ++i;
@@ -132,6 +152,30 @@ class RedundantPipeline {
   std::size_t rows() const { return whole_.rows(); }
 
  private:
+  static constexpr std::size_t kAhead = 64;  // samples that are judged before they are taken
+
+  // A sample of which `believed` is left.
+  template <class Lacking>
+  Result take(const Sample& believed, Lacking& lacking) {
+    find_absent(believed);
+    if (any_absent_) {
+      lost_.clear();
+      for (std::size_t s = 0; s < absent_.size(); ++s)
+        if (absent_[s] != 0) lost_.push_back(static_cast<int>(s));
+      if (!stands_in(lost_)) lacking(lost_);
+    }
+    const Result result = healthy() ? whole_.update(believed) : step(believed);
+    return with_faults(result, gates_.faults(), gates_.ratios().data());
+  }
+
+  Result with_faults(Result result, const std::vector<Fault>& faults, const double* ratios) const {
+    const bool faulty = &faults != &sound_ && !gates_.all_sound();
+    if (faulty) result.health |= kFaulty;
+    result.faults = {faults.data(), faults.size()};
+    result.ratios = {ratios, faults.size()};
+    return result;
+  }
+
   // An event under another number than the one its pipeline gave it.
   struct Renumbered {
     const Pipeline* of;
@@ -365,13 +409,16 @@ class RedundantPipeline {
   }
 
   Pipeline whole_;
+  ChannelGates gates_;
+  std::vector<Fault> sound_;    // of channels that are all believed
+  std::vector<double> ratios_;  // (kAhead, channels)
   std::vector<std::unique_ptr<Second>> stand_ins_;
   Second *now_ = nullptr, *warming_ = nullptr;  // who speaks, if not the whole; who shall
   bool any_absent_ = false;
   std::size_t joints_ = 0;
   std::vector<char> absent_;  // per sensor, at the last sample
   std::vector<double> row_, quiet_, normalized_, drift_;
-  std::vector<int> levels_, none_;
+  std::vector<int> levels_, none_, lost_;
   std::vector<Contact> contacts_;
   std::vector<EventChange> changes_;
   std::vector<Renumbered> renumbered_;

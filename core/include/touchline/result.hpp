@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <limits>
 
+#include "touchline/detail/gates/fault.hpp"
 #include "touchline/detail/observer/health.hpp"
 #include "touchline/detail/observer/row.hpp"
 #include "touchline/detail/place/answer.hpp"
@@ -18,6 +19,7 @@ namespace touchline {
 // Health bits of the pipeline, besides those of the observer (detail/observer/health.hpp).
 constexpr Health kPeriodDiffers = 256;  // stamps are not as far apart as the noise figures are for
 constexpr Health kNoRoom = 512;         // more events at a time than there is room for: one was ended
+constexpr Health kFaulty = 1024;        // a channel is not believed: `Result::faults`
 
 // A view of numbers that belong to someone else.
 template <class T>
@@ -159,6 +161,8 @@ struct Result {
   Span<Watch> watch;        // per segment
   Span<Contact> contacts;   // at least one per segment that is touched
   Span<EventChange> events;
+  Span<Fault> faults;       // per channel, as `ChannelLayout`; none where nothing was judged
+  Span<double> ratios;      // per channel: its last step over what is believed at once
 };
 
 // --- the fields, each told once ---

@@ -28,6 +28,7 @@ from touchline.pipeline.result import Layout, Result
 from touchline.pipeline.stand_ins import stand_in
 from touchline.pipeline.table import ContactTable
 from touchline.result.event import Event
+from touchline.result.fault import FaultChange, changes_of, channel_names
 from touchline.result.native import Names
 from touchline.suggest import unknown
 
@@ -80,6 +81,7 @@ class Pipeline:
         contacts: of the last `run`, a row for each contact and sample.
         watch: (N, m) of the last `run`: can a touch of each segment be felt (`tl.Watch`, by number:
             0 watched, 1 degraded, 2 blind)?
+        faults: of channels, that began, changed or ended in the last `run`.
 
     Raises:
         ValueError: an option is not among those allowed, or the surfaces are another robot's.
@@ -130,9 +132,11 @@ class Pipeline:
             [patch.body for patch in self.skin.patches],
         )
         slices = {name: slice(*ends) for name, ends in self._observer.kernel.slices.items()}
-        self._layout = Layout(self._core, slices, names)
+        self._channels = channel_names(robot.joint_names, robot.sensor_names)
+        self._layout = Layout(self._core, slices, names, self._channels)
         self.contacts = ContactTable.empty(names)
         self.watch = np.empty((0, len(robot.segment_names)), np.int8)
+        self.faults: tuple[FaultChange, ...] = ()
         self._ended: list[Event] = []
         self._loads: dict[str, Load] = {}  # by link, of `set_load`
 
@@ -181,10 +185,12 @@ class Pipeline:
             ValueError: for a wrong shape.
         """
         stamps, signals = self._observer.recording(time, q, qd, tau, wrench)
-        rows, levels, normalized, drift, quiet, watch, contacts = self._core.run(stamps, *signals)
+        numbers = self._core.run(stamps, *signals)
+        rows, levels, normalized, drift, quiet, watch, contacts, faults = numbers
         sample = contacts[:, 0].astype(np.int64)
         self.contacts = ContactTable(sample, contacts[:, 1:], self._layout.names)
         self.watch = watch.astype(np.int8)
+        self.faults = changes_of(faults, self._channels)
         detection = Detection(levels, normalized, drift, quiet)
         return Estimate(rows, self._layout.estimate), detection
 

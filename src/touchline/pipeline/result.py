@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What one sample brought."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from touchline.native import core
 from touchline.observer.observer import Estimate
 from touchline.result.contact import Contact
 from touchline.result.event import Event, EventChange
+from touchline.result.fault import ChannelFault, faults_of
 from touchline.result.kinds import Happened, Watch
 from touchline.result.native import Names
 from touchline.value import Value, lazily
@@ -28,16 +29,25 @@ class Layout:
         native: whose snapshots they are.
         estimate: slices of the observer's row.
         names: of the robot.
+        channels: names of its channels.
     """
 
-    def __init__(self, native: core.Pipeline, estimate: dict[str, slice], names: Names) -> None:
+    def __init__(
+        self,
+        native: core.Pipeline,
+        estimate: dict[str, slice],
+        names: Names,
+        channels: tuple[str, ...],
+    ) -> None:
         slices = {name: slice(*ends) for name, ends in native.slices.items()}
-        self.estimate, self.names = estimate, names
+        self.estimate, self.names, self.channels = estimate, names, channels
         self.row, self.levels = slices["row"], slices["levels"]
         self.normalized, self.drift, self.quiet = (
             slices[name] for name in ("normalized", "drift", "quiet")
         )
-        self.watch = slices["watch"]
+        self.watch, self.faults, self.ratios = (
+            slices[name] for name in ("watch", "faults", "ratios")
+        )
         self.time, self.q = slices["time"].start, slices["q"]
         self.health = estimate["health"].start
         self.contacts, self.changes = slices["counts"].start, slices["counts"].start + 1
@@ -58,6 +68,9 @@ class Result(Value):
         health: health bits of the sample (`touchline.Health`).
         events: those that began, changed or ended with this sample.
         watch: of each segment: can a touch of it be felt?
+        faults: channels that are not believed.
+        ratios: (channels,) of each one's last step over what is believed at once, in the order
+            q, qd, tau of all joints, six axes of each sensor.
     """
 
     time: float
@@ -68,6 +81,8 @@ class Result(Value):
     health: int
     events: tuple[EventChange, ...] = ()
     watch: tuple[Watch, ...] = ()
+    faults: tuple[ChannelFault, ...] = ()
+    ratios: Array = field(default_factory=lambda: np.empty(0))
 
 
 def _time(row: Array, at: Layout) -> float:
@@ -113,9 +128,19 @@ def _watch(row: Array, at: Layout) -> tuple[Watch, ...]:
     return tuple(WATCH[int(state)] for state in row[at.watch].tolist())
 
 
+def _faults(row: Array, at: Layout) -> tuple[ChannelFault, ...]:
+    return faults_of(row[at.faults], row[at.ratios], at.channels)
+
+
+def _ratios(row: Array, at: Layout) -> Array:
+    return row[at.ratios]
+
+
 lazily(
     Result,
     {
+        "faults": _faults,
+        "ratios": _ratios,
         "watch": _watch,
         "time": _time,
         "q": _q,

@@ -23,6 +23,7 @@ HEALTH_MEANING = {
     Health.SATURATED: "a reading is at the end of its range",
     Health.SENSOR_EXCLUDED: "a sensor has been absent for longer than a gap",
     Health.MODEL_LIMIT: "a joint is outside its limits in the model",
+    Health.FAULTY: "a channel reports what cannot be; it is held or left out",
 }
 
 

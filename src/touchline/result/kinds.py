@@ -42,3 +42,13 @@ class Watch(StrEnum):
     WATCHED = "watched"
     DEGRADED = "degraded"  # with fewer signals than the robot has
     BLIND = "blind"  # not at all: settling, or nothing that feels it is left
+
+
+class Fault(StrEnum):
+    """What is wrong with a channel; but for a spike it is left out, as if it were missing."""
+
+    NONE = "none"
+    SPIKE = "spike"  # far from the samples before: the last good reading stands for it
+    WILD = "wild"  # such jumps that go on
+    STUCK = "stuck"  # the same value again and again while the arm moves
+    DISAGREES = "disagrees"  # position or velocity: one is not the derivative of the other

@@ -1,0 +1,487 @@
+// SPDX-License-Identifier: Apache-2.0
+// Is what a channel reports possible? Judges each channel of a sample against its own past, before
+// anything is estimated from it. What cannot be is held for a few samples, then left out as NaN.
+//
+// A jump of one channel: no contact moves one channel alone. What a force does to one axis of a
+// sensor, it does to others too, to the sensors and joints inboard, or to the speed. So a jump
+// counts as a fault only where nothing else in the sample bears it out; if the new level then
+// stays and lives (its last digits move), it is taken after all, a few samples late.
+//
+// A stuck channel: how often it changes from sample to sample while the arm moves is learned, and
+// so is for how long it keeps a value; logs that repeat samples repeat all of them, which counts
+// for nothing.
+//
+// A velocity is the derivative of its position: what positions and velocities differ by, over some
+// samples, is compared with what they have differed by so far.
+//
+// Limits follow from what this arm has shown, and from physics where it has shown nothing yet.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include "touchline/detail/gates/fault.hpp"
+#include "touchline/detail/observer/layout.hpp"
+#include "touchline/robot.hpp"
+#include "touchline/sample.hpp"
+
+namespace touchline {
+
+class ChannelGates {
+ public:
+  // Of a robot whose parts fit.
+  explicit ChannelGates(const Robot& robot)
+      : at_{robot.joints.size(), robot.sensors.size()},
+        period_(std::max(robot.noise.period, kShortest)),
+        floor_(at_.count(), std::numeric_limits<double>::infinity()),
+        wraps_(at_.joints, 0),
+        now_(at_.count()),
+        last_(at_.count(), kNever),
+        out_(at_.count()),
+        candidate_(at_.count()),
+        mean_(at_.count()),
+        step_(at_.count()),
+        ratio_(at_.count()),
+        often_(at_.count()),
+        evidence_(at_.count()),
+        run_(at_.count()),
+        longest_(at_.count()),
+        drift_(at_.joints),
+        usual_drift_(at_.joints),
+        anchor_(at_.joints),
+        far_(at_.joints),
+        since_(at_.count()),
+        calm_(at_.count()),
+        fault_(at_.count(), Fault::none) {
+    set_floors(robot);
+    memory_ = std::min(1.0, period_ / kMemory);
+    warm_up_ = samples(kWarmUp, kLeastSeen);
+    held_most_ = std::min(samples(kHeld, kSure + 1), kHeldMost);
+    silent_ = samples(kSilent, kLeastSilent);
+    return_ = samples(kReturn, kGood);
+    dwell_ = samples(kDwell, kLeastDwell);
+    kept_ = std::exp(-period_ / std::max(kWindow, kWindowSamples * period_));
+  }
+
+  const ChannelLayout& layout() const { return at_; }
+
+  // The sample to go on with: `sample` itself as long as all channels are believed, else one that
+  // stays valid until the next call.
+  Sample judge(const Sample& sample) {
+    const double dt = sample.time - time_;
+    if (!(dt > 0.0)) return refused(sample);
+    refusals_ = 0;
+    time_ = sample.time;
+    gather(sample);
+    const bool gap = !(dt < kGapPeriods * period_);
+    if (!measure(dt) || !all_sound_ || gap) settle(dt, gap);
+    learn();
+    if (!gap) compare_speeds(dt);
+    if (moving()) count_changes(dt);
+    std::copy(now_.begin(), now_.end(), last_.begin());
+    return all_sound_ ? sample : believed(sample.time);
+  }
+
+  bool all_sound() const { return all_sound_; }
+  // Per channel; ratio: of its last step over what is believed at once.
+  const std::vector<Fault>& faults() const { return fault_; }
+  const std::vector<double>& ratios() const { return ratio_; }
+
+ private:
+  static constexpr double kNever = std::numeric_limits<double>::quiet_NaN();
+  static constexpr double kShortest = 1e-6;    // [s] of a period
+  static constexpr double kGapPeriods = 5.0;   // a longer step in time is no step of a channel
+  static constexpr int kPatience = 16;         // stamps that do not advance before a new beginning
+  static constexpr double kMemory = 1.0;       // [s] over which steps are averaged
+  static constexpr double kWarmUp = 0.05;      // [s] of samples before a channel is judged,
+  static constexpr int kLeastSeen = 20;        // and so many samples
+
+  // A step this many times the mean one is a jump, this many times one that moves at all. Of white
+  // noise, 20 means are 16 sigmas of a step and 6 are 4.8, which one step in a million passes.
+  static constexpr double kJump = 20.0, kMoves = 6.0;
+  static constexpr double kFastest = 10.0;      // [rad/s, m/s] no joint moves faster
+  static constexpr double kLeastTravel = 0.01;  // [rad, m] that gravity hardly notices
+  static constexpr double kSpeedStep = 0.1;     // [rad/s, m/s] of one sample,
+  static constexpr double kHardest = 50.0;      // and [rad/s2, m/s2] times its period
+  static constexpr double kLeastForce = 1.0, kLeastTorque = 0.2;  // [N, Nm] no contact is less
+  static constexpr double kBorneOut = 0.3;      // of a step of speed that positions show
+  static constexpr double kReach = 2.0;         // [m] farther from a sensor no link is
+  static constexpr double kPitch = 0.2;         // of one force: its moment along it, as a part
+  static constexpr double kHeld = 0.01;         // [s] for which a reading is held, at most,
+  static constexpr int kHeldMost = 5;           // and so many samples
+  static constexpr int kSure = 3;               // samples at a new level that make it one
+  static constexpr int kGood = 10;              // steps that bring a wild channel back
+  static constexpr double kReturn = 1.0;        // [s] and a position that is elsewhere for good
+
+  static constexpr double kMoving = 0.02;     // [rad/s, m/s] of any joint: the arm moves
+  static constexpr double kSilent = 0.02;     // [s] without a change before a channel is stuck,
+  static constexpr int kLeastSilent = 5;      // and so many samples
+  static constexpr double kEvidence = 40.0;   // [nats] against chance
+  static constexpr double kRuns = 3.0;        // times the longest run that the channel has shown
+  static constexpr double kRunMemory = 20.0;  // [s] over which that is forgotten
+  static constexpr double kLively = 0.5;      // of samples with a change: not the same twice
+  static constexpr int kChanges = 3;          // of value that bring a stuck channel back
+
+  static constexpr double kWindow = 0.01;         // [s] over which speeds are compared,
+  static constexpr double kWindowSamples = 3.0;   // and so many samples
+  static constexpr double kSpeedError = 0.1;      // [rad/s, m/s] that a speed may be wrong by
+  static constexpr double kDisagrees = 10.0;      // times the mean difference
+  static constexpr double kDwell = 0.01;          // [s] for which it lasts,
+  static constexpr int kLeastDwell = 3;           // and so many samples
+
+  int samples(double seconds, int least) const {
+    return std::max(least, static_cast<int>(std::lround(std::min(seconds / period_, 1e6))));
+  }
+
+  // A step that the filters make less of than the threshold of a contact can begin no event.
+  void set_floors(const Robot& robot) {
+    const auto share = [this](double bandwidth) { return 1.0 - std::exp(-bandwidth * period_); };
+    std::vector<double> contact(at_.count(), 0.0);
+    const Tree tree(robot.nodes, robot.gravity);
+    const Layout layout(tree, robot.joints, robot.sensors);
+    for (const DetectionRow& row : robot.rows) {
+      const int sensor = layout.segments[row.segment].sensor;
+      if (row.joint >= 0) contact[at_.tau() + row.joint] = row.contact;
+      if (row.component >= 0 && sensor >= 0)
+        contact[at_.wrench() + 6 * sensor + row.component] = row.contact;
+    }
+    for (std::size_t j = 0; j < at_.joints; ++j) {
+      const JointRow& joint = robot.joints[j];
+      floor_[at_.q() + j] = std::max(kLeastTravel, kFastest * period_);
+      floor_[at_.qd() + j] = kSpeedStep + kHardest * period_;
+      wraps_[j] = robot.nodes[joint.nodes[0]].kind == NodeKind::revolute;
+      const double least = std::max(contact[at_.tau() + j], kLeastTorque);
+      if (joint.measured())
+        floor_[at_.tau() + j] = least / share(joint.bandwidth) / std::fabs(joint.gain);
+    }
+    for (std::size_t c = at_.wrench(); c < at_.count(); c += 3) {  // axes of the log may be turned
+      const SensorRow& sensor = robot.sensors[(c - at_.wrench()) / 6];
+      const std::size_t axis = (c - at_.wrench()) % 6;
+      const double least = *std::max_element(contact.begin() + c, contact.begin() + c + 3);
+      for (int i = 0; i < 3; ++i) {
+        if (sensor.axes[axis + i])
+          floor_[c + i] = std::max(least, axis == 0 ? kLeastForce : kLeastTorque) /
+                          share(sensor.bandwidth);
+      }
+    }
+  }
+
+  bool watched(std::size_t c) const { return floor_[c] < std::numeric_limits<double>::infinity(); }
+
+  void gather(const Sample& sample) {
+    const std::size_t n = at_.joints;
+    std::copy_n(sample.q, n, now_.data() + at_.q());
+    std::copy_n(sample.qd, n, now_.data() + at_.qd());
+    std::copy_n(sample.tau, n, now_.data() + at_.tau());
+    std::copy_n(sample.wrench, 6 * at_.sensors, now_.data() + at_.wrench());
+  }
+
+  // A stamp that does not advance: the observer refuses the sample, and nothing is learned from
+  // it, unless the clock was set back.
+  Sample refused(const Sample& sample) {
+    const bool first = time_ != time_ && std::isfinite(sample.time);
+    if (first || ++refusals_ > kPatience) {
+      time_ = sample.time;
+      refusals_ = 0;
+      gather(sample);
+      last_ = now_;
+      for (std::size_t c = 0; c < at_.count(); ++c) take(c);
+      all_sound_ = true;
+    }
+    return all_sound_ ? sample : believed(sample.time);
+  }
+
+  // The step of each channel and its ratio; returns whether all are usual.
+  bool measure(double dt) {
+    const std::size_t n = at_.joints, count = at_.count();
+    const double* __restrict now = now_.data();
+    const double* __restrict last = last_.data();
+    const double* __restrict mean = mean_.data();
+    const double* __restrict floor = floor_.data();
+    double* __restrict step = step_.data();
+    double* __restrict ratio = ratio_.data();
+    for (std::size_t c = n; c < count; ++c) step[c] = std::fabs(now[c] - last[c]);
+    for (std::size_t j = 0; j < n; ++j)
+      step[j] = std::fabs(now[j] - last[j] - 0.5 * dt * (now[n + j] + last[n + j]));
+    double worst = 0.0;
+    for (std::size_t c = 0; c < count; ++c) {
+      const double usual = kJump * mean[c];
+      ratio[c] = step[c] / (usual > floor[c] ? usual : floor[c]);
+      worst = ratio[c] > worst ? ratio[c] : worst;
+    }
+    return worst <= 1.0;
+  }
+
+  // Not a usual sample: who is believed? Leaves in `now_` the readings to go on with, and in
+  // `step_` those steps that something can be learned from.
+  void settle(double dt, bool gap) {
+    for (std::size_t c = 0; c < at_.count(); ++c) {
+      const bool jumps = ratio_[c] > 1.0 && !gap;
+      if (watched(c) && (jumps || fault_[c] != Fault::none) && seen_ >= warm_up_) judge(c, dt);
+      if (gap || fault_[c] != Fault::none) step_[c] = kNever;
+      else if (jumps && seen_ >= warm_up_) step_[c] = gate(c);
+    }
+    if (gap) std::fill(drift_.begin(), drift_.end(), 0.0);
+    find_all_sound();
+  }
+
+  void find_all_sound() {
+    all_sound_ = std::all_of(fault_.begin(), fault_.end(), [](Fault f) { return f == Fault::none; });
+  }
+
+  double gate(std::size_t c) const { return std::max(floor_[c], kJump * mean_[c]); }
+
+  void judge(std::size_t c, double dt) {
+    const double x = now_[c];
+    switch (fault_[c]) {
+      case Fault::none:
+        if (!std::isfinite(x)) return;
+        if (c < at_.qd() && wraps(c, dt)) {
+          last_[c] += kTurn * std::round((x - last_[c]) / kTurn);
+          return;
+        }
+        if (borne_out(c, dt)) return;
+        fault_[c] = Fault::spike;
+        since_[c] = calm_[c] = 0;
+        hold(c, dt);
+        return;
+      case Fault::spike: return go_on_holding(c, dt);
+      case Fault::wild: return wait_for_calm(c, dt);
+      case Fault::stuck:
+        if (step_[c] > 0.0 && ++since_[c] >= kChanges) take(c);
+        return;
+      case Fault::disagrees: return;  // see `compare_speeds`
+    }
+  }
+
+  void go_on_holding(std::size_t c, double dt) {
+    const double x = now_[c];
+    if (!std::isfinite(x) || ratio_[c] <= 1.0) return take(c);  // a missing one is told as such
+    const bool stays = std::fabs(x - candidate_[c]) <= gate(c);
+    calm_[c] = stays && lives(c, candidate_[c]) ? calm_[c] + 1 : 0;
+    if (calm_[c] >= kSure && c >= at_.tau()) return take(c);  // a step that lasts
+    if (c >= at_.qd() && c < at_.tau() && borne_out(c, dt)) return take(c);
+    if (++since_[c] < held_most_) return hold(c, dt);
+    fault_[c] = stays && c >= at_.tau() ? Fault::stuck : Fault::wild;
+    since_[c] = 0;
+    if (c < at_.tau()) drift_[c % at_.joints] = 0.0;
+    if (c < at_.qd()) anchor_[c] = last_[c];
+    last_[c] = x;
+  }
+
+  // A wild channel comes back after some usual steps; a position after the way that its joint has
+  // come by its speed, or for good as another one.
+  void wait_for_calm(std::size_t c, double dt) {
+    const bool calm = ratio_[c] <= 1.0 && lives(c, last_[c]);
+    if (c < at_.qd()) {
+      anchor_[c] += dt * now_[at_.qd() + c];
+      if (std::fabs(now_[c] - anchor_[c]) <= gate(c)) return take(c);
+      since_[c] = calm ? since_[c] + 1 : 0;
+      if (since_[c] >= return_) take(c);
+      return;
+    }
+    if (!calm && c < at_.tau()) drift_[c - at_.qd()] = 0.0;
+    since_[c] = calm && (c >= at_.tau() || !far(c - at_.qd())) ? since_[c] + 1 : 0;
+    if (since_[c] >= kGood) take(c);
+  }
+
+  bool lives(std::size_t c, double before) const {
+    return now_[c] != before || often_[c] < kLively;
+  }
+
+  // The reading counts again.
+  void take(std::size_t c) {
+    fault_[c] = Fault::none;
+    since_[c] = 0;
+    evidence_[c] = run_[c] = 0.0;
+    if (c < at_.tau()) drift_[c % at_.joints] = 0.0;
+  }
+
+  // The last good reading stands for this one; a joint is where its speed has brought it.
+  void hold(std::size_t c, double dt) {
+    candidate_[c] = now_[c];
+    now_[c] = c < at_.qd() ? last_[c] + dt * last_[at_.qd() + c] : last_[c];
+  }
+
+  // Does anything else in this sample bear out the jump of a channel?
+  bool borne_out(std::size_t c, double dt) const {
+    if (c < at_.qd()) return false;
+    if (c < at_.tau()) return speed_borne_out(c - at_.qd(), dt);
+    const std::size_t first = at_.wrench(), sensor = c < first ? 0 : (c - first) / 6;
+    for (std::size_t other = at_.qd(); other < at_.count(); ++other) {
+      const bool same = c == other || (c >= first && other >= first && (other - first) / 6 == sensor);
+      if (!same && moves(other)) return true;
+    }
+    return c >= first && one_force(sensor);
+  }
+
+  // Has a position gone on after a whole turn?
+  bool wraps(std::size_t j, double dt) const {
+    const double way = now_[j] - last_[j];
+    return wraps_[j] && std::fabs(way - kTurn * std::round(way / kTurn) -
+                                  dt * last_[at_.qd() + j]) <= gate(j);
+  }
+  static constexpr double kTurn = 6.283185307179586;  // [rad]
+
+  bool moves(std::size_t c) const {
+    return watched(c) && fault_[c] == Fault::none && step_[c] > kMoves * mean_[c] + kLeastMove;
+  }
+  static constexpr double kLeastMove = 1e-9;  // of any unit: rounding
+
+  // A step of speed shows in the way since the last sample, unless positions are too rough.
+  bool speed_borne_out(std::size_t j, double dt) const {
+    const double before = last_[at_.qd() + j], jump = std::fabs(now_[at_.qd() + j] - before);
+    const double shown = std::fabs((now_[j] - last_[j]) / dt - before);
+    return !(shown + kMoves * mean_[j] / dt < kBorneOut * jump);
+  }
+
+  // Is the step of a sensor that of one force on a link: no moment along it, none beyond reach,
+  // and not along one axis alone?
+  bool one_force(std::size_t sensor) const {
+    const std::size_t first = at_.wrench() + 6 * sensor;
+    double d[6];
+    int moving = 0;
+    for (int i = 0; i < 6; ++i) {
+      if (!watched(first + i)) return false;
+      d[i] = now_[first + i] - last_[first + i];
+      moving += moves(first + i) ? 1 : 0;
+    }
+    const double force = std::hypot(d[0], d[1], d[2]), moment = std::hypot(d[3], d[4], d[5]);
+    const double along = std::fabs(d[0] * d[3] + d[1] * d[4] + d[2] * d[5]);
+    return moving >= 3 && moment <= kReach * force && along <= kPitch * force * moment;
+  }
+
+  // What this sample teaches of the steps of each channel.
+  void learn() {
+    rate_ = std::max(memory_, 1.0 / (seen_ + 1.0));
+    seen_ += seen_ < kSeenMost ? 1 : 0;
+    double* __restrict mean = mean_.data();
+    const double* __restrict step = step_.data();
+    for (std::size_t c = 0; c < mean_.size(); ++c) {
+      const double off = step[c] - mean[c];
+      mean[c] += off == off ? rate_ * off : 0.0;
+    }
+  }
+  static constexpr int kSeenMost = 1 << 20;  // samples: the mean has forgotten them long ago
+
+  // By how much the way of each joint differs from its speed, over some samples.
+  void compare_speeds(double dt) {
+    const std::size_t n = at_.joints;
+    const double* __restrict now = now_.data();
+    const double* __restrict last = last_.data();
+    double* __restrict drift = drift_.data();
+    double* __restrict usual = usual_drift_.data();
+    const double least = least_drift();
+    double worst = 0.0;
+    for (std::size_t j = 0; j < n; ++j) {
+      const double off = now[j] - last[j] - 0.5 * dt * (now[n + j] + last[n + j]);
+      const double sum = kept_ * drift[j] + off, size = std::fabs(sum);
+      drift[j] = sum == sum ? sum : 0.0;
+      const double most = kDisagrees * usual[j] > least ? kDisagrees * usual[j] : least;
+      const double clipped = size < most ? size : most;
+      usual[j] += rate_ * (clipped - usual[j]);
+      const double over = size / most;
+      worst = over > worst ? over : worst;
+    }
+    if (worst > 1.0 || any_far_) judge_speeds();
+  }
+  double least_drift() const { return kSpeedError * std::max(kWindow, kWindowSamples * period_); }
+  bool far(std::size_t j) const {
+    return std::fabs(drift_[j]) > std::max(kDisagrees * usual_drift_[j], least_drift());
+  }
+
+  void judge_speeds() {
+    any_far_ = false;
+    for (std::size_t j = 0; j < at_.joints; ++j) {
+      Fault &position = fault_[j], &speed = fault_[at_.qd() + j];
+      const bool told = speed == Fault::disagrees;
+      if (told) {
+        far_[j] = far(j) ? dwell_ : far_[j] - 1;
+        if (far_[j] <= 0) take(j), take(at_.qd() + j);
+      } else {
+        far_[j] = far(j) ? far_[j] + 1 : 0;
+        const bool free = position == Fault::none && speed == Fault::none;
+        if (far_[j] >= dwell_ && free && seen_ > warm_up_) position = speed = Fault::disagrees;
+      }
+      any_far_ = any_far_ || far_[j] > 0;
+    }
+    find_all_sound();
+  }
+
+  bool moving() const {
+    double speed = 0.0;
+    const double* __restrict qd = now_.data() + at_.qd();
+    for (std::size_t j = 0; j < at_.joints; ++j) {
+      const double v = std::fabs(qd[j]);
+      speed = v > speed ? v : speed;
+    }
+    return speed > kMoving;
+  }
+
+  // How often torques and wrenches change, and since when one has not.
+  void count_changes(double dt) {
+    const std::size_t first = at_.tau(), count = at_.count();
+    const double* __restrict now = now_.data();
+    const double* __restrict last = last_.data();
+    double* __restrict often = often_.data();
+    double* __restrict evidence = evidence_.data();
+    double* __restrict run = run_.data();
+    double* __restrict longest = longest_.data();
+    double changes = 0.0, most = 0.0;
+    for (std::size_t c = 0; c < count; ++c) changes += std::fabs(now[c] - last[c]) > 0.0 ? 1.0 : 0.0;
+    if (changes == 0.0) return;  // a sample that was held or came twice
+    const double kept = 1.0 - std::min(1.0, dt / kRunMemory);
+    const double silent = silent_, rate = rate_;
+    for (std::size_t c = first; c < count; ++c) {
+      const double d = std::fabs(now[c] - last[c]);
+      const double p = often[c], p2 = p * p, p8 = p2 * p2 * p2 * p2;
+      const double before = longest[c] * kept;
+      longest[c] = d > 0.0 && run[c] > before ? run[c] : before;
+      run[c] = d == 0.0 ? run[c] + 1.0 : 0.0;
+      evidence[c] = d == 0.0 ? evidence[c] + p + p2 + 2.0 * p8 : 0.0;  // about -log(1 - p) each
+      const double off = (d > 0.0 ? 1.0 : 0.0) - p;
+      often[c] += d == d && run[c] < silent ? rate * off : 0.0;
+      const double over = evidence[c] > kEvidence ? run[c] : 0.0;
+      most = over > most ? over : most;
+    }
+    if (most >= silent && seen_ > warm_up_) find_stuck();
+  }
+
+  void find_stuck() {
+    for (std::size_t c = at_.tau(); c < at_.count(); ++c) {
+      if (!watched(c) || fault_[c] != Fault::none || !(evidence_[c] > kEvidence)) continue;
+      if (run_[c] < silent_ || run_[c] < kRuns * longest_[c]) continue;
+      fault_[c] = Fault::stuck;
+      since_[c] = 0;
+    }
+    find_all_sound();
+  }
+
+  Sample believed(double time) {
+    for (std::size_t c = 0; c < at_.count(); ++c)
+      out_[c] = fault_[c] == Fault::none || fault_[c] == Fault::spike ? now_[c] : kNever;
+    return {time, out_.data() + at_.q(), out_.data() + at_.qd(), out_.data() + at_.tau(),
+            out_.data() + at_.wrench()};
+  }
+
+  ChannelLayout at_;
+  double period_;
+  std::vector<double> floor_;  // of steps that are judged; infinite: not a channel
+  std::vector<char> wraps_;    // per joint: may it turn without end?
+  // Now: as read, but for what is held. Out: what goes on, with NaN.
+  std::vector<double> now_, last_, out_, candidate_;
+  std::vector<double> mean_, step_, ratio_;                // of steps
+  std::vector<double> often_, evidence_, run_, longest_;  // of values that stay
+  std::vector<double> drift_, usual_drift_, anchor_;      // of joints
+  std::vector<int> far_;
+  std::vector<int> since_, calm_;  // samples, of what a fault waits for
+  std::vector<Fault> fault_;
+  double time_ = kNever, memory_ = 0.0, rate_ = 0.0, kept_ = 0.0;
+  int seen_ = 0, warm_up_ = 0, held_most_ = 1, silent_ = 0, return_ = 0, dwell_ = 0, refusals_ = 0;
+  bool all_sound_ = true, any_far_ = false;
+};
+
+}  // namespace touchline

@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A channel reports what cannot be: told by name in the same sample, and no contact follows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from free_motion import exact_loads
+from test_lost_sensors import robot_named
+
+import touchline as tl
+from touchline.observer.samples import Samples
+
+RATE = 1000.0
+SECONDS = 1.2
+AT = 700  # sample at which the fault begins
+# rad, rad/s, Nm, N, Nm
+SPIKES = {"q": 3.0, "qd": 2.0, "tau": 80.0, "force": 300.0, "moment": 300.0}
+NAMES = ("sara", "sara-full", "ur5")
+AXES = ("fx", "fy", "fz", "mx", "my", "mz")
+_motions = {}
+
+
+def in_motion(name, seed=0, rate=RATE):
+    """The arm swings, nothing touches it, and its sensors are noisy; its model is 2 % off."""
+    key = name, seed, rate
+    if key not in _motions:
+        robot = robot_named(name)
+        rng = np.random.default_rng(seed)
+        n = len(robot.joint_names)
+        time = np.arange(round(SECONDS * rate)) / rate
+        phase, pace = rng.uniform(0.0, 2 * np.pi, n), rng.uniform(1.0, 3.0, n)
+        q = 0.6 + 0.3 * np.sin(np.outer(time, pace) + phase)
+        qd = 0.3 * pace * np.cos(np.outer(time, pace) + phase)
+        tau, wrench = exact_loads(robot, time, q, qd)
+        tau, wrench = 1.005 * tau, 1.005 * wrench
+        noise = rng.normal(0.0, 1.0, (len(time), 3 * n + 6 * len(robot.sensor_names)))
+        q = q + 3e-6 * noise[:, :n]
+        qd = qd + 2e-4 * noise[:, n : 2 * n]
+        tau = tau + 0.05 * noise[:, 2 * n : 3 * n]
+        scale = np.tile([0.05] * 3 + [0.01] * 3, len(robot.sensor_names))
+        wrench = wrench + (scale * noise[:, 3 * n :]).reshape(wrench.shape)
+        _motions[key] = Samples(time, q, qd, tau, wrench)
+    s = _motions[key]
+    return Samples(s.time, s.q.copy(), s.qd.copy(), s.tau.copy(), s.wrench.copy())
+
+
+def channels(robot):
+    """Name, signal and place of each measured channel."""
+    joints = robot.description.joints
+    for j, name in enumerate(robot.joint_names):
+        yield f"q.{name}", "q", (j,)
+        yield f"qd.{name}", "qd", (j,)
+        if joints[j].measured:
+            yield f"tau.{name}", "tau", (j,)
+    for s, name in enumerate(robot.sensor_names):
+        for i, axis in enumerate(AXES):
+            yield f"{name}.{axis}", "wrench", (s, i)
+
+
+def spike_of(signal, place):
+    return SPIKES["force" if place[1] < 3 else "moment"] if signal == "wrench" else SPIKES[signal]
+
+
+def run(pipeline, s):
+    return pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_spike_of_any_channel_is_told_at_once_by_name_and_begins_nothing(name, sign):
+    robot = robot_named(name)
+    pipeline = tl.Pipeline(robot)
+    for channel, signal, place in channels(robot):
+        s = in_motion(name)
+        getattr(s, signal)[(AT, *place)] += sign * spike_of(signal, place)
+        pipeline.reset()
+        before = len(pipeline.events)
+        estimate, _ = run(pipeline, s)
+        assert [(c.sample, c.channel, str(c.fault)) for c in pipeline.faults] == [
+            (AT, channel, "spike"),
+            (AT + 1, channel, "none"),
+        ]
+        assert pipeline.events[before:] == []
+        told = np.flatnonzero(estimate.health & tl.Health.FAULTY)
+        assert told.tolist() == [AT]
+
+
+def frozen(values, at):
+    values[AT:] = values[at]
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("fault", ["stuck", "zero"])
+def test_a_stuck_or_dead_torque_or_wrench_is_told_within_50_ms(name, fault):
+    robot = robot_named(name)
+    pipeline = tl.Pipeline(robot)
+    for channel, signal, place in channels(robot):
+        if signal in ("q", "qd"):
+            continue
+        s = in_motion(name)
+        values = getattr(s, signal)[(slice(None), *place)]
+        values[AT:] = values[AT] if fault == "stuck" else 0.0
+        pipeline.reset()
+        before = len(pipeline.events)
+        run(pipeline, s)
+        first = pipeline.faults[0]
+        assert first.channel == channel
+        assert AT <= first.sample <= AT + 50
+        last = {c.channel: c.fault for c in pipeline.faults}
+        assert last == {channel: tl.Fault.STUCK}
+        assert [e for e in pipeline.events[before:] if e.level == "collision"] == []
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("seed", range(3))
+def test_healthy_motion_has_no_fault(name, seed):
+    pipeline = tl.Pipeline(robot_named(name))
+    estimate, _ = run(pipeline, in_motion(name, seed))
+    assert pipeline.faults == ()
+    assert not (estimate.health & tl.Health.FAULTY).any()
+
+
+def test_updates_say_the_same_as_run_to_the_last_bit_whatever_is_faulty():
+    robot = robot_named("ur5")
+    s = in_motion("ur5")
+    s.wrench[300, 1, 0] += 300.0
+    s.tau[310:340, 2] = s.tau[310, 2]
+    s.wrench[400:480, 0] = np.random.default_rng(0).normal(0.0, 300.0, (80, 6))
+    s.qd[600, 1] += 2.0
+    s.q[700:720, 1] += 3.0
+    s.wrench[800:900, 1] = np.nan
+    whole, parts, steps = (tl.Pipeline(robot) for _ in range(3))
+    expected = run(whole, s)[0]
+    faults = whole.faults
+    assert {str(c.fault) for c in faults} >= {"spike", "wild", "stuck"}
+    told, at = [], 0
+    for end in (1, 7, 305, 309, 335, 402, 650, 705, 1000, len(s.time)):
+        part = Samples(*(getattr(s, k)[at:end] for k in ("time", "q", "qd", "tau", "wrench")))
+        rows = run(parts, part)[0]
+        np.testing.assert_array_equal(rows.tau_ext, expected.tau_ext[at:end])
+        np.testing.assert_array_equal(rows.segment_wrench, expected.segment_wrench[at:end])
+        np.testing.assert_array_equal(rows.health, expected.health[at:end])
+        at = end
+    for i in range(len(s.time)):
+        result = steps.update(s.time[i], s.q[i], s.qd[i], s.tau[i], s.wrench[i])
+        np.testing.assert_array_equal(result.estimate.tau_ext, expected.tau_ext[i])
+        np.testing.assert_array_equal(result.estimate.segment_wrench, expected.segment_wrench[i])
+        assert result.health == expected.health[i]
+        now = {(f.channel, f.fault) for f in result.faults}
+        assert bool(now) == bool(result.health & tl.Health.FAULTY)
+        told.append(now)
+    for change in faults:
+        if change.fault != tl.Fault.NONE:
+            assert (change.channel, change.fault) in told[change.sample]
+
+
+@pytest.mark.parametrize("rise", [0, 1, 2])
+def test_a_blow_of_300_n_on_a_lone_sensor_is_taken_at_once(rise):
+    """All axes of a sensor move as one force moves them: that is no fault, however steep it is."""
+    robot = robot_named("sara")
+    s = in_motion("sara")
+    force = np.array([180.0, -150.0, 187.0])
+    load = np.concatenate([force, np.cross([0.1, 0.25, -0.05], force)])
+    share = np.clip((np.arange(len(s.time)) - AT + 1) / (rise + 1), 0.0, 1.0)
+    s.wrench[:, 0] -= np.outer(share, load)  # the innermost one alone, as of a blow on its own link
+    pipeline = tl.Pipeline(robot)
+    run(pipeline, s)
+    assert pipeline.faults == ()
+    assert pipeline.events[0].detected <= s.time[AT] + 0.005
+
+
+def test_a_new_level_of_one_axis_that_lives_is_taken_three_samples_late():
+    s = in_motion("sara")
+    s.wrench[AT:, 1, 2] += 100.0
+    pipeline = tl.Pipeline(robot_named("sara"))
+    run(pipeline, s)
+    assert [(c.sample, str(c.fault)) for c in pipeline.faults] == [(AT, "spike"), (AT + 3, "none")]
+
+
+def test_a_channel_that_has_gone_wild_is_left_out_and_comes_back():
+    s = in_motion("ur5")
+    s.wrench[AT : AT + 100, 1, 2] += np.random.default_rng(1).uniform(200.0, 900.0, 100)
+    pipeline = tl.Pipeline(robot_named("ur5"))
+    run(pipeline, s)
+    kinds = [(str(c.fault), c.sample) for c in pipeline.faults]
+    assert kinds[0] == ("spike", AT)
+    assert [kind for kind, _ in kinds] == ["spike", "wild", "none"]
+    assert kinds[1][1] <= AT + 5
+    assert kinds[-1][0] == "none"
+    assert AT + 90 <= kinds[-1][1] <= AT + 120
+    assert [e for e in pipeline.events if e.level == "collision"] == []
+
+
+def test_a_joint_that_passes_a_whole_turn_is_not_faulty():
+    robot = robot_named("ur5")
+    s = in_motion("ur5")
+    wrapped = replace(s, q=s.q - 2 * np.pi * (np.arange(len(s.time)) >= AT)[:, None])
+    pipeline = tl.Pipeline(robot)
+    run(pipeline, wrapped)
+    assert pipeline.faults == ()
+
+
+def test_samples_that_come_twice_are_not_stuck():
+    s = in_motion("ur5")
+    again = np.repeat(np.arange(0, len(s.time), 40), 40)[: len(s.time)]  # each stands for 40 ms
+    held = Samples(s.time, s.q, s.qd, s.tau[again], s.wrench[again])
+    pipeline = tl.Pipeline(robot_named("ur5"))
+    run(pipeline, held)
+    assert [c for c in pipeline.faults if c.fault == tl.Fault.STUCK] == []
