@@ -27,7 +27,7 @@ void print(const char* what, double time, const T& value) {
 
 int main(int argc, char** argv) try {
   if (argc != 3) return std::fprintf(stderr, "usage: %s ROBOT LOG\n", argv[0]), 2;
-  touchline::Pipeline pipeline(touchline::read_robot(argv[1]));
+  touchline::RedundantPipeline pipeline(touchline::read_robot(argv[1]));
   const std::size_t n = pipeline.robot().joints.size(), k = pipeline.robot().sensors.size();
   std::ifstream log(argv[2]);
   std::string line;

@@ -504,7 +504,7 @@ class Watch(enum.Enum):
 class StandIn:
     def __init__(self, lost: Sequence[int], robot: Robot, sensors: Sequence[int], segments: Sequence[int], rows: Sequence[int], watch: Sequence[Watch]) -> None: ...
 
-FAULTS: tuple = ('none', 'spike', 'wild', 'stuck', 'disagrees')
+FAULTS: tuple = ...
 
 class RobotFileError(ValueError):
     pass

@@ -84,7 +84,7 @@ int main(int, char** arguments) {
   const Log log = read_log(arguments[2], n, k);
   const std::size_t count = log.time.size();
   for (const std::size_t part : {std::size_t{0}, std::size_t{1}, std::size_t{7}, count}) {
-    Pipeline pipeline(robot);
+    RedundantPipeline pipeline(robot);
     std::vector<double> rows(count * pipeline.row_layout().width());
     Said said;
     const long before = allocations;

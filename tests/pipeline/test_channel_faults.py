@@ -172,10 +172,47 @@ def test_a_blow_of_300_n_on_a_lone_sensor_is_taken_at_once(rise):
 
 def test_a_new_level_of_one_axis_that_lives_is_taken_three_samples_late():
     s = in_motion("sara")
-    s.wrench[AT:, 1, 2] += 100.0
+    s.wrench[AT:, 0, 2] += 100.0  # the innermost one
     pipeline = tl.Pipeline(robot_named("sara"))
     run(pipeline, s)
     assert [(c.sample, str(c.fault)) for c in pipeline.faults] == [(AT, "spike"), (AT + 3, "none")]
+
+
+def test_a_new_level_that_the_sensor_inboard_does_not_feel_is_left_out():
+    """UR5 with two sensors: what loads a joint or the wrist loads the base."""
+    pipeline = tl.Pipeline(robot_named("ur5"))
+    for signal, place, jump in (("tau", (2,), 40.0), ("wrench", (1, 2), 100.0)):
+        s = in_motion("ur5")
+        getattr(s, signal)[(slice(AT, AT + 200), *place)] += jump
+        pipeline.reset()
+        before = len(pipeline.events)
+        run(pipeline, s)
+        said = [(str(c.fault), c.sample) for c in pipeline.faults]
+        assert [kind for kind, _ in said] == ["spike", "step", "none"]
+        assert said[0][1] == AT
+        assert AT + 200 <= said[-1][1] <= AT + 205
+        assert pipeline.events[before:] == []
+
+
+@pytest.mark.parametrize("signal", ["tau", "wrench"])
+def test_a_signal_that_is_clipped_at_an_unknown_rail_is_told(signal):
+    s = in_motion("ur5")
+    values = s.tau[:, 2] if signal == "tau" else s.wrench[:, 0, 4]
+    rail = np.max(values[:AT]) + 1e-3
+    values[AT:] = rail
+    pipeline = tl.Pipeline(robot_named("ur5"))
+    run(pipeline, s)
+    assert pipeline.faults[0].sample <= AT + 10
+    assert pipeline.faults[0].fault in (tl.Fault.STUCK, tl.Fault.SPIKE)
+
+
+def test_readings_that_are_not_finite_are_no_step_when_they_end():
+    s = in_motion("sara")
+    s.wrench[AT : AT + 10, 0] = np.inf
+    s.wrench[AT : AT + 10, 1, 2] = 1e12
+    pipeline = tl.Pipeline(robot_named("sara"))
+    run(pipeline, s)
+    assert pipeline.faults == ()
 
 
 def test_a_channel_that_has_gone_wild_is_left_out_and_comes_back():

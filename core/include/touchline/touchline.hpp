@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The sense of touch for a robot arm without a skin:
 //
-//   touchline::Pipeline pipeline(touchline::read_robot("sara.touchline"));
+//   touchline::RedundantPipeline pipeline(touchline::read_robot("sara.touchline"));
 //   const touchline::Result result = pipeline.update({time, q, qd, tau, wrench});
 //   for (const touchline::Contact& contact : result.contacts) ...
 #pragma once

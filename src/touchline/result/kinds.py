@@ -49,6 +49,7 @@ class Fault(StrEnum):
 
     NONE = "none"
     SPIKE = "spike"  # far from the samples before: the last good reading stands for it
+    STEP = "step"  # a new level that a sensor inboard would have to feel too, and does not
     WILD = "wild"  # such jumps that go on
     STUCK = "stuck"  # the same value again and again while the arm moves
     DISAGREES = "disagrees"  # position or velocity: one is not the derivative of the other

@@ -5,7 +5,8 @@
 // A jump of one channel: no contact moves one channel alone. What a force does to one axis of a
 // sensor, it does to others too, to the sensors and joints inboard, or to the speed. So a jump
 // counts as a fault only where nothing else in the sample bears it out; if the new level then
-// stays and lives (its last digits move), it is taken after all, a few samples late.
+// stays and lives (its last digits move), it is taken after all, a few samples late, unless there
+// is a sensor inboard that would have had to feel it too.
 //
 // A stuck channel: how often it changes from sample to sample while the arm moves is learned, and
 // so is for how long it keeps a value; logs that repeat samples repeat all of them, which counts
@@ -37,6 +38,7 @@ class ChannelGates {
       : at_{robot.joints.size(), robot.sensors.size()},
         period_(std::max(robot.noise.period, kShortest)),
         floor_(at_.count(), std::numeric_limits<double>::infinity()),
+        witness_(at_.count(), -1),
         wraps_(at_.joints, 0),
         now_(at_.count()),
         last_(at_.count(), kNever),
@@ -49,6 +51,8 @@ class ChannelGates {
         evidence_(at_.count()),
         run_(at_.count()),
         longest_(at_.count()),
+        highest_(at_.count(), -std::numeric_limits<double>::infinity()),
+        lowest_(at_.count(), std::numeric_limits<double>::infinity()),
         drift_(at_.joints),
         usual_drift_(at_.joints),
         anchor_(at_.joints),
@@ -77,7 +81,7 @@ class ChannelGates {
     time_ = sample.time;
     gather(sample);
     const bool gap = !(dt < kGapPeriods * period_);
-    if (!measure(dt) || !all_sound_ || gap) settle(dt, gap);
+    if (!measure(dt) || !all_sound_ || absurd_ || gap) settle(dt, gap);
     learn();
     if (!gap) compare_speeds(dt);
     if (moving()) count_changes(dt);
@@ -114,12 +118,15 @@ class ChannelGates {
   static constexpr int kHeldMost = 5;           // and so many samples
   static constexpr int kSure = 3;               // samples at a new level that make it one
   static constexpr int kGood = 10;              // steps that bring a wild channel back
-  static constexpr double kReturn = 1.0;        // [s] and a position that is elsewhere for good
+  static constexpr double kReturn = 2.0;        // [s] and what is elsewhere for good
 
   static constexpr double kMoving = 0.02;     // [rad/s, m/s] of any joint: the arm moves
   static constexpr double kSilent = 0.02;     // [s] without a change before a channel is stuck,
   static constexpr int kLeastSilent = 5;      // and so many samples
   static constexpr double kEvidence = 40.0;   // [nats] against chance
+  // At the largest or the smallest value that the channel has ever shown: clipped.
+  static constexpr double kEvidenceAtEnd = 12.0;
+  static constexpr int kLeastAtEnd = 4;
   static constexpr double kRuns = 3.0;        // times the longest run that the channel has shown
   static constexpr double kRunMemory = 20.0;  // [s] over which that is forgotten
   static constexpr double kLively = 0.5;      // of samples with a change: not the same twice
@@ -153,6 +160,8 @@ class ChannelGates {
       floor_[at_.q() + j] = std::max(kLeastTravel, kFastest * period_);
       floor_[at_.qd() + j] = kSpeedStep + kHardest * period_;
       wraps_[j] = robot.nodes[joint.nodes[0]].kind == NodeKind::revolute;
+      if (!layout.inboard_sensors[j].empty())
+        witness_[at_.tau() + j] = layout.inboard_sensors[j][0].sensor;
       const double least = std::max(contact[at_.tau() + j], kLeastTorque);
       if (joint.measured())
         floor_[at_.tau() + j] = least / share(joint.bandwidth) / std::fabs(joint.gain);
@@ -161,6 +170,12 @@ class ChannelGates {
       const SensorRow& sensor = robot.sensors[(c - at_.wrench()) / 6];
       const std::size_t axis = (c - at_.wrench()) % 6;
       const double least = *std::max_element(contact.begin() + c, contact.begin() + c + 3);
+      for (std::size_t t = 0; t < at_.sensors; ++t) {
+        const int inner = robot.sensors[t].node;
+        const bool inboard = sensor.node != inner && layout.is_outboard(sensor.node, inner);
+        if (inboard && robot.sensors[t].six_axis())
+          std::fill_n(witness_.begin() + c, 3, static_cast<int>(t));
+      }
       for (int i = 0; i < 3; ++i) {
         if (sensor.axes[axis + i])
           floor_[c + i] = std::max(least, axis == 0 ? kLeastForce : kLeastTorque) /
@@ -212,14 +227,19 @@ class ChannelGates {
       ratio[c] = step[c] / (usual > floor[c] ? usual : floor[c]);
       worst = ratio[c] > worst ? ratio[c] : worst;
     }
-    return worst <= 1.0;
+    return worst <= 1.0;  // infinite readings are none of them
   }
 
   // Not a usual sample: who is believed? Leaves in `now_` the readings to go on with, and in
   // `step_` those steps that something can be learned from.
   void settle(double dt, bool gap) {
+    absurd_ = false;
     for (std::size_t c = 0; c < at_.count(); ++c) {
       const bool jumps = ratio_[c] > 1.0 && !gap;
+      if (std::fabs(now_[c]) >= kAbsurd) {
+        now_[c] = kNever;  // told as such by the observer
+        absurd_ = true;
+      }
       if (watched(c) && (jumps || fault_[c] != Fault::none) && seen_ >= warm_up_) judge(c, dt);
       if (gap || fault_[c] != Fault::none) step_[c] = kNever;
       else if (jumps && seen_ >= warm_up_) step_[c] = gate(c);
@@ -236,9 +256,9 @@ class ChannelGates {
 
   void judge(std::size_t c, double dt) {
     const double x = now_[c];
+    if (x != x) return take(c);
     switch (fault_[c]) {
       case Fault::none:
-        if (!std::isfinite(x)) return;
         if (c < at_.qd() && wraps(c, dt)) {
           last_[c] += kTurn * std::round((x - last_[c]) / kTurn);
           return;
@@ -253,16 +273,26 @@ class ChannelGates {
       case Fault::stuck:
         if (step_[c] > 0.0 && ++since_[c] >= kChanges) take(c);
         return;
+      case Fault::step:
+        calm_[c] = ratio_[c] > 1.0 ? kSure : std::max(calm_[c] - 1, 0);
+        if (calm_[c] == 1 || ++since_[c] >= return_) take(c);
+        return;
       case Fault::disagrees: return;  // see `compare_speeds`
     }
   }
 
   void go_on_holding(std::size_t c, double dt) {
     const double x = now_[c];
-    if (!std::isfinite(x) || ratio_[c] <= 1.0) return take(c);  // a missing one is told as such
+    if (ratio_[c] <= 1.0) return take(c);
     const bool stays = std::fabs(x - candidate_[c]) <= gate(c);
     calm_[c] = stays && lives(c, candidate_[c]) ? calm_[c] + 1 : 0;
-    if (calm_[c] >= kSure && c >= at_.tau()) return take(c);  // a step that lasts
+    if (calm_[c] >= kSure && c >= at_.tau()) {  // a step that lasts
+      if (!witnessed(c)) return take(c);
+      fault_[c] = Fault::step;
+      since_[c] = calm_[c] = 0;
+      last_[c] = x;
+      return;
+    }
     if (c >= at_.qd() && c < at_.tau() && borne_out(c, dt)) return take(c);
     if (++since_[c] < held_most_) return hold(c, dt);
     fault_[c] = stays && c >= at_.tau() ? Fault::stuck : Fault::wild;
@@ -315,7 +345,17 @@ class ChannelGates {
       const bool same = c == other || (c >= first && other >= first && (other - first) / 6 == sensor);
       if (!same && moves(other)) return true;
     }
-    return c >= first && one_force(sensor);
+    return c >= first && !witnessed(c) && one_force(sensor);
+  }
+
+  // Is there a sensor inboard that feels all that this channel can feel, and is it believed?
+  bool witnessed(std::size_t c) const {
+    if (witness_[c] < 0) return false;
+    const std::size_t first = at_.wrench() + 6 * witness_[c];
+    for (std::size_t i = first; i < first + 6; ++i) {
+      if (fault_[i] != Fault::none || !(step_[i] == step_[i])) return false;
+    }
+    return true;
   }
 
   // Has a position gone on after a whole turn?
@@ -430,6 +470,8 @@ class ChannelGates {
     double* __restrict evidence = evidence_.data();
     double* __restrict run = run_.data();
     double* __restrict longest = longest_.data();
+    double* __restrict highest = highest_.data();
+    double* __restrict lowest = lowest_.data();
     double changes = 0.0, most = 0.0;
     for (std::size_t c = 0; c < count; ++c) changes += std::fabs(now[c] - last[c]) > 0.0 ? 1.0 : 0.0;
     if (changes == 0.0) return;  // a sample that was held or came twice
@@ -444,16 +486,21 @@ class ChannelGates {
       evidence[c] = d == 0.0 ? evidence[c] + p + p2 + 2.0 * p8 : 0.0;  // about -log(1 - p) each
       const double off = (d > 0.0 ? 1.0 : 0.0) - p;
       often[c] += d == d && run[c] < silent ? rate * off : 0.0;
-      const double over = evidence[c] > kEvidence ? run[c] : 0.0;
+      const bool edge = now[c] >= highest[c] || now[c] <= lowest[c];
+      highest[c] = now[c] > highest[c] ? now[c] : highest[c];
+      lowest[c] = now[c] < lowest[c] ? now[c] : lowest[c];
+      const double over = evidence[c] - (edge ? kEvidenceAtEnd : kEvidence);
       most = over > most ? over : most;
     }
-    if (most >= silent && seen_ > warm_up_) find_stuck();
+    if (most > 0.0 && seen_ > warm_up_) find_stuck();
   }
 
   void find_stuck() {
     for (std::size_t c = at_.tau(); c < at_.count(); ++c) {
-      if (!watched(c) || fault_[c] != Fault::none || !(evidence_[c] > kEvidence)) continue;
-      if (run_[c] < silent_ || run_[c] < kRuns * longest_[c]) continue;
+      if (!watched(c) || fault_[c] != Fault::none || run_[c] < kRuns * longest_[c]) continue;
+      const bool edge = now_[c] == highest_[c] || now_[c] == lowest_[c];
+      const bool stuck = run_[c] >= silent_ && evidence_[c] > kEvidence;
+      if (!stuck && !(edge && run_[c] >= kLeastAtEnd && evidence_[c] > kEvidenceAtEnd)) continue;
       fault_[c] = Fault::stuck;
       since_[c] = 0;
     }
@@ -470,18 +517,19 @@ class ChannelGates {
   ChannelLayout at_;
   double period_;
   std::vector<double> floor_;  // of steps that are judged; infinite: not a channel
+  std::vector<int> witness_;   // the sensor that feels all that a torque or wrench feels; -1: none
   std::vector<char> wraps_;    // per joint: may it turn without end?
   // Now: as read, but for what is held. Out: what goes on, with NaN.
   std::vector<double> now_, last_, out_, candidate_;
   std::vector<double> mean_, step_, ratio_;                // of steps
-  std::vector<double> often_, evidence_, run_, longest_;  // of values that stay
+  std::vector<double> often_, evidence_, run_, longest_, highest_, lowest_;  // of values that stay
   std::vector<double> drift_, usual_drift_, anchor_;      // of joints
   std::vector<int> far_;
   std::vector<int> since_, calm_;  // samples, of what a fault waits for
   std::vector<Fault> fault_;
   double time_ = kNever, memory_ = 0.0, rate_ = 0.0, kept_ = 0.0;
   int seen_ = 0, warm_up_ = 0, held_most_ = 1, silent_ = 0, return_ = 0, dwell_ = 0, refusals_ = 0;
-  bool all_sound_ = true, any_far_ = false;
+  bool all_sound_ = true, any_far_ = false, absurd_ = false;
 };
 
 }  // namespace touchline

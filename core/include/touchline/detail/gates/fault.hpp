@@ -12,6 +12,7 @@ namespace touchline {
 enum class Fault : std::uint8_t {
   none,
   spike,     // one to a few samples far from those before
+  step,      // such a jump to a level that stays, and a sensor that must feel it feels nothing
   wild,      // such jumps that go on
   stuck,     // the same value again and again while the arm moves
   disagrees  // position or velocity of a joint: one is not the derivative of the other
