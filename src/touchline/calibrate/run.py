@@ -41,8 +41,8 @@ Array = NDArray[np.float64]
 LEAST_SECONDS = 20.0  # shorter recordings have no tail
 MOST_LEFT_OUT = 0.3  # of the time; where more seems touched nobody can tell what is usual
 SHORT = (
-    "written: the largest residual that was seen, and the tail of normal values beyond it; how "
-    "often that is exceeded only a longer recording tells"
+    "written instead: what one residual of a hundred exceeds, and the tail of normal values beyond "
+    "it; how often that is exceeded only a longer recording tells"
 )
 ROUNDS = 4  # of leaving out what seems to be touched
 
@@ -174,7 +174,7 @@ def calibrate(
                 recordings.period,
                 recordings.seconds,
                 recordings.all("residuals"),
-                _grows(found),
+                _growth(found),
             )
             if short is not None:
                 lacking += f"\n{SHORT}"
@@ -201,12 +201,12 @@ def calibrate(
     )
 
 
-def _grows(found: Identification) -> float:
-    """How much larger residuals are on data that played no part in the fit, at least 1."""
-    used = found.evidence.used
-    whole = rms(found.left()[~found.touched])[used]
-    ratios = found.after[used] / np.maximum(whole, 1e-9)
-    return float(max(1.0, np.max(ratios, initial=1.0)))
+def _growth(found: Identification) -> dict[str, float]:
+    """By row, how much larger residuals are on data that played no part in the fit, at least 1."""
+    whole = rms(found.left()[~found.touched])
+    ratios = np.maximum(found.after / np.maximum(whole, 1e-9), 1.0)
+    names = found.evidence.rows.names
+    return {names[r]: float(ratios[r]) for r in np.flatnonzero(found.evidence.used)}
 
 
 class NoThresholds(InputError):

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Thresholds from recordings too short to show how often something is exceeded.
 
-The largest residual that was seen is taken for one that comes once in so long a recording, and the
-tail beyond it for that of normal values, whose mean excess over k sigma is sigma / k.
+The level that one residual of a hundred exceeds is measured; beyond it the tail is taken for that
+of normal values, whose mean excess over k sigma is sigma / k. Single outliers, which a start or a
+late sample makes, do not raise it.
 """
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +18,8 @@ from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
 
 METHOD = "rows"  # of detection, the one whose statistic is a row's residual
+SHARE = 0.01  # of the residuals lie beyond the measured level
+CORRELATED = 0.1  # s; residuals of a model's errors that are nearer than that are one excursion
 
 
 def short_thresholds(
@@ -23,7 +27,7 @@ def short_thresholds(
     period: float,
     seconds: float,
     recordings: Iterable[Iterable[Samples]],
-    optimism: float,
+    growth: dict[str, float],
 ) -> CalibrationDescription | None:
     """Row thresholds; None where too little settles even for these.
 
@@ -32,22 +36,27 @@ def short_thresholds(
         period: of the samples [s].
         seconds: of the recordings.
         recordings: that played a part in the identification.
-        optimism: how much larger residuals are on data that played none, at least 1.
+        growth: by row, how much larger residuals are on data that played none, at least 1.
     """
     found = collect_residuals(robot, period, recordings)
     rows = fit_rows(robot, period, found)
-    largest: dict[str, float] = {}
+    levels: dict[str, float] = {}
     for i, row in enumerate(make_thresholds(robot, period).rows):
         name = row_name(robot, row)
         if name in rows:
-            size = float(np.nanmax(np.abs(found.residual[:, i]))) / rows[name].typical
+            size = np.abs(found.residual[:, i])
+            level = float(np.nanquantile(size, 1.0 - SHARE)) / rows[name].typical
             segment = robot.segment_names[row.segment]
-            largest[segment] = max(largest.get(segment, 1.0), size)
-    if not largest:
+            levels[segment] = max(levels.get(segment, 1.0), level)
+    if not levels:
         return None
-    hours = seconds / 3600.0
-    tails = {
-        segment: {METHOD: TailDescription(optimism * k, 1.0 / hours, optimism / k)}
-        for segment, k in largest.items()
+    rows = {
+        name: replace(row, typical=row.typical * growth.get(name, 1.0))
+        for name, row in rows.items()
     }
-    return CalibrationDescription(hours, period, rows, tails)
+    often = SHARE * 3600.0 / CORRELATED
+    tails = {
+        segment: {METHOD: TailDescription(level, often, 1.0 / level)}
+        for segment, level in levels.items()
+    }
+    return CalibrationDescription(seconds / 3600.0, period, rows, tails)
