@@ -7,7 +7,8 @@ import viser
 from numpy.typing import NDArray
 
 from touchline.localizer.skin import Patch
-from touchline.touch.touch import Touch
+from touchline.touch.stroke import Stroke
+from touchline.touch.touch import Press, Touch
 from touchline.touch.widget import Widget
 
 Array = NDArray[np.float64]
@@ -24,7 +25,8 @@ LIT, INK, KNOB = (46, 170, 80), (30, 40, 110), (40, 80, 70)
 EDGE = 0.004  # m, of the triangles that widgets are cut from
 ABOVE = 0.003  # m over the surface, or it would be drawn through them
 RADIUS = 0.009  # m, of a slider's knob
-LONGEST = 2000  # points of a stroke that are drawn
+LONGEST = 200  # points of a stroke that are drawn: a browser makes all its lines anew each time
+RENEWED = 100  # samples after which a stroke that grows is drawn again
 
 
 class WidgetScene:
@@ -42,6 +44,7 @@ class WidgetScene:
         self._knobs: dict[str, viser.IcosphereHandle] = {}
         self._ink: dict[str, viser.LineSegmentsHandle] = {}
         self._lit: dict[str, bool] = {}
+        self._drawn: dict[str, Stroke | int] = {}  # a stroke that is over, or samples of a new one
         for name, widget in touch.widgets.items():
             if widget.link in patches and not widget.whole:
                 self._add(name, widget, patches[widget.link])
@@ -81,20 +84,30 @@ class WidgetScene:
                 low, high = widget.given.range
                 knob.position = widget.point_at((value - low) / (high - low))
         for name, ink in self._ink.items():
-            way = None
-            if name in pressed and len(pressed[name].trace) > 2:
-                way = np.array(pressed[name].trace)[:, 1:3]
-            elif name not in pressed:
-                strokes = [stroke for stroke in touch.strokes if stroke.widget == name]
-                way = strokes[-1].cleaned().points[:, 1:] if strokes else None
+            way = self._new_way(name, touch, pressed.get(name))
             if way is not None and len(way) > 1:
                 ink.points = _ink(touch.widgets[name], way)
+
+    def _new_way(self, name: str, touch: Touch, press: Press | None) -> Array | None:
+        """The way (N, 2) of what is written on a pad, if it is not drawn yet."""
+        before = self._drawn.get(name, 0)
+        if press is not None:
+            count = len(press.trace) // RENEWED
+            if not count or count == before:
+                return None
+            self._drawn[name] = count
+            return np.array(press.trace)[:, 1:3]
+        last = next((s for s in reversed(touch.strokes) if s.widget == name), None)
+        if last is None or last is before:
+            return None
+        self._drawn[name] = last
+        return last.cleaned().points[:, 1:]
 
 
 def _ink(widget: Widget, way: Array) -> NDArray[np.float32]:
     """Line segments (N, 2, 3) over a pad, in its link's frame."""
     u, v, n = widget.plane()
-    way = way[:: max(1, len(way) // LONGEST)]
+    way = way[:: -(-len(way) // LONGEST)]
     points = np.array(widget.given.at) + way @ np.array([u, v]) + 2.0 * ABOVE * n
     return np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
 
