@@ -5,15 +5,12 @@ import threading
 
 import numpy as np
 import pytest
-from browser import until
-from projection import count_near, pixel
+from projection import count_near
+from window import HARMLESS, Window
 
 from touchline.view.live import LivePage
 from touchline.view.markers import COLOURS, METRES_PER_NEWTON
 from touchline.view.server import PageServer
-
-# Chromium says so whenever viser lets a drag on an object keep the camera still; nothing is lost.
-HARMLESS = "Unable to preventDefault inside passive event listener invocation."
 
 
 @pytest.fixture
@@ -25,46 +22,6 @@ def live():
         yield page, server
         page.stop()
         thread.join()
-
-
-class Window:
-    """The page in the browser, with the places of things in the arm's world."""
-
-    def __init__(self, browser, page, server) -> None:
-        self.browser, self.page = browser, page
-        browser.open(server.url)
-        browser.wait_for("Random push")
-        clients = until(server.page.get_clients, pause=browser.rest)
-        self.camera = next(iter(clients.values())).camera
-        self.until(self._arm_is_drawn, "the arm in the picture")
-
-    def pixel(self, point) -> tuple[float, float]:
-        x, y = pixel(self.camera, point)
-        canvas = "document.querySelector('canvas').getBoundingClientRect()"
-        left, top = self.browser.run(f"(b => [b.x, b.y])({canvas})")
-        return x + left, y + top
-
-    def link(self, name) -> tuple[float, float]:
-        """Where the origin of a link, which is within it, is in the window."""
-        return self.pixel(self.page.arm.robot.T_world_links(self.page.arm.q)[name][:3, 3])
-
-    def _arm_is_drawn(self) -> bool:
-        column, row = (round(x) for x in self.link("link4"))
-        patch = self.browser.picture()[row - 5 : row + 6, column - 5 : column + 6]
-        return bool((patch.min(axis=-1) < 250).all())
-
-    def until(self, done, what):
-        return until(done, pause=self.browser.rest, what=what)
-
-    def verdict(self, segment):
-        return next((v for v in self.page.verdicts if v.segment == segment), None)
-
-    def feels(self, link):
-        """What is felt if it is located on a link."""
-        for verdict in self.page.verdicts:
-            if verdict.contact is not None and verdict.contact.link == link:
-                return verdict
-        return None
 
 
 def test_the_mouse_pushes_the_arm_and_the_page_shows_what_it_feels(browser, live):

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The demo's interface in a browser: the mouse presses a button and writes on the arm."""
+
+import threading
+
+import numpy as np
+import pytest
+from window import HARMLESS, Window
+
+from touchline.view.interface import InterfacePage
+from touchline.view.server import PageServer
+from touchline.view.widgets import LIT
+
+SEVEN = np.array([(-0.02, 0.025), (0.02, 0.025), (-0.008, -0.025)])  # m, on the pad
+STEPS = 6  # of the mouse for each of its lines
+BETWEEN = 0.25  # s; waiting for pictures instead takes too long on a busy machine
+WINDOW = 1100, 640  # pixels; fewer are drawn sooner
+
+
+@pytest.fixture
+def demo():
+    with PageServer("test", port=0) as server:
+        page = InterfacePage(server)
+        thread = threading.Thread(target=page.run)
+        thread.start()
+        yield page, server
+        page.stop()
+        thread.join()
+
+
+def place_of(window, name, point):
+    """Where a point (3,) [m] of a widget's link is in the window."""
+    page = window.page
+    T = page.arm.robot.T_world_links(page.arm.q)[page.touch.widgets[name].link]
+    return window.pixel(T[:3, :3] @ point + T[:3, 3])
+
+
+def kinds(page, name):
+    return [event.kind for event in tuple(page.touch.events) if event.widget == name]
+
+
+def stands(window):
+    before = window.page.arm.q
+    window.browser.rest(0.3)
+    return np.abs(window.page.arm.q - before).max() < 1e-4
+
+
+def test_the_mouse_presses_a_button_and_writes_a_seven(browser, demo):
+    page, server = demo
+    browser.resize(*WINDOW)
+    window = Window(browser, page, server, pictures=False)
+    window.until(lambda: page.arm.time > 0.3, "the simulation")
+    heard = []
+    page.touch.on("start", heard.append)
+    start = page.touch.widgets["start"]
+    browser.click(*place_of(window, "start", np.array(start.given.at)))
+    window.until(lambda: "release" in kinds(page, "start"), "the button")
+    assert [event.kind for event in heard[:2]] == ["press", "release"]
+    assert page.arm._trajectory.wanted, "start moves the arm"
+    assert "start: press" in browser.text()
+    page.post(lambda: page._controls.set(moving=False))
+    window.until(lambda: stands(window), "the arm to stand")
+
+    pad = page.touch.widgets["page"]
+    right, up, _ = pad.plane()
+    ways = [np.linspace(a, b, STEPS) for a, b in zip(SEVEN[:-1], SEVEN[1:], strict=True)]
+    places = [
+        place_of(window, "page", np.array(pad.given.at) + u * right + v * up)
+        for u, v in np.vstack(ways)
+    ]
+    browser.mouse("Moved", *places[0])
+    browser.rest(6 * BETWEEN)  # the page finds out in its next picture what lies below the mouse
+    browser.mouse("Pressed", *places[0], buttons=1)
+    for place in places[1:]:
+        browser.mouse("Moved", *place, buttons=1)
+        browser.rest(BETWEEN)
+    window.until(lambda: page._areas._lit.get("page"), "the pad to light")
+    assert tuple(page._areas.areas["page"].color) == LIT
+    browser.mouse("Released", *places[-1])
+    window.until(lambda: len(page.read) > 0, "a stroke that is read")
+    assert page.read[-1][0] == "7"
+    window.until(lambda: "written: 7" in browser.text(), "the answer on the page")
+    assert [c for c in browser.complaints if HARMLESS not in c] == []
+    assert page.restarts == 0
