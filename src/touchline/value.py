@@ -8,6 +8,7 @@ fields alone (`visit_fields` in core/include/touchline/result.hpp).
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from html import escape
 from typing import Any, Self
 
 import numpy as np
@@ -95,6 +96,15 @@ class Value:
     def __repr__(self) -> str:
         told = [f"{name}={told_shortly(x)}" for name, x in self._known().items() if _says(x)]
         return f"{type(self).__name__}({', '.join(told)})"
+
+    def _repr_html_(self) -> str:
+        """The value as a notebook shows it: a row for each field that says something."""
+        rows = "".join(
+            f"<tr><th>{escape(name)}</th><td>{escape(told_shortly(x))}</td></tr>"
+            for name, x in self._known().items()
+            if _says(x)
+        )
+        return f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
 
 
 def lazily(cls: type, decoders: dict[str, Decode]) -> None:

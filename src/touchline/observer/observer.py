@@ -17,6 +17,13 @@ view = core.view
 METHODS = ("segment", "paper")
 DISCRETIZATIONS = ("automatic", "tustin", "exponential")
 
+LONGEST = 1.0  # s between integer stamps: no arm is sampled more slowly
+LATEST = 1e11  # s: 3000 years; nanoseconds get there in two minutes
+NEEDED = {  # signals that nothing can stand in for
+    "q": "an estimate needs joint positions (n,)",
+    "qd": "an estimate needs joint velocities (n,); `touchline analyze` derives them for a log",
+}
+
 
 class Estimate(Value):
     """What the observer knows after one sample, or after each of N samples of a recording.
@@ -172,8 +179,10 @@ class Observer:
             wrench: logged sensor wrenches (k, 6), NaN where not measured.
 
         Raises:
-            ValueError: for a wrong shape.
+            ValueError: for a wrong shape, or integer nanoseconds as `time`.
         """
+        if not isinstance(time, float):
+            require_seconds(time)
         try:
             row = self._update(time, q, qd, tau, wrench)
         except TypeError:  # not arrays of float64 yet
@@ -210,6 +219,7 @@ class Observer:
         Raises:
             ValueError: for a wrong shape.
         """
+        require_seconds(time)
         stamps = _numbers(time, "time", None)
         if stamps.ndim != 1:
             raise ValueError(f"time has shape {stamps.shape}, expected (N,)")
@@ -236,9 +246,28 @@ class Observer:
             full = lead + shape
             if signal is None and name in ("tau", "wrench"):
                 arrays.append(np.full(full, np.nan))
+            elif signal is None:
+                raise ValueError(f"{name} is missing: {NEEDED[name]}")
             else:
                 arrays.append(_numbers(signal, name, full))
         return arrays
+
+
+def require_seconds(time: ArrayLike) -> None:
+    """Makes sure that integer stamps, () or (N,), are no nanoseconds, as ROS keeps them.
+
+    Raises:
+        ValueError: they are too late, or too far apart, to be seconds.
+    """
+    stamps = np.atleast_1d(np.asarray(time))
+    if stamps.dtype.kind not in "iu" or stamps.ndim != 1 or not len(stamps):
+        return
+    step = float(np.median(np.diff(stamps.astype(float)))) if len(stamps) > 1 else 0.0
+    if step > LONGEST or stamps.max() > LATEST:
+        raise ValueError(
+            f"time is in seconds, but holds integers up to {stamps.max()}; "
+            "for nanoseconds pass (time - time[0]) * 1e-9"
+        )
 
 
 def _numbers(signal: ArrayLike | None, name: str, shape: tuple[int, ...] | None) -> Array:

@@ -22,7 +22,7 @@ from touchline.model.corrections import with_loads, with_offsets
 from touchline.model.description import Load
 from touchline.model.robot import Robot, load_robot
 from touchline.native import core
-from touchline.observer.observer import Estimate, Observer
+from touchline.observer.observer import Estimate, Observer, require_seconds
 from touchline.pipeline.native_robot import native_robot, write_robot
 from touchline.pipeline.result import Layout, Result
 from touchline.pipeline.stand_ins import stand_in
@@ -160,8 +160,10 @@ class Pipeline:
         """Takes one sample, as `Observer.update`; a bad one is reported in `health`.
 
         Raises:
-            ValueError: for a wrong shape.
+            ValueError: for a wrong shape, or integer nanoseconds as `time`.
         """
+        if not isinstance(time, float):
+            require_seconds(time)
         try:
             row = self._update(time, q, qd, tau, wrench)
         except TypeError:  # not arrays of float64 yet
