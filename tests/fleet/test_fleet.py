@@ -243,5 +243,9 @@ def test_results_in_python(made, tmp_path):
     kept = tl.analyze(made / "a" / "whole.parquet", "sara", tmp_path / "kept")
     assert kept.estimates.equals(results.estimates)
     assert (tmp_path / "kept" / "events.json").is_file()
+    loaded = tl.analyze(made / "a" / "whole.parquet", tl.load_robot("sara"), tmp_path / "loaded")
+    assert loaded.estimates.equals(results.estimates) and loaded.events == results.events
+    origin = json.loads((tmp_path / "loaded" / "analysis.json").read_text())
+    assert origin["robot"] == "sara"
     with pytest.raises(InputError):
         tl.analyze(made / "empty.parquet", "sara")

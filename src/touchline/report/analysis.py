@@ -93,7 +93,7 @@ class Analysis:
 
 def analyze(
     log: Path | str,
-    robot: Path | str,
+    robot: Robot | Path | str,
     out: Path | str,
     bandwidth: float | None = None,
     method: str = "segment",
@@ -106,7 +106,8 @@ def analyze(
 
     Args:
         log: the recording.
-        robot: path of its `robot.yaml`, or the name of a robot that ships with Touchline.
+        robot: the robot, or what `load_robot` takes. A later `touchline view` of the results reads
+            it again, a `Robot` by its name.
         out: directory for the results.
         bandwidth: K [rad/s] of all rows; default: the description's.
         method: of the observer, "segment" or "paper".
@@ -123,8 +124,9 @@ def analyze(
     import pyarrow.parquet  # noqa: F401  the results need it: told before the work begins
 
     check_options(bandwidth, method, friction, reach)
-    log, out, model = Path(log), Path(out), with_pushes(load_robot(robot), friction, reach)
-    check_inputs(out, log, Path(robot))
+    log, out, source = Path(log), Path(out), robot.name if isinstance(robot, Robot) else robot
+    model = with_pushes(robot if isinstance(robot, Robot) else load_robot(robot), friction, reach)
+    check_inputs(out, log, Path(source))
     with open_log(log, model.description) as recording:
         parts = recording.chunks(CHUNK)
         first = next(parts, None)
@@ -145,7 +147,7 @@ def analyze(
             analysis = run.finish(log, out, method, bandwidth, warnings, recording.losses)
             where = origin or str(log.resolve())
             facts = _origin(analysis) | {"findings": found}
-            write_origin(folder.draft / ANALYSIS, where, robot, facts)
+            write_origin(folder.draft / ANALYSIS, where, source, facts)
             if report != "none":
                 from touchline.report.page import page_text
 

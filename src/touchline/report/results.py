@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from touchline.model.robot import Robot
 from touchline.report.analysis import analyze as analyze_files
 from touchline.report.outputs import CONTACTS, ESTIMATES, EVENTS
 
@@ -45,7 +46,7 @@ class Results:
 
 def analyze(
     log: Path | str,
-    robot: Path | str,
+    robot: Robot | Path | str,
     out: Path | str | None = None,
     bandwidth: float | None = None,
     method: str = "segment",
@@ -54,7 +55,7 @@ def analyze(
 
     Args:
         log: the recording.
-        robot: path of its `robot.yaml`, or the name of a robot that ships with Touchline.
+        robot: the robot, or what `load_robot` takes.
         out: directory that keeps the files of `touchline analyze`; default: none.
         bandwidth: K [rad/s] of all rows; default: the description's.
         method: of the observer, "segment" or "paper".
