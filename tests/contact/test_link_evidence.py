@@ -44,7 +44,7 @@ def test_each_touch_is_one_event_whose_shares_are_probabilities(told):
     assert RUNS * 0.9 <= len(told) <= RUNS * 1.05
     for _, shares, event in told:
         assert sum(shares.values()) == pytest.approx(1.0, abs=0.02)
-        if event.body is None:  # no single push explains
+        if event.body is None:  # one push does not explain it
             continue
         assert event.body_probability == pytest.approx(shares[event.body], abs=1e-9)
         assert event.body == max(shares, key=shares.get)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import touchline as tl
 from touchline import _render
 from touchline.report.event_pictures import EventPoses, event_pictures, event_scene
-from touchline.report.facts import event_doubt, event_where
+from touchline.report.facts import event_doubt, event_place, event_where
 from touchline.report.figure import labels, svg_picture
 from touchline.report.picture import Camera, Scene, png_bytes
 from touchline.report.views import sees, views_of_contact
@@ -328,9 +328,10 @@ def test_an_event_without_a_place_claims_none(robot):
 def test_what_is_not_known_is_said_in_words():
     event = Event(id=0, segment="base", level="contact", detected=1.0, status="not_separable")
     event.rank, event.unknowns = 7, 10
-    assert event_where(event) == "no single push"
+    assert event_where(event) == "several touches, or a twist"
+    assert event_place(event) == "several touches, or a twist (not_separable)"
     words = event_doubt(event)
-    assert "No single push on base explains" in words and "(7 equations, 10 unknowns)" in words
+    assert "One push on base cannot explain" in words and "(7 equations, 10 unknowns)" in words
     assert "two contacts or more" in words
     event.unknowns = 15
     assert "three contacts or more" in event_doubt(event)
@@ -341,8 +342,12 @@ def test_what_is_not_known_is_said_in_words():
     assert "any of the marked places" in event_doubt(event)
     event.status = "wrench_only"
     assert "its place is not" in event_doubt(event)
+    assert event_place(event) == "(wrench_only)"
+    ambiguous = event.replace(status="ambiguous", link="link4", body_probability=0.617)
+    assert event_place(ambiguous) == "link4 (ambiguous, 62 %)"
     event.status, event.link = "located", "link1"
     assert event_doubt(event) == "" and event_where(event) == "link1"
+    assert event_place(event) == "link1"
 
 
 def test_the_arm_is_drawn_as_it_stood(robot):

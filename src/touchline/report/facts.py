@@ -113,8 +113,18 @@ def event_where(event: Event) -> str:
     if event.link is not None:
         return event.link
     if event.status == "not_separable":
-        return "no single push"
+        return "several touches, or a twist"
     return f"beyond {event.joint}" if event.joint else ""
+
+
+def event_place(event: Event) -> str:
+    """The same, with status and probability where the event is not located."""
+    where = event_where(event)
+    if event.status == "located":
+        return where
+    sure = event.body_probability if event.link is not None else None
+    doubt = str(event.status) if sure is None else f"{event.status}, {100 * sure:.0f} %"
+    return f"{where} ({doubt})".lstrip()
 
 
 def event_doubt(event: Event) -> str:
@@ -124,7 +134,7 @@ def event_doubt(event: Event) -> str:
     words = {
         "ambiguous": "One contact at any of the marked places explains the measurements"
         f"{equations}; the percentages say how likely each is.",
-        "not_separable": f"No single push on {event.segment} explains the measurements{equations}: "
+        "not_separable": f"One push on {event.segment} cannot explain the measurements{equations}: "
         f"there are {_at_least(event)} at the same time, or one that pulls or twists. The arrow is "
         "the sum of the forces; their places cannot be told.",
         "wrench_only": "The force is known, its place is not: no push at a point of the surface "

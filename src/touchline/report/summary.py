@@ -6,7 +6,7 @@ import numpy as np
 from touchline.report.analysis import Analysis
 from touchline.report.facts import (
     detection_fact,
-    event_where,
+    event_place,
     health_facts,
     joint_facts,
     segment_facts,
@@ -79,7 +79,7 @@ def _events(analysis: Analysis) -> list[str]:
                 event.segment,
                 number(event.force_peak, 1),
                 number(event.torque_peak, 1),
-                event_where(event),
+                event_place(event),
             ]
         )
     hidden = len(events) - MOST_EVENTS

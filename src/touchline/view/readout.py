@@ -11,7 +11,7 @@ from touchline.view.judge import Verdict
 LEVEL_COLOURS = ("#e6e8eb", "#f5a623", "#d0021b")
 LEVEL_WORDS = ("nothing", "contact", "collision")
 STATUS_WORDS = {
-    "not_separable": "no single push",
+    "not_separable": "several touches, or a twist",
     "wrench_only": "force only",
     "ambiguous": "one of several places",
 }

@@ -44,7 +44,7 @@ struct JointEstimate {
     --count;
   }
 
-  // Of a contact nothing is known any more.
+  // Forgets all that is known of a contact.
   void forget(int c, double force_sigma) {
     const int n = size(), first = kEach * c;
     for (int i = first; i < first + kEach; ++i) {
