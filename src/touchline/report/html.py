@@ -32,8 +32,15 @@ def table(head: Sequence[str], rows: Iterable[Sequence[Any]], rows_as: Sequence[
     head, rows = [head[i] for i in kept], [[row[i] for i in kept] for row in rows]
     numeric = [all(_is_number(row[i]) for row in rows) for i in range(len(head))]
     kinds = [' class="number"' if is_number else "" for is_number in numeric]
-    lines = ['<div class="scroll"><table><thead><tr>']
-    lines += [f"<th{kind}>{escape(name)}</th>" for name, kind in zip(head, kinds, strict=True)]
+    # What scrolls takes the keyboard's focus, and needs a name; an empty header is none.
+    named = escape(", ".join(name for name in head if name) or "facts")
+    lines = [f'<div class="scroll" tabindex="0" role="group" aria-label="table: {named}">']
+    lines.append("<table><thead><tr>")
+    tags = ["th" if name else "td" for name in head]
+    lines += [
+        f"<{tag}{kind}>{escape(name)}</{tag}>"
+        for tag, name, kind in zip(tags, head, kinds, strict=True)
+    ]
     lines.append("</tr></thead><tbody>")
     for i, row in enumerate(rows):
         cells = (f"<td{kind}>{cell(v)}</td>" for v, kind in zip(row, kinds, strict=True))

@@ -92,17 +92,18 @@ def plot(
     width, height = size
     inner = (width - LEFT - RIGHT, height - TOP - BOTTOM)
     pieces = max([len(low) for low, _ in curves] + [1])
+    axes = [axis_class(curve.name) for curve in panel.curves]
     paths = "".join(
-        f'<path class="curve s{i}" d="{curve_path(low, high, least, largest, join)}"/>'
-        for i, (low, high) in enumerate(curves)
+        f'<path class="curve s{i}{axis}" d="{curve_path(low, high, least, largest, join)}"/>'
+        for i, ((low, high), axis) in enumerate(zip(curves, axes, strict=True))
     )
     if data is not None:
         data = {**data, "low": least, "high": largest, "steps": STEPS, "limit": limit}
         packed = escape(json.dumps(data, separators=(",", ":")), quote=False)
         attributes += " data-plot='{}'".format(packed.replace("'", "&#39;"))
     keys = "".join(
-        f'<span class="key s{i}">{escape(curve.name)}</span>'
-        for i, curve in enumerate(panel.curves)
+        f'<span class="key s{i}{axis}">{escape(curve.name)}</span>'
+        for i, (curve, axis) in enumerate(zip(panel.curves, axes, strict=True))
     )
     # From half a piece before zero: a path stands at the middle of its pieces.
     return (
@@ -114,6 +115,12 @@ def plot(
         f'<svg x="{LEFT}" y="{TOP}" width="{inner[0]}" height="{inner[1]}" '
         f'viewBox="-0.5 0 {pieces} {STEPS}" preserveAspectRatio="none">{paths}</svg></svg></div>'
     )
+
+
+def axis_class(name: str) -> str:
+    """The class, after a space, that gives fx to mz the colours of x, y and z; else nothing."""
+    is_axis = len(name) == 2 and name[0] in "fm" and name[1] in "xyz"
+    return f" axis-{name[1]}" if is_axis else ""
 
 
 def _axes(
