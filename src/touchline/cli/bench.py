@@ -306,6 +306,36 @@ def interface(
     return 0
 
 
+def reliability(
+    *,
+    seeds: int = 1,
+    share: float = 0.03,
+    healthy: float = 0.25,
+    page: Annotated[Path | None, arg(metavar="FILE")] = None,
+) -> int:
+    """Faults of sensors and clocks, put into recordings: what is told, and what comes of them.
+
+    Example: touchline bench reliability --share 0.2 --page docs/reliability.md
+
+    Prints figures beside the goals, then a line for each type of fault. The arms are `sara`,
+    `sara-full`, a UR5 with two sensors and a Panda; the last two need example-robot-data.
+
+    Exit status: 1 where a goal is missed.
+
+    Args:
+        seeds: Motions and pushes of each arm.
+        share: Of the cases of each that are drawn; 1 takes some 7,000 runs, half an hour.
+        healthy: Minutes of motion without a fault, of each arm, in which none may be reported.
+        page: Writes docs/reliability.md.
+    """
+    from touchline.bench.reliability.run import Plan, main
+    from touchline.numbers import check_least
+
+    check_least(1, seeds=seeds)
+    check_least(0, share=share, healthy=healthy)
+    return main(Plan(seeds, share, healthy), page)
+
+
 BENCHMARKS: dict[str, Callable[..., int]] = {
     "observer": observer,
     "logs": logs,
@@ -319,4 +349,5 @@ BENCHMARKS: dict[str, Callable[..., int]] = {
     "identify": identify,
     "real": real,
     "interface": interface,
+    "reliability": reliability,
 }

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Healthy recordings: a simulated arm that moves, and is pushed once."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from touchline.errors import InputError
+from touchline.model.description import SensorDescription
+from touchline.model.robot import Robot, load_robot
+from touchline.observer.samples import Samples
+from touchline.simulation.contacts import Profile, ScriptedContact
+from touchline.simulation.noise import SensorNoise
+from touchline.simulation.scenario import scripted
+from touchline.simulation.scene import Run
+from touchline.simulation.touchable import TouchableSurface, structure_links
+
+ROBOTS = ("sara", "sara-full", "ur5", "panda")
+SECONDS, SPEED, FORCE, MODEL_ERROR = 2.4, 0.5, 25.0, 0.02  # s, rad/s, N
+PUSHED, RELEASED = 0.9, 1.4  # s
+PHASES = {"free": 0.6, "onset": PUSHED, "contact": 1.15, "release": RELEASED}  # s: a fault begins
+OUTBOARD = 4  # so many of the outermost links are pushed: all layouts feel these
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A healthy recording.
+
+    Attributes:
+        robot: of it.
+        seed: of all that is random.
+        samples: of its sensors.
+        body: that is pushed.
+    """
+
+    robot: Robot
+    seed: int
+    samples: Samples
+    body: str
+
+
+def robot_named(name: str) -> Robot:
+    """An arm of ROBOTS; "ur5" has a base and a wrist sensor and six joint torques.
+
+    Raises:
+        InputError: the package example-robot-data is missing.
+    """
+    robot = load_robot(name)
+    if name != "ur5":
+        return robot
+    places = (("base", "shoulder_link"), ("wrist", "wrist_3_link"))
+    sensors = tuple(SensorDescription(sensor, link) for sensor, link in places)
+    noise = replace(
+        robot.description.noise,
+        sensors={s.name: (0.05, 0.05, 0.05, 0.01, 0.01, 0.01) for s in sensors},
+    )
+    joints = tuple(replace(joint, torque="sensor") for joint in robot.description.joints)
+    description = replace(
+        robot.description,
+        sensors=sensors,
+        noise=noise,
+        bandwidth_sensors={s.name: 100.0 for s in sensors},
+        joints=joints,
+    )
+    return Robot(description, robot.mechanism)
+
+
+def robots() -> list[tuple[str, Robot]]:
+    """Those of ROBOTS whose models are installed."""
+    found = []
+    for name in ROBOTS:
+        try:
+            found.append((name, robot_named(name)))
+        except InputError as error:
+            print(f"{name}: left out, {error}")
+    return found
+
+
+def record(robot: Robot, seed: int, pushed: bool = True, seconds: float = SECONDS) -> Recording:
+    """The arm swings; one of its outer links is pushed for half a second."""
+    rng = np.random.default_rng([seed, 11])
+    settings = Run(seed=seed, noise=SensorNoise(), model_error=MODEL_ERROR, physics=2000.0)
+    at = TouchableSurface(robot).draw(rng, structure_links(robot)[-OUTBOARD:])
+    profile = Profile(PUSHED, RELEASED - PUSHED - 0.04, 0.02, 0.02)
+    push = ScriptedContact(at.link, at.point, -FORCE * at.normal, profile, force_frame="link")
+    contacts = [push] if pushed else []
+    samples = scripted(robot, contacts, seconds, SPEED, settings).samples
+    body = next(body.name for body in robot.bodies if at.link in body.links)
+    return Recording(robot, seed, samples, body)

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The reliability benchmark, in short: faults that must be told, and none where there is none."""
+
+import numpy as np
+import pytest
+
+import touchline as tl
+from touchline.bench.reliability.faults import FAULTS, channels_of, injected
+from touchline.bench.reliability.judge import judge, listen
+from touchline.bench.reliability.recordings import PHASES, record
+from touchline.bench.reliability.run import tables
+
+AT_ONCE = ("spike", "spikes", "rail", "NaN", "infinite", "absurd")
+
+
+@pytest.fixture(scope="module")
+def listened():
+    robot = tl.load_robot("sara-full")
+    recording = record(robot, 0)
+    pipeline = tl.Pipeline(robot)
+    return pipeline, recording, listen(pipeline, recording.samples)
+
+
+def channel_named(robot, name):
+    return next(channel for channel in channels_of(robot) if channel.name == name)
+
+
+def fault_named(name):
+    return next(fault for fault in FAULTS if fault.name == name)
+
+
+def test_each_type_of_fault_changes_its_channel_and_no_other(listened):
+    recording = listened[1]
+    for fault in FAULTS:
+        for channel in channels_of(recording.robot):
+            whole = channel.signal == "wrench" and channel.axis is None
+            if ("sensor" if whole else channel.signal) not in fault.on:
+                continue
+            rng = np.random.default_rng(0)
+            faulty, end = injected(recording.samples, fault, channel, 0.6, rng)
+            assert end > 0.59
+            for signal in ("time", "q", "qd", "tau", "wrench"):
+                before, after = getattr(recording.samples, signal), getattr(faulty, signal)
+                same = np.array_equal(before, after, equal_nan=True)
+                if signal != channel.signal:
+                    assert same, (fault.name, channel.name)
+                elif fault.name != "clipped":  # a signal may stay below its rail
+                    assert not same, (fault.name, channel.name)
+
+
+def test_without_a_fault_none_is_reported(listened):
+    assert listened[2].named == {}
+
+
+@pytest.mark.parametrize("name", AT_ONCE)
+@pytest.mark.parametrize("phase", ["free", "contact"])
+def test_what_jumps_or_is_absent_is_told_in_the_same_sample(listened, name, phase):
+    pipeline, recording, healthy = listened
+    channel = channel_named(recording.robot, "tau.joint2")
+    outcome = judge(
+        pipeline, recording, healthy, fault_named(name), channel, (phase, PHASES[phase])
+    )
+    assert outcome.crash == "" and outcome.finite
+    assert outcome.told <= 0.0015
+    assert outcome.collisions == 0
+
+
+@pytest.mark.parametrize("name", ["stuck", "zero"])
+def test_what_stands_still_is_told_within_50_ms(listened, name):
+    pipeline, recording, healthy = listened
+    channel = channel_named(recording.robot, "tau.joint2")
+    outcome = judge(
+        pipeline, recording, healthy, fault_named(name), channel, ("free", PHASES["free"])
+    )
+    assert outcome.told <= 0.05 and outcome.named
+
+
+def test_the_tables_count_what_was_missed(listened):
+    pipeline, recording, healthy = listened
+    channel = channel_named(recording.robot, "tau.joint2")
+    outcomes = [
+        judge(pipeline, recording, healthy, fault_named(name), channel, ("free", PHASES["free"]))
+        for name in ("spike", "delay")
+    ]
+    text, missed = tables(outcomes, 1.0, ["sara: tau.joint1 stuck"] * 2)
+    assert "delay, tau" in text and "spike, tau" in text
+    assert missed
