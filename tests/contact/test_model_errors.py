@@ -14,7 +14,7 @@ from touchline.bench.localization.trial import make_pipeline, run_trial
 from touchline.bench.touches import TouchSampler, resting_signals
 from touchline.detector.detector import Detection, Detector
 from touchline.detector.model_drift import WAY, guess_drift
-from touchline.detector.thresholds import expect_drift, make_thresholds
+from touchline.detector.thresholds import expect_drift, make_thresholds, without_limits
 from touchline.localizer.localizer import Localizer
 from touchline.localizer.skin import Skin
 from touchline.model.perturbed import perturbed
@@ -40,7 +40,7 @@ def drift_of(robot, q, qd, *drift):
     """Drifts (N, r) of every row at 1 kHz, and the rows."""
     observer = tl.Observer(robot)
     thresholds = expecting(make_thresholds(robot), *drift)
-    found = Detector(observer, thresholds)
+    found = Detector(observer, without_limits(thresholds))  # a step of the speed is felt
     n, k = q.shape[1], len(robot.sensor_names)
     weight = gravity_loads(robot, q)
     signals = np.arange(len(q)) * 1e-3, q, qd, weight.torque, weight.wrench.reshape(-1, k, 6)

@@ -208,6 +208,29 @@ def real(*, data: Directory = None) -> int:
     return 0
 
 
+def imperfect(
+    *, arms: tuple[str, ...] = ("sara", "panda", "ur5"), runs: int = 40, seed: int = 0
+) -> int:
+    """Pushes on simulated arms that are not as told: masses, payload, bias, gains, friction.
+
+    Example: touchline bench imperfect --arms sara --runs 10
+
+    Nothing is calibrated. Each line counts pushes of 20 N, 0.8 s long: located before the touch,
+    found, located more than 5 cm off or without any touch, ended within 0.3 s of the release.
+
+    Args:
+        arms: Of the localization benchmark, and ur5.
+        runs: Pushes per line.
+        seed: Of all that is random.
+    """
+    from touchline.bench.imperfect.run import main
+    from touchline.numbers import check_least
+
+    check_least(1, runs=runs)
+    main(arms, runs, seed)
+    return 0
+
+
 def identify(*, data: Directory = None) -> int:
     """What identification leaves of the residuals of real arms, on motion that played no part.
 
@@ -346,6 +369,7 @@ BENCHMARKS: dict[str, Callable[..., int]] = {
     "wrench": wrench,
     "detection": detection,
     "check": check,
+    "imperfect": imperfect,
     "identify": identify,
     "real": real,
     "interface": interface,

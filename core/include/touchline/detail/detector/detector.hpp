@@ -62,6 +62,7 @@ class Detector {
   // To be called after each step of the observer, with the row it wrote and the sample it took.
   void step(const double* output, const double* q, const double* qd) {
     row_ = output;
+    qd_ = qd;
     gap_ = (static_cast<Health>(output[observer_.row_layout().health()]) & kGap) != 0;
     const double now = observer_.time();
     const double dt = timed_ ? std::max(0.0, now - time_) : 0.0;
@@ -73,6 +74,7 @@ class Detector {
       s.peak = s.sum = s.collision = 0.0;
       s.off = false;
       read_segment(g);
+      if (known(g)) s.age += dt;
       for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) test_row(i);
       judge(g, dt);
       decide(g, dt);
@@ -117,24 +119,41 @@ class Detector {
     double age = 0.0, referred = 0.0;  // over how long they have been averaged [s]
     bool started = false;
   };
+  enum class Origin {  // what an event began with
+    start,     // of observation: an offset that has yet to be seen whole
+    reversal,  // only of joints that hardly move, as friction does that changes its sign
+    creep,     // no faster than motions change
+    push
+  };
   struct Segment {
+    Origin origin = Origin::start;
+    double age = 0.0;     // since its first settled sample [s]
+    double lasted = 0.0;  // for how long the present event has [s]
     double peak = 0.0, sum = 0.0, collision = 0.0;  // of the normalized rows
     double above = 0.0, above_collision = 0.0, below = 0.0;  // for how long [s]
     double score = 0.0;  // of all tests, in thresholds
-    double top = 0.0;    // the largest peak since the event began
+    double top = 0.0;    // the largest mean of the last moments since then, in limits
     double rest = 0.0;   // for how long little has been left of it, and that has not changed [s]
     bool pending = false, pending_collision = false;
     bool off = false;  // has the arm shown that it is not as told?
   };
   static constexpr double kStanding = 0.02;  // [rad/s]; a hand that pushes an arm moves it, too
-  static constexpr double kConfirm = 15.0; // times 1 / K: settling leaves nothing of what it began with
+  static constexpr double kConfirm = 8.0; // times 1 / K: settling leaves nothing of what it began with
+  static constexpr double kStart = 3.0;    // times 1 / K: what begins sooner was there before
+  static constexpr double kStartSamples = 3.0;  // more, where the filter forgets from one to the next
   static constexpr double kAlike = 3.0;    // a factor within which an offset is still the same one
   static constexpr double kLittle = 0.5;  // of an event's peak: what may rest after it
+  static constexpr double kTrace = 0.25;  // of an event's peak: what two contacts hardly leave
+  static constexpr double kBarely = 1.5;  // limits: models of arms in motion are not better
   static constexpr double kSpike = 5.0;    // samples of calm that one of noise takes away
   static constexpr double kTrend = 2.0;   // times 1 / K: time constant of the mean of the last moments
   static constexpr double kRest = 5.0;    // times 1 / K: how long rests what has come to rest
+  static constexpr double kLeft = 0.15;   // and at least so long while the arm moves [s]
   static constexpr double kMoving = 0.1;  // [rad/s]; slower is an arm that a hand pushes aside
   static constexpr double kPause = 0.3;   // an arm that stops for less goes on moving [s]
+  static constexpr double kSlow = 0.2;    // [rad/s]; a joint that is about to turn, or just has
+  static constexpr double kCreep = 0.25;  // of what was there before: a push adds more in 2 / K
+  static constexpr double kHand = 2.0;    // a push on an arm in motion rarely lasts longer [s]
   static constexpr double kMost = 1.5;  // thresholds that a sum can grow to while all is felt
 
   void follow_motion(const double* q, const double* qd, double dt) {
@@ -228,7 +247,7 @@ class Detector {
     const double x = normalized_[i] / limits_[i];
     Segment& segment = segments_[row.segment];
     segment.peak = std::max(segment.peak, std::fabs(x));
-    segment.sum += x * x;
+    if (!(learns(i) && spreads_[i].limit() > row.contact)) segment.sum += x * x;
     segment.collision = std::max(segment.collision, std::fabs(x) * row.contact / row.collision);
   }
 
@@ -275,17 +294,22 @@ class Detector {
 
   void decide(std::size_t g, double dt) {
     Segment& s = segments_[g];
+    if (levels_[g] == 0 && !s.pending) s.origin = origin(g, dt);
     advance(s.score > 1.0, dt, s.pending, s.above);
     advance(s.collision > 1.0, dt, s.pending_collision, s.above_collision);
-    s.below = lasting(s.score < settings_.times.release, dt, s.below);
+    // What motion shows soon exceeds no limit; it need not fall below a part of it.
+    const double release = own_doing(g) ? 1.0 : settings_.times.release;
+    s.below = lasting(s.score < release, dt, s.below);
     if (s.pending && s.above >= settings_.times.min_duration) levels_[g] = std::max(levels_[g], 1);
     if (s.pending_collision && s.above_collision >= settings_.times.min_duration) levels_[g] = 2;
-    if (levels_[g] == 0) s.top = s.rest = s.below = 0.0;
+    if (levels_[g] == 0) s.top = s.rest = s.below = s.lasted = 0.0;
     if (levels_[g] == 0) return;
-    s.top = std::max(s.top, s.peak);
+    s.lasted += dt;
+    s.top = std::max(s.top, lately(g));
     s.rest = lasting(may_rest(g) && steady(g), dt, s.rest);
     if (s.below >= settings_.times.hold) levels_[g] = 0;
-    if (levels_[g] > 0 && s.rest >= kRest / slowest_[g]) come_to_rest(g);
+    const double least = kRest / slowest_[g];
+    if (levels_[g] > 0 && s.rest >= (stands() ? least : std::max(least, kLeft))) come_to_rest(g);
   }
 
   // For how long something has held, but for single samples of noise.
@@ -293,17 +317,53 @@ class Detector {
     return holds ? duration + dt : std::max(0.0, duration - kSpike * dt);
   }
 
-  // May what the last moments have of a contact be friction or an error of the model? Only if it is
-  // little of the contact's peak, the arm has shown that it is not as told, and stands.
-  bool may_rest(std::size_t g) const {
-    if (activity().speed2 > kStanding * kStanding) return false;
+  bool known(std::size_t g) const {
+    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i)
+      if (samples_[i].known) return true;
+    return false;
+  }
+
+  // What an event that begins now would have begun with.
+  Origin origin(std::size_t g, double dt) const {
+    if (segments_[g].age < kStart / slowest_[g] + kStartSamples * dt) return Origin::start;
+    bool slow = true, creeps = true;
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+      const double share = std::fabs(normalized_[i]) / limits_[i];
+      if (share < std::min(1.0, segments_[g].peak)) continue;
       const RowState& s = states_[i];
-      if (!samples_[i].known) continue;
-      const double limit = limits_[i] * rows_[i].contact;
-      if (std::fabs(s.trend - s.baseline) > kLittle * segments_[g].top * limit) return false;
+      const double quick = samples_[i].residual - s.trend, before = s.trend - s.baseline;
+      slow = slow && rows_[i].component < 0 && std::fabs(qd_[rows_[i].joint]) < kSlow;
+      creeps = creeps && std::fabs(quick) < kCreep * std::fabs(before);
     }
-    return segments_[g].off;
+    return slow ? Origin::reversal : creeps ? Origin::creep : Origin::push;
+  }
+
+  // Is what is felt of a segment most likely the arm's own doing: an error of its model in motion?
+  bool own_doing(std::size_t g) const {
+    const Segment& s = segments_[g];
+    return s.off && still_ < kPause && (s.origin != Origin::push || s.lasted > kHand);
+  }
+
+  // May what the last moments have of a contact be friction or an error of the model? Only if it is
+  // little of the contact's peak, and the arm stands and has shown that it is not as told, or moves
+  // and hardly anything is left: two contacts against each other leave more.
+  bool may_rest(std::size_t g) const {
+    const Segment& s = segments_[g];
+    const bool little = s.origin == Origin::start || lately(g) < kLittle * s.top;
+    return little && (stands() ? s.off : lately(g) < std::max(kBarely, kTrace * s.top));
+  }
+
+  bool stands() const { return activity().speed2 < kStanding * kStanding; }
+
+  // The mean of the last moments, in limits: the largest of a segment's rows.
+  double lately(std::size_t g) const {
+    double most = 0.0;
+    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+      if (!samples_[i].known) continue;
+      const double off = states_[i].trend - states_[i].baseline;
+      most = std::max(most, std::fabs(off) / (limits_[i] * rows_[i].contact));
+    }
+    return most;
   }
 
   // Has no row of the segment changed of late by what would matter?
@@ -346,7 +406,10 @@ class Detector {
     if (!samples_[i].known) return;
     s.trend += (value - s.trend) * std::min(1.0, dt * bandwidth(row) / kTrend);
     confirm_start(i, dt);
-    if (learns(i) && dt > 0.0) spreads_[i].add(value - s.baseline, dt, levels_[row.segment] > 0);
+    if (learns(i) && dt > 0.0) {
+      const bool touched = levels_[row.segment] > 0;
+      if (!touched || own_doing(row.segment)) spreads_[i].add(value - s.baseline, dt, touched);
+    }
     // Running means first, low-passes once they have seen enough.
     if (adapts(row.segment)) {
       s.referred = std::min(s.referred + dt, kReference);
@@ -393,7 +456,7 @@ class Detector {
 
   const Observer& observer_;
   Posture posture_;
-  const double* row_ = nullptr;
+  const double *row_ = nullptr, *qd_ = nullptr;
   std::vector<DetectionRow> rows_;
   DetectionSettings settings_;
   RowCovariance told_;

@@ -13,8 +13,9 @@ class MotionSpread {
   // A residual less its baseline [N or Nm], for a time dt [s] of motion. While it is taken for a
   // contact (`touched`) it counts for more: an error that begins with motion ends as an event soon.
   void add(double off, double dt, bool touched) {
-    time_ = std::min(time_ + dt, touched ? kTouched : kTime);
-    if (time_ > 0.0) square_ += (off * off - square_) * std::min(1.0, dt / time_);
+    const double news = touched ? kTouched * dt : dt;
+    time_ = std::min(time_ + news, kTime);
+    if (time_ > 0.0) square_ += (off * off - square_) * std::min(1.0, news / time_);
   }
 
   // What motion alone hardly exceeds [N or Nm]. A friction that changes sign exceeds its own root
@@ -23,7 +24,7 @@ class MotionSpread {
 
  private:
   static constexpr double kTime = 10.0;   // of motion that is remembered [s]
-  static constexpr double kTouched = 0.5;  // of motion, since a contact rarely lasts longer [s]
+  static constexpr double kTouched = 20.0;  // so many times: an error fills the memory in 0.5 s
   static constexpr double kSigmas = 3.0;  // as is usual where a scatter is not normal
 
   double time_ = 0.0, square_ = 0.0;

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pushes of 20 N on arms that are not as told, standing and in motion; nothing is calibrated."""
+
+from collections.abc import Sequence
+
+from touchline.bench.imperfect.faults import FAULTS
+from touchline.bench.imperfect.trial import Outcome, Trials
+from touchline.bench.localization.arm import load_arm
+from touchline.bench.tables import Row, aligned
+
+ARMS = ("sara", "panda", "ur5")
+NOISE = 1  # tier of the localization benchmark: 0.05 N, 0.01 Nm, 0.05 Nm
+HEAD = ("arm", "what is wrong", "", "located before", "found", "wrong place", "cleared", "events")
+
+
+def main(arms: Sequence[str], runs: int, seed: int) -> None:
+    """Prints a line for each arm, fault, and for standing and moving.
+
+    Args:
+        arms: names, see `load_arm`.
+        runs: pushes per line.
+        seed: of all that is random.
+    """
+    rows: list[Row] = [HEAD]
+    for a, name in enumerate(arms):
+        trials = Trials(load_arm(name, NOISE))
+        for f, fault in enumerate(FAULTS):
+            for moving in (False, True):
+                played = [trials.play(fault, moving, (seed, a, f, moving, k)) for k in range(runs)]
+                rows.append((name, fault.name, "moving" if moving else "standing", *_told(played)))
+    print("Pushes of 20 N for 0.8 s on arms that are not as told and not calibrated:")
+    print(aligned(rows))
+
+
+def _told(played: list[Outcome]) -> tuple[str, ...]:
+    def share(part: int) -> str:
+        return f"{part}/{len(played)}"
+
+    return (
+        share(sum(o.before for o in played)),
+        share(sum(o.found for o in played)),
+        share(sum(o.wrong for o in played)),
+        share(sum(o.cleared for o in played)),
+        f"{sum(o.events for o in played) / len(played):.1f}",
+    )

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A push on an arm that is not as told, and what is said of it."""
+
+from dataclasses import dataclass, replace
+from itertools import count
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.bench.detection.free_motion import MotionMaker, Trajectory, random_trajectory
+from touchline.bench.imperfect.faults import Fault
+from touchline.bench.touches import Touch, TouchSampler
+from touchline.localizer.skin import Skin
+from touchline.model.robot import Robot
+from touchline.observer.dynamics import contact_loads
+from touchline.pipeline.pipeline import Pipeline
+from touchline.result.event import Event
+from touchline.result.kinds import Status
+
+Array = NDArray[np.float64]
+
+RATE = 1000.0  # Hz
+SECONDS = 3.5  # of a trial
+BEGIN, END, RISE = 1.5, 2.3, 0.05  # s, of the push
+FORCE = 20.0  # N
+SPEED = 1.0  # rad/s, of the fastest joint of an arm that moves
+LATE = 0.3  # s, after which a touch that is over must have ended
+NEAR = 0.05  # m; a located place further off is wrong
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What was said of one trial.
+
+    Attributes:
+        before: was a contact located before the touch?
+        found: does an event begin within the touch, or last from before to the touch's end?
+        wrong: is an event of the touch located more than `NEAR` off, or without any touch?
+        cleared: has all ended `LATE` after the touch?
+        events: how many began.
+    """
+
+    before: bool
+    found: bool
+    wrong: bool
+    cleared: bool
+    events: int
+
+
+class Trials:
+    """Trials of one arm.
+
+    Args:
+        robot: as told.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot, self._skin = robot, Skin(robot)
+        self._segments = tuple(s for s in robot.segment_names if s != "root") or None
+
+    def play(self, fault: Fault, moving: bool, seed: tuple[int, ...]) -> Outcome:
+        """One push in a random pose or a random motion."""
+        rng = np.random.default_rng(seed)
+        arm = fault.moving(self._robot, rng)
+        trajectory = _scaled(random_trajectory(self._robot, rng), SPEED if moving else 0.0)
+        maker = MotionMaker(self._robot, arm, RATE, SECONDS)
+        q, qd, loads = maker.loads(trajectory)
+        touch = self._touch(q[round(BEGIN * RATE)], rng)
+        path = self._path(touch, q)
+        force = _course(maker.time)[:, None] * touch.force
+        wrench = np.hstack([force, np.cross(path, force)])
+        contact = contact_loads(self._robot, q, touch.patch.link, wrench)
+        n = q.shape[1]
+        loads[:, :n] -= contact.torque
+        loads[:, n:] -= contact.wrench.reshape(len(q), -1)
+        s = fault.read(maker.sensed(q, qd, loads, rng), rng)
+        pipeline = Pipeline(self._robot, period=1.0 / RATE, skin=self._skin)
+        pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+        return _judged(pipeline.events, maker.time, path)
+
+    def _touch(self, q: Array, rng: np.random.Generator) -> Touch:
+        sampler = TouchSampler(self._skin, rng, self._segments, floor=-10.0)
+        for _ in count():
+            touch = sampler.attempt(FORCE, q)
+            if touch is not None:
+                return touch
+        raise AssertionError("unreachable")
+
+    def _path(self, touch: Touch, q: Array) -> Array:
+        """Where the touched point of the link is at each sample (N, 3) [m]; the force stays."""
+        node = touch.patch.node
+        poses = np.array([self._robot.poses(x)[node] for x in q])
+        T = self._robot.poses(touch.q)[node]
+        local = T[:3, :3].T @ (touch.position - T[:3, 3])
+        return np.asarray(poses[:, :3, :3] @ local + poses[:, :3, 3], dtype=np.float64)
+
+
+def _course(time: Array) -> Array:
+    up, down = (time - BEGIN) / RISE, (time - END) / RISE
+    return np.clip(up, 0.0, 1.0) - np.clip(down, 0.0, 1.0)
+
+
+def _scaled(trajectory: Trajectory, speed: float) -> Trajectory:
+    """At a steady pace, with `speed` [rad/s] the most that its fastest joint reaches."""
+    most = (trajectory.amplitude * trajectory.frequency).sum(axis=0).max()
+    return replace(trajectory, amplitude=trajectory.amplitude * speed / most)
+
+
+def _judged(events: list[Event], time: Array, path: Array) -> Outcome:
+    end = END + RISE
+    own = [e for e in events if BEGIN <= e.detected <= end]
+    over = [e for e in events if e.detected < BEGIN and _ended(e) > end]
+    return Outcome(
+        before=any(e.detected < BEGIN and e.status == Status.LOCATED for e in events),
+        found=bool(own or over),
+        wrong=any(_wrong(e, time, path) for e in events),
+        cleared=all(_ended(e) <= end + LATE for e in events if e.detected <= end),
+        events=len(events),
+    )
+
+
+def _ended(event: Event) -> float:
+    return np.inf if event.cleared is None else event.cleared
+
+
+def _wrong(event: Event, time: Array, path: Array) -> bool:
+    """Is it located where nothing touches?"""
+    if event.status != Status.LOCATED or event.position is None:
+        return False
+    at = event.time_of_position
+    if at is None or not BEGIN <= at <= END + 2 * RISE:
+        return True
+    place = path[min(int(np.searchsorted(time, at)), len(path) - 1)]
+    return float(np.linalg.norm(event.position - place)) > NEAR

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Arms that are not as told, and that nobody has calibrated: a few pushes on each."""
+
+import numpy as np
+import pytest
+
+from touchline.bench.imperfect.faults import FAULTS, PAYLOAD
+from touchline.bench.imperfect.trial import Trials
+from touchline.bench.localization.arm import load_arm
+from touchline.cli import main
+
+
+@pytest.fixture(scope="module")
+def trials():
+    return Trials(load_arm("sara", 1))
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_a_push_on_a_standing_arm_is_found_and_ends(trials, fault):
+    outcome = trials.play(fault, False, (1,))
+    assert outcome.found and outcome.cleared and not outcome.wrong and not outcome.before
+
+
+def test_pushes_in_motion_are_found_and_end(trials):
+    heavy = next(fault for fault in FAULTS if fault.name == "masses 2 %")
+    played = [trials.play(heavy, True, (2, k)) for k in range(4)]
+    assert all(outcome.found and outcome.cleared for outcome in played)
+    assert sum(outcome.wrong for outcome in played) <= 1
+
+
+def test_the_payload_is_on_the_last_link_alone():
+    robot = load_arm("sara", 1)
+    payload = next(fault for fault in FAULTS if fault.name.startswith("payload"))
+    loaded = payload.moving(robot, np.random.default_rng(0)).mechanism.links
+    more = {
+        n: loaded[n].inertia.mass - link.inertia.mass for n, link in robot.mechanism.links.items()
+    }
+    assert sum(more.values()) == pytest.approx(PAYLOAD)
+    (name,) = [n for n, mass in more.items() if mass > 0.0]
+    body = loaded[name].inertia
+    assert (np.linalg.eigvalsh(body.inertia) >= 0.0).all()
+
+
+def test_a_benchmark_without_runs_is_told(capsys):
+    assert main(["bench", "imperfect", "--runs", "0"]) == 2
+    assert "runs" in capsys.readouterr().err
