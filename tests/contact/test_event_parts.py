@@ -6,6 +6,7 @@ import pytest
 from free_motion import free_motion
 
 import touchline as tl
+from touchline.observer.dynamics import contact_loads
 
 
 @pytest.fixture(scope="module")
@@ -17,8 +18,11 @@ def robot():
 def touched(robot):
     """Two segments are touched in turns; each touch ends before the recording does."""
     samples = free_motion(robot, seconds=3.0, rate=200.0)
-    for sensor, start in ((0, 100), (1, 160), (0, 260), (1, 400)):
-        samples.wrench[start : start + 40, sensor, 1] -= 12.0
+    for link, start in (("link3", 100), ("tool", 160), ("link3", 260), ("tool", 400)):
+        rows, push = slice(start, start + 40), [0.0, 12.0, 0.0, 0.0, 0.0, 0.0]
+        loads = contact_loads(robot, samples.q[rows], link, push)
+        samples.tau[rows] -= loads.torque
+        samples.wrench[rows] -= loads.wrench
     return samples
 
 

@@ -256,6 +256,8 @@ def _fit(
 def _without_friction(values: Array, evidence: Evidence) -> Array:
     """Columns (N, R, c) without what friction, which may be unknown, could make of them."""
     out = values.copy()
+    if evidence.joints == 0:
+        return out
     width = evidence.width_index(0, COULOMB_WIDTH)
     for j in range(evidence.joints):
         if evidence.used[j] and np.std(evidence.speed[:, j]) > MOVED:

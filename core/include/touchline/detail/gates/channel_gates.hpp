@@ -391,7 +391,10 @@ class ChannelGates {
     }
     const double force = std::hypot(d[0], d[1], d[2]), moment = std::hypot(d[3], d[4], d[5]);
     const double along = std::fabs(d[0] * d[3] + d[1] * d[4] + d[2] * d[5]);
-    return moving >= 3 && moment <= kReach * force && along <= kPitch * force * moment;
+    const double* usual = mean_.data() + first;  // the arm's own motion adds to the step
+    const double slack = force * std::hypot(usual[3], usual[4], usual[5]) +
+                         moment * std::hypot(usual[0], usual[1], usual[2]);
+    return moving >= 3 && moment <= kReach * force && along <= kPitch * force * moment + slack;
   }
 
   // What this sample teaches of the steps of each channel.
