@@ -13,6 +13,7 @@ import touchline as tl
 from touchline.cli import main
 from touchline.cli.bench import BENCHMARKS
 from touchline.logs import write_table
+from touchline.observer.dynamics import contact_loads
 
 TOUCH = slice(1000, 1200)  # samples
 
@@ -24,12 +25,21 @@ def robot():
 
 @pytest.fixture(scope="module")
 def recording(robot):
-    """Six seconds at 400 Hz; the base is pushed for half a second, twice."""
+    """Six seconds at 400 Hz; link 2 is pushed for half a second, then to the end."""
     samples = free_motion(robot, seconds=6.0, rate=400.0)
-    wrench = samples.wrench.copy()
-    wrench[TOUCH, 0, 0] -= 20.0
-    wrench[2200:, 0, 1] += 100.0
-    return replace(samples, wrench=wrench)
+    samples = pushed(robot, samples, "link2", TOUCH, [20.0, 0.0, 0.0])
+    return pushed(robot, samples, "link2", slice(2200, None), [0.0, -100.0, 0.0])
+
+
+def pushed(robot, samples, link, rows, force):
+    """With a force [N] in world on the origin of a link, as all sensors and joints feel it."""
+    q, tau, wrench = samples.q[rows], samples.tau.copy(), samples.wrench.copy()
+    places = np.array([robot.T_world_links(x)[link][:3, 3] for x in q])
+    forces = np.tile(force, (len(q), 1))
+    loads = contact_loads(robot, q, link, np.hstack([forces, np.cross(places, forces)]))
+    tau[rows] -= loads.torque
+    wrench[rows] -= loads.wrench
+    return replace(samples, tau=tau, wrench=wrench)
 
 
 @pytest.fixture(scope="module")
@@ -176,10 +186,10 @@ def test_every_benchmark_explains_itself(capsys):
 
 def test_events_are_numbered_in_the_order_of_detection(robot, tmp_path, monkeypatch):
     samples = free_motion(robot, seconds=8.0, rate=200.0)
-    wrench = samples.wrench.copy()
-    for sensor, start in ((0, 300), (1, 500), (0, 700), (2, 900), (1, 1100)):
-        wrench[start : start + 100, sensor, 1] -= 12.0
-    write_table(tmp_path / "log.parquet", replace(samples, wrench=wrench), robot.description)
+    starts = (("link3", 300), ("tool", 500), ("link3", 700), ("handle", 900), ("tool", 1100))
+    for link, start in starts:
+        samples = pushed(robot, samples, link, slice(start, start + 100), [0.0, 12.0, 0.0])
+    write_table(tmp_path / "log.parquet", samples, robot.description)
     arguments = ["analyze", str(tmp_path / "log.parquet"), "--robot", "sara-full", "--out"]
     found = []
     for chunk in (1 << 15, 411):

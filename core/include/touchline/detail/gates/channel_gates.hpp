@@ -394,7 +394,7 @@ class ChannelGates {
     const double* usual = mean_.data() + first;  // the arm's own motion adds to the step
     const double slack = force * std::hypot(usual[3], usual[4], usual[5]) +
                          moment * std::hypot(usual[0], usual[1], usual[2]);
-    return moving >= 3 && moment <= kReach * force && along <= kPitch * force * moment + slack;
+    return moving >= 2 && moment <= kReach * force && along <= kPitch * force * moment + slack;
   }
 
   // What this sample teaches of the steps of each channel.
