@@ -198,7 +198,7 @@
     // Drawn last to first: the first curve is the one that matters most.
     for (let i = panel.columns.length - 1; i >= 0; i--) {
       const { path, wide } = outline(source, panel.columns[i], frame);
-      node("path", { d: path, class: `curve s${i}${wide ? " boxes" : ""}`, ...clipped }, svg);
+      node("path", { d: path, class: `${plot.kinds[i]}${wide ? " boxes" : ""}`, ...clipped }, svg);
     }
   };
   const drawStrip = (plot) => {
@@ -334,12 +334,14 @@
   const recording = new Group([0, length], 4 * data.width);
   const overall = { start: 0, width: data.width, count: data.count, curves: data.curves.map(unpack) };
   const add = (holder, group, source, panel, draw) => {
-    const svg = holder.querySelector("svg"), values = [];
+    const svg = holder.querySelector("svg"), values = [], kinds = [];
     if (panel) holder.querySelectorAll(".key").forEach((key) => {
+      kinds.push(key.className.replace("key", "curve"));  // a curve has the colour of its key
       values.push(key.appendChild(document.createElement("span")));
       key.lastChild.className = "value";
     });
-    const plot = { svg, group, source, panel, draw, values, height: svg.viewBox.baseVal.height };
+    const height = svg.viewBox.baseVal.height;
+    const plot = { svg, group, source, panel, draw, values, kinds, height };
     group.plots.push(plot);
     interact(plot);
   };
