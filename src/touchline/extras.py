@@ -22,6 +22,7 @@ EXTRAS = {
     "aiohttp": "fleet",
     "distributed": "fleet",
     "rerun": "rerun",
+    "foxglove": "foxglove",
     "pinocchio": "bench",
     "idyntree": "bench",
     "example_robot_data": "bench",

@@ -9,7 +9,8 @@ from projection import count_near
 from window import HARMLESS, Window
 
 from touchline.view.live import LivePage
-from touchline.view.markers import COLOURS, METRES_PER_NEWTON
+from touchline.view.markers import COLOURS
+from touchline.view.moments import METRES_PER_NEWTON
 from touchline.view.server import PageServer
 
 

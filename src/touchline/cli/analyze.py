@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`touchline analyze`."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -19,6 +20,8 @@ def analyze(
     report: Literal["full", "summary", "none"] = "full",
     friction: Annotated[float | None, arg(metavar="MU")] = None,
     reach: Annotated[float | None, arg(metavar="M")] = None,
+    rerun: Annotated[Path | None, arg(metavar="FILE")] = None,
+    foxglove: Annotated[Path | None, arg(metavar="FILE")] = None,
     dry_run: bool = False,
     workers: Annotated[int, arg(metavar="N")] = 0,
     time_limit: Annotated[float | None, arg(metavar="S")] = None,
@@ -58,6 +61,8 @@ def analyze(
         report: full; summary: without pictures and curves of each event; none: no report.html.
         friction: Coefficient of friction of what touches. Default: as described (`pushes`).
         reach: Free space that a push needs: length of a finger or tool [m]. Default: as described.
+        rerun: Also a file for Rerun (.rrd): arm, contacts, curves, events. Of one recording.
+        foxglove: The same for Foxglove (.mcap).
         dry_run: Print what would be done.
         workers: Processes for several recordings. Default: one per core.
         time_limit: For each of several recordings [s].
@@ -78,17 +83,59 @@ def analyze(
     if is_single(logs):
         if robot is None:
             raise InputError(f"--robot: {logs[0]}: name the robot of this recording")
-        return _one(Path(logs[0]), robot, out, options)
+        return _one(Path(logs[0]), robot, out, options, Viewers(rerun, foxglove))
+    if rerun is not None or foxglove is not None:
+        raise InputError("--rerun, --foxglove: of one recording; analyze that one alone")
     from touchline.fleet.run import Limits
 
     return _several(logs, robot, out, options, Limits(workers, time_limit, memory_limit, cluster))
 
 
-def _one(log: Path, robot: str, out: Path, options: dict[str, Any]) -> int:
+@dataclass(frozen=True)
+class Viewers:
+    """Files for other viewers, where they are wanted."""
+
+    rerun: Path | None
+    foxglove: Path | None
+
+    def check(self, log: Path, out: Path) -> None:
+        """Make sure, before the work begins, that they can be written."""
+        from touchline.extras import need
+        from touchline.folder import check_file
+        from touchline.report.outputs import check_inputs
+
+        for module, path in (("rerun", self.rerun), ("foxglove", self.foxglove)):
+            if path is not None:
+                check_inputs(out, path)
+                if path.resolve() == log.resolve():
+                    raise InputError(f"--{module} {path}: is the recording; choose another file")
+                need(module)
+                check_file(path)
+
+    def write(self, out: Path, robot: str) -> None:
+        """Write what is wanted of the results in `out`."""
+        if self.rerun is None and self.foxglove is None:
+            return
+        from touchline.view.foxglove_file import write_foxglove
+        from touchline.view.replay import Replay
+        from touchline.view.rerun_file import write_rerun
+
+        replay = Replay(out, robot)
+        if self.rerun is not None:
+            write_rerun(replay, self.rerun)
+            print(f"for Rerun: {self.rerun}")
+        if self.foxglove is not None:
+            write_foxglove(replay, self.foxglove)
+            print(f"for Foxglove: {self.foxglove}")
+
+
+def _one(log: Path, robot: str, out: Path, options: dict[str, Any], viewers: Viewers) -> int:
     from touchline.report.analysis import analyze as run
     from touchline.report.summary import summary_text
 
+    viewers.check(log, out)
     print(summary_text(run(log, robot, out, **options)))
+    viewers.write(out, robot)
     return 0
 
 

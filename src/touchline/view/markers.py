@@ -8,6 +8,7 @@ import trimesh
 import viser
 from numpy.typing import NDArray
 
+from touchline.view.moments import METRES_PER_NEWTON
 from touchline.view.pose import quaternion_to, quaternions
 
 Array = NDArray[np.float64]
@@ -18,7 +19,6 @@ COLOURS: dict[str, Colour] = {
     "truth": (0, 114, 178),
     "candidate": (230, 159, 0),
 }
-METRES_PER_NEWTON = 0.008
 WEAK = 0.5  # N; a smaller force has no arrow
 POINT_RADIUS, ARROW_RADIUS, HEAD_RADIUS, HEAD_LENGTH = 0.011, 0.008, 0.019, 0.045  # m
 WIDE = 1.75  # of the truth, which is seen as an outline of what is felt

@@ -145,6 +145,11 @@ class Replay:
         order = np.argsort(time, kind="stable")
         return time[order], np.column_stack(q)[order]
 
+    @property
+    def times(self) -> Array:
+        """Times (N,) [s] at which the posture is known; they do not decrease."""
+        return self._stood[0]
+
     def posture(self, time: float) -> Array:
         """Joint positions (n,) [rad or m] at a time [s], straight between those that are known.
 
