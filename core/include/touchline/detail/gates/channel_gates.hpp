@@ -111,6 +111,7 @@ class ChannelGates {
   static constexpr double kSpeedStep = 0.1;     // [rad/s, m/s] of one sample,
   static constexpr double kHardest = 50.0;      // and [rad/s2, m/s2] times its period
   static constexpr double kLeastForce = 1.0, kLeastTorque = 0.2;  // [N, Nm] no contact is less
+  static constexpr double kEqual = 0.05;        // of its ratio that another channel must have too
   static constexpr double kBorneOut = 0.3;      // of a step of speed that positions show
   static constexpr double kReach = 2.0;         // [m] farther from a sensor no link is
   static constexpr double kPitch = 0.2;         // of one force: its moment along it, as a part
@@ -343,7 +344,7 @@ class ChannelGates {
     const std::size_t first = at_.wrench(), sensor = c < first ? 0 : (c - first) / 6;
     for (std::size_t other = at_.qd(); other < at_.count(); ++other) {
       const bool same = c == other || (c >= first && other >= first && (other - first) / 6 == sensor);
-      if (!same && moves(other)) return true;
+      if (!same && moves(other) && ratio_[other] > kEqual * ratio_[c]) return true;
     }
     return c >= first && !witnessed(c) && one_force(sensor);
   }
