@@ -57,7 +57,7 @@ def test_the_mouse_presses_a_button_and_writes_a_seven(browser, demo):
     window.until(lambda: "release" in kinds(page, "start"), "the button")
     assert [event.kind for event in heard[:2]] == ["press", "release"]
     assert page.arm._trajectory.wanted, "start moves the arm"
-    assert "start: press" in browser.text()
+    window.until(lambda: "start: press" in browser.text(), "the press on the page")
     page.post(lambda: page._controls.set(moving=False))
     window.until(lambda: stands(window), "the arm to stand")
 

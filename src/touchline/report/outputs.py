@@ -17,8 +17,8 @@ from touchline.observer.observer import Estimate
 from touchline.pipeline.table import ContactTable, contact_schema
 from touchline.report.postures import PostureWriter
 from touchline.result.event import Event
-from touchline.touch.spot import BEFORE
-from touchline.touch.touch import SURE, Touch
+from touchline.touch.spot import BEFORE, LIKELIER
+from touchline.touch.touch import Touch
 
 ESTIMATES, CONTACTS, POSTURES = "estimates.parquet", "contacts.parquet", "postures.parquet"
 EVENTS, ANALYSIS, REPORT = "events.json", "analysis.json", "report.html"
@@ -88,7 +88,7 @@ class _Pressed:
             thin = slice(None, None, max(1, int(near.sum()) // MOST))
             rows = time[near][thin], q[near][thin], torque[near][thin]
             found, sure = self._touch.spots.read_event(*rows, event.detected, end)[0]
-            name = found if sure >= SURE else None
+            name = found if sure >= LIKELIER else None
         return event.replace(widget=name)
 
 

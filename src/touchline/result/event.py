@@ -81,8 +81,10 @@ class Event(Value):
         return {name: _plain(value) for name, value in self._known().items()}
 
 
-# The core knows no widgets: who follows a `Touch` names them.
-lazily(Event, decoders(EVENT, Candidate) | {"widget": lambda row, names: None})
+# Fields that are not the core's (docs/architecture.md): it knows no widgets, and no result has one;
+# who follows a `Touch` beside the pipeline adds it.
+ADDED = ("widget",)
+lazily(Event, decoders(EVENT, Candidate) | dict.fromkeys(ADDED, lambda row, names: None))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

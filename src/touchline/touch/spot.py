@@ -3,38 +3,83 @@
 
 In one posture a push at one place in one direction always brings torques in the same proportion,
 whatever its force. So a spot is taught by touching it, and told from others and from touches
-elsewhere ("none of them") by its direction in the space of joint torques.
+elsewhere ("none of them") by its direction in the space of joint torques. What touches elsewhere
+can bring, and how a hand's wavering shows, follow from the robot's surface (`pushes.py`); how much
+this hand wavers on this spot, from the touches that taught it.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from math import lgamma, log, pi
 
 import numpy as np
 from numpy.typing import NDArray
 
 from touchline.localizer.skin import Skin
 from touchline.model.description import TaughtTouch
+from touchline.touch.pushes import Directions, Mask, Pushes, log_sum
 
 Array = NDArray[np.float64]
 
-REPEAT = 0.02  # rad: how well a hand repeats a direction before anything was taught (1 degree)
-REPEAT_COUNT = 5  # touches that this prior counts for
-ELSEWHERE = 0.5  # rad: spread of the directions of touches elsewhere, in parts of the lever arms
+WAVER_FORCE = np.geomspace(0.02, 0.4, 7)  # rad: a hand's direction wavers by one of these (1-23°)
+WAVER_PLACE = np.geomspace(0.001, 0.02, 7)  # m: its place by one of these, all equally likely
 POSTURE = 0.1  # rad (rms over the joints): farther from where it was taught a spot is not told
 STEP_NOISE = 0.05  # Nm: what noise and stiction leave in a step of one joint
 BEFORE = 0.3, 0.03  # s: from when to when before a touch its torques are taken as those at rest
-AVERAGE = 0.05  # s, over which the direction of a torque step is averaged
+AVERAGE = 0.1  # s, over which the direction of a torque step is averaged
 LEAST_STEP = 0.3  # Nm; smaller steps have no direction worth the name
-LEAST_LEVER = 0.05  # m, of a joint about whose axis everything outboard is close
+LIKELIER = 0.5  # probability from which a spot counts: it is likelier than all else together
 
 
-@dataclass(frozen=True)
 class _Spot:
-    name: str
-    q: Array
-    direction: Array
-    count: int
+    """One spot in one posture.
+
+    Args:
+        name: of its widget.
+        q: (n,) the posture.
+        steps: (K, n) that taught it [Nm].
+        known: (n,) bool, the joints that count.
+        pushes: in this posture.
+    """
+
+    def __init__(self, name: str, q: Array, steps: Array, known: Mask, pushes: Pushes) -> None:
+        self.name, self.q, self.pushes = name, q, pushes
+        sizes = np.linalg.norm(steps[:, known], axis=1)
+        self.least = float(sizes.min())
+        units = steps[:, known] / sizes[:, None]
+        middle = units.mean(axis=0)
+        middle /= np.linalg.norm(middle)
+        noise = STEP_NOISE / sizes
+        self.doubt = float(noise.mean()) / np.sqrt(len(units))  # that noise leaves in the middle
+        by_force, by_place = pushes.wavering(middle, self.doubt)
+        spreads = np.array(
+            [f**2 * by_force + p**2 * by_place for f in WAVER_FORCE for p in WAVER_PLACE]
+        )
+        weights = _evidence(units, middle, spreads, noise)
+        many = np.tile(middle, (len(spreads), 1))
+        self.directions = Directions.of(many, (1.0 + 1.0 / len(units)) * spreads, weights)
+
+    def evidence(self, unit: Array, noise: float) -> float:
+        """How much likelier a direction (n,) is on this spot than elsewhere; a logarithm.
+
+        Both are looked at as sharply as the lessons and the noise of one sigma `noise` allow.
+        """
+        sharp = float(np.hypot(noise, self.doubt))
+        here = self.directions.log_density(unit, sharp)
+        return here - self.pushes.log_density(unit, sharp)
+
+
+def _evidence(units: Array, middle: Array, spreads: Array, noise: Array) -> Array:
+    """How likely each spread (M, n, n) is, of taught directions (K, n) about their mean; sum 1."""
+    if len(units) == 1:
+        return np.full(len(spreads), 1.0 / len(spreads))
+    logs = np.zeros(len(spreads))
+    for unit, sigma in zip(units, noise, strict=True):
+        total = spreads + sigma**2 * np.eye(len(middle))
+        off = unit / (unit @ middle) - middle
+        far = np.einsum("j,ijk,k->i", off, np.linalg.inv(total), off)
+        # The mean was taken from them: one of K directions is used up.
+        logs -= 0.5 * (far + (1.0 - 1.0 / len(units)) * np.linalg.slogdet(total)[1])
+    shares = np.exp(logs - logs.max())
+    return shares / shares.sum()
 
 
 class TorqueSpots:
@@ -42,27 +87,32 @@ class TorqueSpots:
 
     Args:
         taught: the touches that taught each spot.
-        skin: of the robot: its lever arms say how much each joint's part may vary.
+        skin: of the robot.
     """
 
     def __init__(self, taught: Mapping[str, Sequence[TaughtTouch]], skin: Skin) -> None:
         self._skin = skin
-        self._spots: list[_Spot] = []
-        scatter: list[Array] = []
-        for name, touches in taught.items():
-            for q, steps in _by_posture(touches):
-                units = steps / np.linalg.norm(steps, axis=1, keepdims=True)
-                middle = units.mean(axis=0)
-                self._spots.append(_Spot(name, q, middle / np.linalg.norm(middle), len(units)))
-                scatter.append(units - middle)
-        self._scatter = np.vstack(scatter) if scatter else np.empty((0, 0))
-        self._degrees = REPEAT_COUNT + len(self._scatter) - len(self._spots)
-        self._prepared: dict[bytes, tuple[Array, Array]] = {}
+        self._taught = [
+            (name, q, steps)
+            for name, touches in taught.items()
+            for q, steps in _by_posture(touches)
+        ]
+        self._spots: dict[bytes, list[_Spot]] = {}
+        self._of(np.array([joint.torque != "none" for joint in skin.robot.description.joints]))
 
     @property
     def names(self) -> tuple[str, ...]:
         """Of all spots."""
-        return tuple(dict.fromkeys(spot.name for spot in self._spots))
+        return tuple(dict.fromkeys(name for name, _, _ in self._taught))
+
+    def least(self, q: Array) -> float:
+        """The softest touch that taught a spot in this posture (n,) [Nm]; infinite without one."""
+        sizes = [
+            np.linalg.norm(steps, axis=1).min()
+            for _, posture, steps in self._taught
+            if _apart(posture, q) < POSTURE
+        ]
+        return float(min(sizes, default=np.inf))
 
     def read(self, q: Array, step: Array) -> list[tuple[str | None, float]]:
         """Which spot a touch is on: (name, probability), best first; None: none of them.
@@ -71,22 +121,16 @@ class TorqueSpots:
             q: joint positions (n,) [rad or m].
             step: (n,) change of the external torque by the touch [Nm]; NaN where not measured.
         """
-        near = [s for s in self._spots if np.sqrt(np.mean((s.q - q) ** 2)) < POSTURE]
         known = np.isfinite(step)
         size = float(np.linalg.norm(step[known]))
-        if not near or size < LEAST_STEP:
+        if size < LEAST_STEP or not any(_apart(at, q) < POSTURE for _, at, _ in self._taught):
             return [(None, 1.0)]
-        levers, within = self._spread(near[0].q)
-        noise = (STEP_NOISE / size) ** 2 * np.eye(len(step))
-        unit = np.where(known, step / size, 0.0)
-        part = np.ix_(known, known)
-        scores: list[tuple[str | None, float]] = []
-        for spot in near:
-            spread = (within * (1.0 + 1.0 / spot.count) + noise)[part]
-            off = (unit - spot.direction)[known]
-            scores.append((spot.name, _log_student(off, spread, self._degrees) - log(len(near))))
-        around = (np.diag((ELSEWHERE * levers) ** 2) + noise)[part]
-        scores.append((None, _log_normal(unit[known], around)))
+        near = [spot for spot in self._of(known) if _apart(spot.q, q) < POSTURE]
+        unit, noise = step[known] / size, STEP_NOISE / size
+        scores: list[tuple[str | None, float]] = [
+            (spot.name, spot.evidence(unit, noise) - np.log(len(near))) for spot in near
+        ]
+        scores.append((None, 0.0))
         return _shares(scores)
 
     def read_event(
@@ -112,36 +156,22 @@ class TorqueSpots:
         largest = int(np.argmax(np.linalg.norm(np.nan_to_num(mean), axis=1)))
         return self.read(q[during[largest]], mean[largest])
 
-    def _spread(self, q: Array) -> tuple[Array, Array]:
-        """Lever arms (n,) in parts of the longest, and the spread (n, n) of a spot's direction."""
-        key = q.tobytes()
-        if key not in self._prepared:
-            levers = lever_arms(self._skin, q)
-            levers /= levers.max()
-            prior = REPEAT_COUNT * np.diag((REPEAT * levers) ** 2)
-            total = prior + self._scatter.T @ self._scatter
-            self._prepared[key] = levers, total / self._degrees
-        return self._prepared[key]
+    def _of(self, known: Mask) -> list[_Spot]:
+        """The spots as the joints `known` (n,) show them."""
+        key = known.tobytes()
+        if key not in self._spots:
+            spots: list[_Spot] = []
+            for name, q, steps in self._taught:
+                same = (spot.pushes for spot in spots if _apart(spot.q, q) < POSTURE / 10)
+                pushes = next(same, None) or Pushes(self._skin, q, known)
+                spots.append(_Spot(name, q, steps, known, pushes))
+            self._spots[key] = spots
+        return self._spots[key]
 
 
-def lever_arms(skin: Skin, q: Array) -> Array:
-    """The longest arm (n,) [m] that a force on a link outboard of each joint has about its axis."""
-    robot = skin.robot
-    poses = robot.poses(q)
-    levers = np.full(len(robot.joint_names), LEAST_LEVER)
-    for patch in skin.patches:
-        T = poses[patch.node] @ patch.T_node_link
-        points = patch.surface.vertices @ T[:3, :3].T + T[:3, 3]
-        node = patch.node
-        while node >= 0:
-            here, pose = robot.nodes[node], poses[node]
-            if here.coordinate >= 0:
-                arm = 1.0  # a prismatic joint carries the force itself
-                if here.kind == "revolute":
-                    arm = np.linalg.norm(np.cross(points - pose[:3, 3], pose[:3, 2]), axis=1).max()
-                levers[here.coordinate] = max(levers[here.coordinate], arm)
-            node = here.parent
-    return levers
+def _apart(one: Array, other: Array) -> float:
+    """How far two postures (n,) are apart [rad], rms over the joints."""
+    return float(np.sqrt(np.mean((one - other) ** 2)))
 
 
 def _by_posture(touches: Sequence[TaughtTouch]) -> list[tuple[Array, Array]]:
@@ -150,7 +180,7 @@ def _by_posture(touches: Sequence[TaughtTouch]) -> list[tuple[Array, Array]]:
     for touch in touches:
         q, step = np.array(touch.q), np.array(touch.step)
         for known, steps in postures:
-            if np.sqrt(np.mean((known - q) ** 2)) < POSTURE:
+            if _apart(known, q) < POSTURE:
                 steps.append(step)
                 break
         else:
@@ -158,27 +188,9 @@ def _by_posture(touches: Sequence[TaughtTouch]) -> list[tuple[Array, Array]]:
     return [(q, np.array(steps)) for q, steps in postures]
 
 
-def _log_student(x: Array, spread: Array, degrees: int) -> float:
-    n = len(x)
-    distance = float(x @ np.linalg.solve(spread, x))
-    return (
-        lgamma((degrees + n) / 2)
-        - lgamma(degrees / 2)
-        - 0.5 * n * log(degrees * pi)
-        - 0.5 * float(np.linalg.slogdet(spread)[1])
-        - 0.5 * (degrees + n) * log(1.0 + distance / degrees)
-    )
-
-
-def _log_normal(x: Array, spread: Array) -> float:
-    distance = float(x @ np.linalg.solve(spread, x))
-    return -0.5 * (distance + float(np.linalg.slogdet(spread)[1]) + len(x) * log(2 * pi))
-
-
 def _shares(scores: list[tuple[str | None, float]]) -> list[tuple[str | None, float]]:
-    highest = max(score for _, score in scores)
-    sums: dict[str | None, float] = {}
-    for name, score in scores:
-        sums[name] = sums.get(name, 0.0) + float(np.exp(score - highest))
-    total = sum(sums.values())
-    return sorted(((name, x / total) for name, x in sums.items()), key=lambda pair: -pair[1])
+    names = dict.fromkeys(name for name, _ in scores)
+    logs = {n: log_sum(np.array([score for name, score in scores if name == n])) for n in names}
+    total = log_sum(np.array(list(logs.values())))
+    shares = [(name, float(np.exp(score - total))) for name, score in logs.items()]
+    return sorted(shares, key=lambda pair: -pair[1])

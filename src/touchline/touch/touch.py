@@ -20,18 +20,19 @@ from touchline.suggest import unknown
 from touchline.touch.beside import STEPS, WAVER, Beside, Other, Rows
 from touchline.touch.gesture import EASING, LIFTED, PRESS, Finger, GestureReader, near
 from touchline.touch.grip import Grip
+from touchline.touch.soft import DWELL as TORQUE_DWELL
+from touchline.touch.soft import SoftTouch
 from touchline.touch.spot import AVERAGE as TORQUE_AVERAGE
-from touchline.touch.spot import BEFORE, TorqueSpots
+from touchline.touch.spot import BEFORE, LIKELIER, TorqueSpots
 from touchline.touch.stroke import Stroke
 from touchline.touch.widget import Widget
 
 Array = NDArray[np.float64]
 
 DWELL = 0.03  # s; by then 99 % of the collisions are called so (docs/reaction.md), and no command
-TORQUE_DWELL = 0.1  # s; a torque step has its direction once the force no longer rises
-FULL = 0.8  # of the largest step of a press; a smaller mean is of a force that rises or falls
+FULL = 0.5  # of the largest step of a press; a smaller mean is of a force that rises or falls
 LATEST = 0.25  # s; a finger that is not on a widget by then only passes over it
-SURE = 0.9  # probability of being on a widget, or of a taught spot, from which it counts
+SURE = 0.9  # probability of being on a widget, from which it counts
 GESTURE_MOST = 60.0  # N; what presses harder means no gesture
 AVERAGE = 0.03  # s, over which the place of a press is averaged
 STROKE_LEAST = 0.01  # m; a shorter way on a pad is a press, no stroke
@@ -201,6 +202,8 @@ class Touch:
         self.widgets = {name: make_widget(name, given[name], self.patches) for name in given}
         taught = {name: entry.taught for name, entry in given.items() if entry.taught}
         self._spots = TorqueSpots(taught, skin) if taught else None
+        soft = self._spots is not None and not robot.sensor_names
+        self._soft = SoftTouch(self._spots) if self._spots is not None and soft else None
         self.values: dict[str, Any] = {
             w.name: False for w in self.widgets.values() if w.kind == "toggle"
         }
@@ -242,7 +245,8 @@ class Touch:
         found: list[TouchEvent] = []
         torque = result.estimate.tau_ext
         contacts = result.contacts
-        if not contacts and not self._presses:
+        resting = self._soft is None or self._soft.resting is None
+        if resting and not contacts and not self._presses:
             self._rest.append((time, torque))
             while self._rest[0][0] < time - BEFORE[0]:
                 self._rest.popleft()
@@ -257,6 +261,7 @@ class Touch:
             found += self._follow(contact, result, q, torque, poses)
         for number in [n for n in self._presses if n not in seen]:
             found += self._lift(self._presses[number], time)
+        found += self._softly(time, q, torque, bool(contacts))
         fingers = [press.finger for press in self._presses.values()]
         found += [self._gesture_event(g) for g in self._gestures.follow(fingers, time)]
         for number in [n for n, p in self._presses.items() if p.finger.lifted is not None]:
@@ -291,6 +296,22 @@ class Touch:
     def spots(self) -> TorqueSpots | None:
         """What tells spots that were taught by joint torques; None where there are none."""
         return self._spots
+
+    def _softly(self, time: float, q: Array, torque: Array, felt: bool) -> list[TouchEvent]:
+        """What touches do that the detector does not feel, or no longer."""
+        if self._soft is None:
+            return []
+        if any(press.widget is not None for press in self._presses.values()):
+            self._soft.leave()
+        told = self._soft.follow(time, q, torque, felt)
+        if told is None:
+            return []
+        kind, name, probability = told
+        found = [TouchEvent(kind, name, time, probability=probability)]
+        if kind == "press" and self.widgets[name].kind == "toggle":
+            self.values[name] = not self.values[name]
+            found.append(replace(found[0], kind="toggle", value=self.values[name]))
+        return found
 
     def _follow(self, contact: Contact, result: Result, q, torque, poses) -> list[TouchEvent]:
         time = result.time
@@ -365,7 +386,12 @@ class Touch:
             resting = np.mean(early, axis=0) if early else np.zeros_like(torque)
             felt = contact.wrench is not None
             before = self._before(contact, time) if felt else None
+            if not felt and self._soft is not None and self._soft.resting is not None:
+                resting = self._soft.resting
             press = Press(finger, resting, felt, before, resting)
+            if self._soft is not None and self._soft.name is not None:
+                press.widget = self.widgets[self._soft.name]  # a soft touch that grew
+                finger.widget = press.widget.name
         self._presses[contact.event] = press
         return press
 
@@ -488,10 +514,13 @@ class Touch:
         if finger.collision or age < DWELL or (press.felt and age > LATEST):
             return []
         widget, probability = self._on_widget(press, q, time)
-        if widget is None or probability < SURE:
+        if widget is None:
             return []
-        if contact.force is not None and not widget.force <= finger.now <= widget.most:
-            return []
+        # Torques alone tell no force in N of a spot without a place: a blow ends it, no limit does.
+        if contact.force is not None and not widget.given.taught:
+            size = finger.now if press.felt else _size(contact.force)
+            if not widget.force <= size <= widget.most:
+                return []
         press.widget, finger.widget = widget, widget.name
         found = [self._event("press", press, time, probability=probability)]
         if widget.kind == "toggle":
@@ -512,15 +541,16 @@ class Touch:
             ]
             if chances:
                 best = max(chances, key=lambda chance: chance[:2])
-                return best[2], best[0]
-        if self._spots is not None and press.full is not None:
-            step = press.full[1]
-            if _size(step) < FULL * finger.peak:
-                return None, 0.0
-            name, probability = self._spots.read(q, step)[0]
-            if name is not None:
-                return self.widgets[name], probability
-        return None, 0.0
+                return (best[2], best[0]) if best[0] >= SURE else (None, 0.0)
+        if self._spots is None or press.full is None or time - press.looked < PAUSE:
+            return None, 0.0
+        press.looked, step = time, press.full[1]
+        if _size(step) < FULL * finger.peak:
+            return None, 0.0
+        name, probability = self._spots.read(q, step)[0]
+        if name is None or probability < LIKELIER:
+            return None, 0.0
+        return self.widgets[name], probability
 
     def _along(self, press: Press, result: Result, poses) -> tuple[float, Array] | None:
         """Way and force (3,) of a slider's finger where others touch its segment, too."""
@@ -547,7 +577,7 @@ class Touch:
         widget, finger = press.widget, press.finger
         if widget is None or finger.last is None or not press.places:
             return []
-        if finger.collision or finger.now > widget.most:
+        if finger.collision or (press.felt and finger.now > widget.most):
             return self._lift(press, time)
         reading = widget.read(press.places[-1][1])
         if widget.kind == "pad" and isinstance(reading.value, tuple):
