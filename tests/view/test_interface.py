@@ -47,16 +47,38 @@ def draw(page, name, places):
     run(page, 60)
 
 
-def test_buttons_move_stop_and_teach_the_arm(page):
+def test_buttons_start_and_stop_the_arm(page):
     for name, moving in (("start", True), ("stop", False)):
         click(page, name)
         assert [e.kind for e in page.touch.events if e.widget == name][:2] == ["press", "release"]
         assert page.arm._trajectory.wanted is moving
-    points = len(page._path.points)
-    click(page, "point")
-    told = [line for line in page._told if line.startswith("point")]
-    assert told == (["point 2"] if len(page._path.points) > points else ["point: taught already"])
     assert page.restarts == 0
+
+
+def test_a_hand_leads_the_arm_to_a_point_of_its_path(page):
+    run(page, 90)  # it stands again
+    home = page.arm.q
+    link = page.arm.robot.T_world_links(home)["link6"][:3, 3]
+    page.pull_begins(2, "", link, EYE)
+    run(page, 60)
+    page.pull_ends(2)
+    run(page, 60)
+    there = page.arm.q
+    assert np.abs(there - home).max() > 0.1, "the arm was led elsewhere"
+    run(page, 30)
+    assert np.abs(page.arm.q - there).max() < 0.01, "and stays there"
+    click(page, "point")
+    assert "point 2" in page._told and len(page._path.points) == 2
+    click(page, "point")
+    assert len(page._path.points) == 2, "taught already"
+    click(page, "start")
+    ways = []
+    for _ in range(60):
+        run(page, 5)
+        ways.append([np.abs(page.arm.q - q).max() for q in page._path.points])
+    click(page, "stop")
+    assert np.min(ways, axis=0).max() < 0.03, "it goes to both points"
+    run(page, 90)
 
 
 def test_the_slider_sets_the_speed(page):

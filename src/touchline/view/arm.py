@@ -122,6 +122,10 @@ class LiveArm:
         """The reaction that has taken over from the arm's own controller."""
         return self._controller.active
 
+    def lead(self, step: Array) -> None:
+        """Moves the pose at which it stands by (n,) [rad or m]."""
+        self._trajectory.lead(step)
+
     def feel(self, contacts: list[Contact], tau_ext: Array) -> None:
         """Tells the arm what it feels, for it to react: `tau_ext` (n,) [Nm], NaN if not known."""
         self._controller.contacts, self._controller.tau_ext = contacts, tau_ext

@@ -18,7 +18,7 @@ from touchline.simulation.setup import read_setup
 from touchline.touch.plain import plain_digits
 from touchline.touch.recognizer import Recognizer
 from touchline.touch.stroke import Stroke
-from touchline.touch.touch import Touch, TouchEvent
+from touchline.touch.touch import LATEST, Touch, TouchEvent
 from touchline.view.arm import LiveArm
 from touchline.view.finger import Finger
 from touchline.view.grasp import let_touch
@@ -33,11 +33,13 @@ Array = NDArray[np.float64]
 
 PART = 10  # samples after which a finger is moved on
 FORCE, STIFFNESS = 8.0, 100.0  # N, %; the page begins with
+GUIDED = 20.0  # Nm s/rad: how fast the standing arm gives way to a finger beside the widgets
 TOLD = 8  # last events that the page lists
 SPEEDS = (0.1, 0.8)  # rad/s at the ends of the slider
 ADVICE = (
     "**Click** on a widget to press it, **drag** to slide or write. `start` and `stop` move the "
-    "arm along its path, `speed` says how fast, `point` teaches its posture as a point of the path."
+    "arm along its path, `speed` says how fast. **Hold** beside the widgets to lead the standing "
+    "arm elsewhere; `point` teaches its posture as a point of the path."
 )
 
 
@@ -64,6 +66,7 @@ class Commanded:
 
     def __init__(self, robot: Robot, skin: Skin, touch: Touch) -> None:
         self._robot, self.touch = robot, touch
+        self.torque = np.zeros(len(robot.joint_names))  # that is felt [Nm]
         self._pipeline = Pipeline(robot, skin=skin)
 
     def get(self, name: str) -> "Commanded":
@@ -79,6 +82,7 @@ class Commanded:
             self.touch.update(result)
             levels.append(result.detection.levels)
             wrench.append(result.estimate.segment_wrench)
+        self.torque = np.nan_to_num(result.estimate.tau_ext)
         return Felt(
             self._robot.segment_names, s.time, np.array(levels), np.array(wrench),
             result.estimate.tau_ext, result.contacts, int(result.health),
@@ -129,7 +133,8 @@ class InterfacePage(LivePage):
         self.touch = Touch(robot, self._skin)
         for name in self.touch.widgets:
             self.touch.on(name, self._on_event)
-        return Commanded(robot, self._skin, self.touch)
+        self._commanded = Commanded(robot, self._skin, self.touch)
+        return self._commanded
 
     def _on_event(self, event: TouchEvent) -> None:
         arm = self.arm
@@ -203,8 +208,22 @@ class InterfacePage(LivePage):
                 finger.step(part * 1e-3)
             self._fingers = [finger for finger in self._fingers if not finger.hand.released]
             last = super()._feel(part)
+            if self._is_guided():
+                self.arm.lead(self._commanded.torque * part * 1e-3 / GUIDED)
             rows -= part
         return last
+
+    def _is_guided(self) -> bool:
+        """Does the arm stand, and a finger press on it that is on no widget?"""
+        presses = [press for press in self.touch.presses if not press.finger.doubtful]
+        return (
+            bool(presses)
+            and not self._controls.conditions().moving
+            and all(
+                press.widget is None and press.finger.duration(self.arm.time) > LATEST
+                for press in presses
+            )
+        )
 
     def _show(self, q: Array, true: list[Touched]) -> None:
         super()._show(q, true)

@@ -30,6 +30,10 @@ class Switched:
         self._away = np.zeros_like(q)
         self._away, self._resumed = q - self(time).q, time
 
+    def lead(self, step: Array) -> None:
+        """Moves the pose at which it stands by (n,) [rad or m]."""
+        self._pose = self._pose + step
+
     def __call__(self, time: float) -> Setpoint:
         """The setpoint at a time [s]; times do not go back."""
         if time >= self._began + EASE and self._to != float(self.wanted):

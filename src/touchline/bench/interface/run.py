@@ -14,6 +14,13 @@ from touchline.bench.interface.writing import confusion, draw, pen_digits, write
 from touchline.bench.tables import aligned
 from touchline.errors import InputError
 
+# What others report, of other arms and other tasks: to stand beside, not to compare digit by digit.
+WRITTEN_BEFORE = ("published: letters and digits on another arm [1]", "90 to 95 %", "-", "-")
+GESTURES_BEFORE = ("published: tap, double tap, push, grab [2]", "over 95 %", "-", "-", "-")
+SOURCES = (
+    "[1] Iskandar, Albu-Schaeffer, Dietrich, Science Robotics 2024 (adn4008; secondary source)",
+    "[2] a real Panda, joint torques alone, learned: arXiv 2508.12435",
+)
 PARTS = ("digits", "buttons", "sliders", "gestures", "unmeant", "spots")
 
 
@@ -43,7 +50,8 @@ def main(plan: Plan) -> None:
             print(aligned([title, *sliders(plan.runs, rng)]) + "\n", flush=True)
         elif part == "gestures":
             title = ("gestures", "right", "wrong", "missed", "decided p50, p99")
-            print(aligned([title, *gestures(plan.runs, rng)]) + "\n", flush=True)
+            rows = [title, *gestures(plan.runs, rng), GESTURES_BEFORE]
+            print(f"{aligned(rows)}\n{SOURCES[1]}\n", flush=True)
         elif part == "unmeant":
             title = (
                 "pushes beside five buttons",
@@ -63,7 +71,8 @@ def _print_digits(plan: Plan, rng: np.random.Generator) -> None:
         return
     written = write(digits, plan.runs, rng)
     title = ("digits of 14 unseen writers", "read", "place p50", "as drawn, read")
-    print(aligned([title, *(found.row() for found in written)]) + "\n")
+    print(aligned([title, *(found.row() for found in written), WRITTEN_BEFORE]))
+    print(f"{SOURCES[0]}\n")
     print(aligned(confusion(written[0])) + "\n", flush=True)
     if plan.picture is not None:
         try:
