@@ -3,7 +3,7 @@
 PYTHON := .venv/bin/python
 CORE := $(shell find core -name '*.hpp' -o -name '*.cpp' -o -name 'CMakeLists.txt')
 
-.PHONY: demo test check format docs clean
+.PHONY: demo test check format docs wheels acceptance clean
 
 demo: .venv/demo
 	.venv/bin/touchline demo $(ARGS)
@@ -25,8 +25,16 @@ docs: .venv/docs
 	$(PYTHON) scripts/make_reference.py
 	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict --quiet
 
+# For each Python from 3.11 on that is found; needs network for the build tools.
+wheels:
+	scripts/wheels.sh dist
+
+# Eight robots in a fresh environment: make acceptance WHEEL=dist/touchline-...whl
+acceptance:
+	python3 scripts/acceptance.py $(WHEEL) $(ARGS)
+
 clean:
-	rm -rf .venv build site
+	rm -rf .venv build dist site
 
 .venv/demo: pyproject.toml scripts/setup.sh $(CORE)
 	scripts/setup.sh demo

@@ -21,6 +21,16 @@ namespace touchline::logs {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
+// The bytes in the other order.
+template <class Integer>
+Integer swapped(Integer value) {
+  Integer turned = 0;
+  for (std::size_t i = 0; i < sizeof value; ++i) {
+    turned = static_cast<Integer>(turned << 8 | (value >> (8 * i) & 0xff));
+  }
+  return turned;
+}
+
 // Steps through one message. After the first thing that does not fit `good()` is false, and all
 // that is read from then on is 0 or empty.
 class CdrReader {
@@ -43,7 +53,7 @@ class CdrReader {
     std::uint32_t value;
     std::memcpy(&value, data_ + at_, 4);
     at_ += 4;
-    return little_ ? value : __builtin_bswap32(value);
+    return little_ ? value : swapped(value);
   }
 
   std::string_view text() {
@@ -73,7 +83,7 @@ class CdrReader {
   double number(const std::uint8_t* where) const {
     std::uint64_t bits;
     std::memcpy(&bits, where, 8);
-    if (!little_) bits = __builtin_bswap64(bits);
+    if (!little_) bits = swapped(bits);
     double value;
     std::memcpy(&value, &bits, 8);
     return value;

@@ -170,6 +170,21 @@ def test_free_and_ball_joints_are_refused_together(tmp_path):
     assert "robot.xml: body 'c': free joint 'joint_1': the robot must stand on the world" in free
 
 
+LEG = """<body name="pelvis" pos="0 0 1"><freejoint/><geom size=".1"/>
+<body name="thigh"><joint name="hip"/><geom size=".1"/></body></body>"""
+
+
+def test_a_robot_on_one_free_joint_stands_still_and_is_told(tmp_path):
+    mechanism = load_mechanism(write(tmp_path, LEG))
+    moving = [name for name, joint in mechanism.joints.items() if joint.kind != "fixed"]
+    assert moving == ["hip"]
+    assert mechanism.joints["pelvis/fixed"].T_parent_joint[2, 3] == 1.0
+    (warning,) = mechanism.warnings
+    assert "pelvis floats on a free joint; it is taken to stand still" in warning
+    with pytest.raises(InputError, match="body 'c': free joint"):  # an object beside it
+        load_mechanism(write(tmp_path, LEG + FREE))
+
+
 def test_mujoco_s_errors_are_ours(tmp_path):
     with pytest.raises(InputError, match=r"robot\.xml: MuJoCo cannot read it: .*unrecognized"):
         load_mechanism(write(tmp_path, "<boddy/>"))

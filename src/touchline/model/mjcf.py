@@ -47,6 +47,9 @@ def load_mjcf(path: Path | str) -> Mechanism:
         raise InputError(problems)
     links, joints = reader.tree()
     joints, notes = reader.couple(joints)
+    if reader.floating is not None:
+        body = model.body(model.jnt_bodyid[reader.floating]).name or "the first body"
+        notes.append(f"{body} floats on a free joint; it is taken to stand still on the world")
 
     def fault(where: str, what: str) -> None:
         problems.append(f"{path}: {where}: {what}")
@@ -76,6 +79,7 @@ class MjcfReader:
             int(self.mujoco.mjtJoint.mjJNT_FREE): "free",
             int(self.mujoco.mjtJoint.mjJNT_BALL): "ball",
         }
+        self.floating = self._floating()
 
     def gravity(self) -> Array:
         """Return the acceleration of gravity (3,) in world [m/s2]; zero where it is disabled."""
@@ -86,8 +90,22 @@ class MjcfReader:
         """Yield (joint, kind, body) of each joint that is neither hinge nor slide."""
         for index in range(self.model.njnt):
             kind = self.kinds[int(self.model.jnt_type[index])]
-            if kind in REMEDIES:
+            if kind in REMEDIES and index != self.floating:
                 yield self._joint_name(index), kind, self._body_name(self.model.jnt_bodyid[index])
+
+    def _floating(self) -> int | None:
+        """Return the free joint that carries all hinges and slides; None if there is none."""
+        model = self.model
+        kinds = [self.kinds[int(kind)] for kind in model.jnt_type]
+        free = [index for index, kind in enumerate(kinds) if kind == "free"]
+        moved = {
+            int(model.body_rootid[model.jnt_bodyid[index]])
+            for index, kind in enumerate(kinds)
+            if kind != "free"
+        }
+        if len(free) != 1 or moved != {int(model.jnt_bodyid[free[0]])}:
+            return None
+        return free[0]
 
     def tree(self) -> tuple[dict[str, Link], dict[str, Joint]]:
         """Return the links and joints, each body after its parent."""
@@ -138,7 +156,7 @@ class MjcfReader:
         first = model.body_jntadr[body]
         indices = range(first, first + model.body_jntnum[body])
         between, chain = {}, []
-        for index in indices:
+        for index in () if self.floating in indices else indices:
             # A slide's axis has no place, so its child keeps the body's origin.
             hinge = self.kinds[int(model.jnt_type[index])] == "revolute"
             anchor = model.jnt_pos[index] if hinge else np.zeros(3)
