@@ -5,6 +5,7 @@ import copy
 import json
 import pickle
 from dataclasses import fields, replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -119,3 +120,18 @@ def test_events_that_begin_and_end_are_told_once():
     assert all(event == ended[event.id] for event in events if event.cleared is not None)
     decided = {c.event.id for c in told if c.event.decided is not None}
     assert decided == {event.id for event in events if event.decided is not None}
+
+
+def test_a_notebook_shows_a_robot_and_its_pipeline_says_what_it_is():
+    pipeline = tl.Pipeline("sara", bandwidth=50.0)
+    assert repr(pipeline) == (
+        "<Pipeline of sara: method segment, bandwidth 50 rad/s, 1000 Hz, 0 events>"
+    )
+    assert "described bandwidth" in repr(tl.Pipeline("sara"))
+    (picture,) = ElementTree.fromstring(f"<div>{pipeline.robot._repr_html_()}</div>").findall("svg")
+    x, y, width, height = map(float, picture.get("viewBox", "").split())
+    places = [(float(c.get("cx", "")), float(c.get("cy", ""))) for c in picture.iter("circle")]
+    assert len(places) == len(pipeline.robot.nodes)
+    assert all(x < a < x + width and y < b < y + height for a, b in places)
+    with pytest.raises(tl.InputError, match="no robot of this name"):
+        tl.Pipeline("sarra")

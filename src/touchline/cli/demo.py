@@ -106,5 +106,7 @@ def _print(duration: float, out: Path, seed: int, name: str) -> int:
     simulate_to_log("demo", robot, log, write_table, settings, {"seconds": duration})
     analysis = analyze(log, name, out)
     print(comparison_text(analysis.comparisons, analysis.events))
+    for line in analysis.faint:
+        print(f"faint: {line}")
     print(f"report: {out / 'report.html'}")
     return 0

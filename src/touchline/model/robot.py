@@ -67,14 +67,37 @@ class Robot:
         )
 
     def _repr_html_(self) -> str:
-        """The robot as a notebook shows it: its bodies with masses, segments and joints."""
+        """The robot as a notebook shows it: its skeleton, and bodies with masses and segments."""
         rows = "".join(
             f"<tr><td>{escape(', '.join(body.links))}</td><td>{escape(body.segment)}</td>"
             f"<td>{self.nodes[body.node].inertia.mass:.3g}</td></tr>"
             for body in self.bodies
         )
         head = "<tr><th>links of a body</th><th>segment</th><th>mass [kg]</th></tr>"
-        return f"<p>{escape(repr(self))}</p><table>{head}{rows}</table>"
+        return f"<p>{escape(repr(self))}</p>{self._skeleton()}<table>{head}{rows}</table>"
+
+    def _skeleton(self) -> str:
+        """An SVG of the lines between the nodes, seen along y, in the middle of all ranges."""
+        poses = self.poses(np.mean(self.ranges, axis=0))
+        parents = [node.parent for node in self.nodes]
+        points = poses[:, (0, 2), 3] * (1.0, -1.0)
+        low, high = points.min(axis=0), points.max(axis=0)
+        room = 0.1 * max(*(high - low), 0.1)
+        x, y, width, height = (*(low - room), *(high - low + 2 * room))
+        lines = "".join(
+            f'<path d="M{points[parent][0]:.3f} {points[parent][1]:.3f}L{p[0]:.3f} {p[1]:.3f}"/>'
+            for parent, p in zip(parents, points, strict=True)
+            if parent >= 0
+        )
+        size = room / 8
+        dots = "".join(
+            f'<circle cx="{p[0]:.3f}" cy="{p[1]:.3f}" r="{size:.3f}"/>' for p in points
+        )
+        return (
+            f'<svg role="img" aria-label="skeleton of {escape(self.name)}" height="240" '
+            f'viewBox="{x:.3f} {y:.3f} {width:.3f} {height:.3f}" stroke="currentColor" '
+            f'stroke-width="{size:.3f}" fill="currentColor">{lines}{dots}</svg>'
+        )
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -115,6 +115,7 @@ class Pipeline:
         tuning.method = getattr(core.Method, method)
         pushes = expected_pushes(robot, friction)
         tuning.localizer = localizer_settings(rule, pushes)
+        self._method = method
         self._weights = period, bandwidth, wrench_error, torque_error, pushes
         self._model_error = model_error
         own = ref(self)  # the native pipeline must not keep this one alive
@@ -139,6 +140,14 @@ class Pipeline:
         self.faults: tuple[FaultChange, ...] = ()
         self._ended: list[Event] = []
         self._loads: dict[str, Load] = {}  # by link, of `set_load`
+
+    def __repr__(self) -> str:
+        period, bandwidth = self._weights[:2]
+        named = "described bandwidth" if bandwidth is None else f"bandwidth {bandwidth:g} rad/s"
+        return (
+            f"<Pipeline of {self.robot.name}: method {self._method}, {named}, "
+            f"{1.0 / period:g} Hz, {len(self.events)} events>"
+        )
 
     @property
     def events(self) -> list[Event]:

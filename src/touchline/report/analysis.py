@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from touchline.check.felt import felt
 from touchline.check.recording import glance
 from touchline.detector.thresholds import Thresholds
 from touchline.errors import InputError
@@ -26,6 +27,7 @@ from touchline.report.curves import Curves
 from touchline.report.event_pictures import EventPoses
 from touchline.report.event_windows import EventWindows
 from touchline.report.facts import watch_warnings
+from touchline.report.faint import faint_lines
 from touchline.report.outputs import (
     ANALYSIS,
     NAMES,
@@ -64,6 +66,8 @@ class Analysis:
         poses: how the robot stood at each of them.
         windows: the curves around them.
         comparisons: of the events with the truth of a simulated log.
+        faint: touches, true or felt, that lie below what can be felt on their link, a line each.
+        report: which page there is: "full", "summary" or "none".
         warnings: what the user should know.
         losses: those that tell of parts of the recording that could not be read.
     """
@@ -81,6 +85,8 @@ class Analysis:
     poses: EventPoses
     windows: EventWindows
     comparisons: list[Comparison]
+    faint: list[str]
+    report: Report
     warnings: list[str]
     losses: list[str]
 
@@ -144,7 +150,7 @@ def analyze(
             warnings += [*recording.warnings, *model.warnings, *run.pipeline.skin.lost]
             warnings += watch_warnings(model, run.statistics)
             warnings += [f"check: {line}" for line in found]
-            analysis = run.finish(log, out, method, bandwidth, warnings, recording.losses)
+            analysis = run.finish(log, out, method, bandwidth, report, warnings, recording.losses)
             where = origin or str(log.resolve())
             facts = _origin(analysis) | {"findings": found}
             write_origin(folder.draft / ANALYSIS, where, source, facts)
@@ -241,14 +247,18 @@ class _Run:
         out: Path,
         method: str,
         bandwidth: float | None,
+        report: Report,
         warnings: list[str],
         losses: list[str],
     ) -> Analysis:
         """Close the files; returns what there is to tell."""
         events = self.pipeline.events
         self._outputs.finish(events)
+        comparisons, robot = compare_log(events, log), self.pipeline.robot
+        touched = bool(events or comparisons)
+        able = {one.link: one for one in felt(robot, self.period)} if touched else {}
         return Analysis(
-            robot=self.pipeline.robot,
+            robot=robot,
             log=log,
             out=out,
             method=method,
@@ -260,7 +270,9 @@ class _Run:
             events=events,
             poses=self._poses,
             windows=self._windows,
-            comparisons=compare_log(events, log),
+            comparisons=comparisons,
+            faint=faint_lines(events, comparisons, able),
+            report=report,
             warnings=warnings,
             losses=losses,
         )

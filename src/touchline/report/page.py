@@ -81,7 +81,7 @@ def page_text(analysis: Analysis, figured: bool = True) -> str:
 
 
 def _tables(analysis: Analysis, pictured: set[int]) -> list[str]:
-    return [_events(analysis, pictured), _comparisons(analysis)]
+    return [_events(analysis, pictured), _comparisons(analysis), _faint(analysis)]
 
 
 def _header(analysis: Analysis) -> str:
@@ -134,6 +134,14 @@ def _comparisons(analysis: Analysis) -> str:
         return ""
     words = f"{verdict(rows, analysis.events)}. The truth is the simulation's own."
     return section("Against the truth", table(HEAD, [cells(row) for row in rows]), note(words))
+
+
+def _faint(analysis: Analysis) -> str:
+    """Touches below what can be felt on their link."""
+    if not analysis.faint:
+        return ""
+    items = "".join(f"<li>{escape(line)}</li>" for line in analysis.faint)
+    return section("Below what can be felt", f"<ul>{items}</ul>")
 
 
 def _event_row(event: Event, origin: float, pictured: bool) -> list[Any]:

@@ -11,6 +11,7 @@ from touchline.report.facts import (
     joint_facts,
     segment_facts,
 )
+from touchline.report.outputs import CONTACTS, ESTIMATES, EVENTS, REPORT
 
 MOST_EVENTS = 40
 
@@ -39,9 +40,10 @@ def summary_text(analysis: Analysis) -> str:
         _recording(analysis),
         _health(analysis),
         _events(analysis),
+        [f"faint: {line}" for line in analysis.faint],
         _residuals(analysis),
         _warnings(analysis),
-        [f"results: {analysis.out}/report.html, estimates.parquet, contacts.parquet, events.json"],
+        _results(analysis),
     ]
     return "\n\n".join("\n".join(lines) for lines in parts if lines)
 
@@ -108,3 +110,8 @@ def _residuals(analysis: Analysis) -> list[str]:
 
 def _warnings(analysis: Analysis) -> list[str]:
     return [f"note: {warning}" for warning in analysis.warnings]
+
+
+def _results(analysis: Analysis) -> list[str]:
+    page = [REPORT] if analysis.report != "none" else []
+    return [f"results: {analysis.out}/" + ", ".join([*page, ESTIMATES, CONTACTS, EVENTS])]
