@@ -90,9 +90,7 @@ class Robot:
             if parent >= 0
         )
         size = room / 8
-        dots = "".join(
-            f'<circle cx="{p[0]:.3f}" cy="{p[1]:.3f}" r="{size:.3f}"/>' for p in points
-        )
+        dots = "".join(f'<circle cx="{p[0]:.3f}" cy="{p[1]:.3f}" r="{size:.3f}"/>' for p in points)
         return (
             f'<svg role="img" aria-label="skeleton of {escape(self.name)}" height="240" '
             f'viewBox="{x:.3f} {y:.3f} {width:.3f} {height:.3f}" stroke="currentColor" '
