@@ -19,7 +19,7 @@ WRITTEN_BEFORE = ("published: letters and digits on another arm [1]", "90 to 95 
 GESTURES_BEFORE = ("published: tap, double tap, push, grab [2]", "over 95 %", "-", "-", "-")
 SOURCES = (
     "[1] Iskandar, Albu-Schaeffer, Dietrich, Science Robotics 2024 (adn4008; secondary source)",
-    "[2] a real Panda, joint torques alone, learned: arXiv 2508.12435",
+    "[2] a real Franka, joint sensors alone: arXiv 2508.12435",
 )
 PARTS = ("digits", "buttons", "sliders", "gestures", "unmeant", "spots")
 
