@@ -38,7 +38,7 @@ TOLD = 8  # last events that the page lists
 SPEEDS = (0.1, 0.8)  # rad/s at the ends of the slider
 ADVICE = (
     "**Click** on a widget to press it, **drag** to slide or write. `start` and `stop` move the "
-    "arm along its path, `speed` says how fast. **Hold** beside the widgets to lead the standing "
+    "arm along its path, `speed` says how fast. **Drag** beside the widgets to lead the standing "
     "arm elsewhere; `point` teaches its posture as a point of the path."
 )
 
