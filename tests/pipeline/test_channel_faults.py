@@ -245,3 +245,43 @@ def test_samples_that_come_twice_are_not_stuck():
     pipeline = tl.Pipeline(robot_named("ur5"))
     run(pipeline, held)
     assert [c for c in pipeline.faults if c.fault == tl.Fault.STUCK] == []
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("signal", ["q", "qd"])
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e12, "stuck"])
+def test_a_position_or_velocity_that_is_lost_is_stood_in_for_by_the_other(name, signal, value):
+    robot = robot_named(name)
+    pipeline = tl.Pipeline(robot)
+    run(pipeline, in_motion(name))
+    for j in (1, 4):
+        s = in_motion(name)
+        values = getattr(s, signal)[:, j]
+        values[AT : AT + 300] = values[AT] if value == "stuck" else value
+        pipeline.reset()
+        before = len(pipeline.events)
+        estimate, _ = run(pipeline, s)
+        channel = f"{signal}.{robot.joint_names[j]}"
+        assert {c.channel for c in pipeline.faults} == {channel}
+        assert pipeline.events[before:] == []
+        settled = np.isfinite(estimate.segment_wrench[:, 0]).any(axis=1)
+        assert settled[AT - 1] and settled[AT:].all()
+        if value == "stuck":
+            assert pipeline.faults[0].sample <= AT + 100
+        else:
+            bit = tl.Health.MISSING if np.isnan(value) else tl.Health.NON_FINITE
+            told = np.flatnonzero(estimate.health & bit)
+            assert told.tolist() == list(range(AT, AT + 300))
+            assert np.all(estimate.health[AT : AT + 300] & tl.Health.FAULTY)
+
+
+def test_a_joint_without_position_and_velocity_is_not_made_up():
+    robot = robot_named("sara")
+    s = in_motion("sara")
+    s.q[AT : AT + 100, 2] = s.qd[AT : AT + 100, 2] = np.nan
+    pipeline = tl.Pipeline(robot)
+    estimate, _ = run(pipeline, s)
+    assert np.isnan(estimate.tau_ext[AT : AT + 100]).all()
+    assert np.all(estimate.health[AT : AT + 100] & tl.Health.MISSING)
+    assert np.isfinite(estimate.segment_wrench[-1]).all()
+    assert {c.sample for c in pipeline.faults if c.fault == tl.Fault.NONE} == {AT + 100}

@@ -243,3 +243,33 @@ def test_healthy_samples_are_the_whole_robot_s_to_the_last_bit():
     ready._core.prepare([0])
     np.testing.assert_array_equal(run(plain, samples)[0].rows, run(ready, samples)[0].rows)
     assert plain.events == ready.events
+
+
+@pytest.mark.parametrize(("name", "dead"), [("sara", 1), ("sara", 2), ("sara-full", 1), ("ur5", 1)])
+def test_a_contact_that_lasts_through_a_drop_out_stays_one_event(name, dead):
+    robot = robot_named(name)
+    q = np.linspace(0.3, 0.9, len(robot.joint_names))
+    link = "forearm_link" if name == "ur5" else "link4"
+    force = np.array([5.0, 15.0, -20.0])
+    samples = pushed(robot, q, link, force, begin=0.3, end=0.95)
+    pipeline = tl.Pipeline(robot)
+    live = tl.Pipeline(robot)
+    lossy = without(samples, dead, 0.5, 0.8)
+    run(pipeline, lossy)
+    told = []
+    for x in zip(*_columns(lossy), strict=True):
+        told += [str(c.happened) for c in live.update(*x).events]
+    assert len(pipeline.events) == 1 and pipeline.events == live.events
+    event = pipeline.events[0]
+    assert 0.3 <= event.detected < 0.33 and 0.95 < event.cleared < 1.2
+    assert told.count("began") == told.count("ended") == 1
+
+
+def test_a_contact_that_ends_in_a_drop_out_is_over():
+    robot = robot_named("sara")
+    q = np.linspace(0.3, 0.9, 7)
+    samples = pushed(robot, q, "link4", np.array([5.0, 15.0, -20.0]), begin=0.3, end=0.52)
+    pipeline = tl.Pipeline(robot)
+    run(pipeline, without(samples, 1, 0.5, 0.8))
+    assert len(pipeline.events) == 1
+    assert 0.5 < pipeline.events[0].cleared < 0.75

@@ -84,6 +84,15 @@ class Pipeline {
   int next_event() const { return recorder_.next_event(); }
   void number_events_from(int next) { recorder_.number_events_from(next); }
 
+  // What stands on a row of the detector while nothing touches [N, Nm], and over how long it has
+  // been averaged [s]; and takes what another pipeline of this arm has learned of its row `of`.
+  double baseline(int row) const { return detector_.baseline(row); }
+  double known_for(int row) const { return detector_.known_for(row); }
+  void go_on_from(const Pipeline& other, int of, int row, double baseline) {
+    detector_.go_on_from(other.detector_, of, row, baseline);
+  }
+  const Observer& observer() const { return observer_; }
+
   // Without its surfaces, which are the localizer's: `surfaces()`.
   const Robot& robot() const { return robot_; }
   const std::vector<LinkSurface>& surfaces() const { return localizer_.surfaces(); }

@@ -8,9 +8,8 @@
 // out, told in `Result::faults`, and has no part in what is estimated.
 //
 // A stand-in is warmed up from the first sample without the sensor on, and speaks as soon as it has
-// settled, 5 / K later; the whole robot speaks again 5 / K after the sensor is back. What loads the
-// arm at that moment counts as it does at any start of observation. Events that last end with the
-// one that falls silent.
+// settled, 5 / K later; the whole robot speaks again 5 / K after the sensor is back. What stands on
+// the arm while nothing touches it, the one tells the other. An event that both feel is one event.
 #pragma once
 
 #include <algorithm>
@@ -52,6 +51,7 @@ class RedundantPipeline {
     contacts_.resize(levels_.size() * Reports::kMost);
     changes_.reserve(8 * levels_.size() * (Reports::kMost + 1));
     renumbered_.reserve(changes_.capacity());
+    waiting_.reserve(levels_.size() * (Reports::kMost + 1));
     joints_ = n;
     sound_.resize(gates_.layout().count(), Fault::none);
     ratios_.resize(kAhead * sound_.size());
@@ -61,6 +61,7 @@ class RedundantPipeline {
   void add(StandIn given) {
     check(given);
     stand_ins_.push_back(std::make_unique<Second>(std::move(given), tuning(), absent_.size()));
+    find_parts(*stand_ins_.back());
   }
   bool stands_in(const std::vector<int>& lost) const {
     return std::any_of(stand_ins_.begin(), stand_ins_.end(),
@@ -136,6 +137,7 @@ class RedundantPipeline {
       rename(event);
       visit(static_cast<const Event&>(event));
     });
+    for (const Event& event : waiting_) visit(event);
   }
   int next_event() const { return std::max(next_, whole_.next_event()); }
   void number_events_from(int next) {
@@ -170,16 +172,22 @@ class RedundantPipeline {
 
   Result with_faults(Result result, const std::vector<Fault>& faults, const double* ratios) const {
     const bool faulty = &faults != &sound_ && !gates_.all_sound();
-    if (faulty) result.health |= kFaulty;
+    if (faulty) result.health |= kFaulty | gates_.absent();
     result.faults = {faults.data(), faults.size()};
     result.ratios = {ratios, faults.size()};
     return result;
   }
 
-  // An event under another number than the one its pipeline gave it.
+  static constexpr double kContinues = 0.05;  // [s] in which the next one feels what lasts, or not
+
+  // An event under another number than the one its pipeline gave it; `before`: it goes on with an
+  // event that had been detected then.
   struct Renumbered {
     const Pipeline* of;
     int own, told;
+    bool continues = false;
+    double detected = kUnknown, decided = kUnknown;
+    ContactLevel level = ContactLevel::contact;
   };
 
   struct Second {
@@ -195,7 +203,69 @@ class RedundantPipeline {
     Pipeline pipeline;
     std::vector<double> wrench;
     std::vector<char> without;  // per sensor of the whole robot
+    std::vector<int> told_as;   // per segment of the whole robot: the one that it is part of here
   };
+
+  // Which segments of the whole robot are one where a stand-in speaks.
+  void find_parts(Second& second) const {
+    const Layout& layout = whole_.observer().layout();
+    const Layout& own = second.pipeline.observer().layout();
+    second.told_as.assign(levels_.size(), -1);
+    for (std::size_t g = 0; g < own.segments.size(); ++g) {
+      if (own.segments[g].sensor < 0) {  // its root has all that no sensor has
+        for (int& part : second.told_as) part = part < 0 ? second.given.segments[g] : part;
+      } else {
+        const int sensor = second.given.sensors[own.segments[g].sensor];
+        add_parts(second, layout, layout.segment_of_sensor[sensor], second.given.segments[g]);
+      }
+    }
+  }
+  void add_parts(Second& second, const Layout& layout, int segment, int told) const {
+    second.told_as[segment] = told;
+    for (const int t : layout.segments[segment].successors) {
+      if (second.without[t] != 0) add_parts(second, layout, layout.segment_of_sensor[t], told);
+    }
+  }
+
+  // Tells a stand-in what stands on the arm while nothing touches it.
+  void teach(Second& second) {
+    const std::vector<DetectionRow>& rows = second.pipeline.robot().rows;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const int known = second.given.rows[i];
+      if (rows[i].joint >= 0 && known >= 0 && whole_.known_for(known) > 0.0)
+        second.pipeline.go_on_from(whole_, known, static_cast<int>(i), whole_.baseline(known));
+      if (rows[i].component == 0) teach_wrench(second, i);
+    }
+  }
+
+  // The six rows of a segment from row `first` on: the sum of those of its parts.
+  void teach_wrench(Second& second, std::size_t first) {
+    const Observer& observer = whole_.observer();
+    const std::vector<DetectionRow>& rows = second.pipeline.robot().rows;
+    const std::vector<DetectionRow>& of = whole_.robot().rows;
+    const int g = rows[first].segment, sensor = second.pipeline.observer().layout().segments[g].sensor;
+    if (first + 6 > rows.size() || sensor < 0) return;
+    Spatial sum{};
+    double age = kAbsurd;
+    for (std::size_t i = 0; i + 6 <= of.size(); ++i) {
+      if (of[i].component != 0 || second.told_as[of[i].segment] != second.given.segments[g]) continue;
+      const int part = observer.layout().segments[of[i].segment].sensor;
+      if (part < 0) continue;
+      double stands[6];
+      for (int k = 0; k < 6; ++k) {
+        stands[k] = whole_.baseline(static_cast<int>(i) + k);
+        age = std::min(age, whole_.known_for(static_cast<int>(i) + k));
+      }
+      sum = sum + wrench_to_parent(observer.sensor_pose(part), load(stands));
+    }
+    if (!(age > 0.0) || age >= kAbsurd) return;
+    double stands[6];
+    store(wrench_to_child(observer.sensor_pose(second.given.sensors[sensor]), sum), stands);
+    for (int k = 0; k < 6; ++k) {
+      const int row = static_cast<int>(first) + k, known = second.given.rows[row];
+      if (known >= 0) second.pipeline.go_on_from(whole_, known, row, stands[k]);
+    }
+  }
 
   void check(const StandIn& s) const {
     const Robot& own = whole_.robot();
@@ -219,7 +289,8 @@ class RedundantPipeline {
 
   // Does the whole robot speak for itself, with all sensors and its own numbers of events?
   bool healthy() const {
-    return now_ == nullptr && warming_ == nullptr && !any_absent_ && renumbered_.empty();
+    return now_ == nullptr && warming_ == nullptr && !any_absent_ && renumbered_.empty() &&
+           waiting_.empty();
   }
 
   // Is a six-axis sensor without a usable reading?
@@ -255,7 +326,15 @@ class RedundantPipeline {
     Second* const needed = any_absent_ ? stand_in() : nullptr;
     const Result of_whole = whole_.update(sample);  // it settles anew as soon as all are back
     Result of_now = now_ != nullptr ? feed(*now_, sample) : of_whole;
-    warming_ = needed != now_ ? needed : nullptr;
+    Second* const before = std::exchange(warming_, needed != now_ ? needed : nullptr);
+    if (warming_ != nullptr && warming_ != before) teach(*warming_);
+    if (!waiting_.empty() && !(whole_.time() < handed_over_ + kContinues)) {
+      for (Event& event : waiting_) {
+        event.cleared = handed_over_;
+        tell(Happened::ended, event);
+      }
+      waiting_.clear();
+    }
     if (warming_ != nullptr) {
       const Result of_warming = feed(*warming_, sample);
       if (settled(of_warming)) {
@@ -283,24 +362,51 @@ class RedundantPipeline {
 
   Pipeline& pipeline_of(Second* second) { return second != nullptr ? second->pipeline : whole_; }
 
-  // Events that last end with the one that falls silent; those of the other begin.
+  // Events that last wait for the other one to feel them too.
   Second* hand_over(Second* to) {
-    next_ = next_event();
     Pipeline &from = pipeline_of(now_), &next = pipeline_of(to);
+    handed_over_ = whole_.time();
     from.visit_lasting([&](Event event) {
       rename(event);
-      event.cleared = from.time();
-      tell(Happened::ended, event);
+      if (waiting_.size() < waiting_.capacity()) waiting_.push_back(event);
     });
+    next_ = next_event();
     renumbered_.clear();
+    parts_ = to != nullptr ? to : now_;
     now_ = to;
-    next.visit_lasting([&](Event event) {
-      number(next, event.id);
-      rename(event);
-      tell(Happened::began, event);
-    });
+    next.visit_lasting([&](const Event& event) { begin(next, event); });
     if (to == nullptr) whole_.number_events_from(next_);
     return to;
+  }
+
+  // An event of the one that speaks now has begun: is it one of those that last?
+  void begin(const Pipeline& of, Event event) {
+    if (known(of, event.id) == nullptr) go_on(of, event);
+    const bool continues = known(of, event.id) != nullptr && known(of, event.id)->continues;
+    rename(event);
+    tell(continues ? Happened::changed : Happened::began, event);
+  }
+
+  // The event of `waiting_` that an event of the one that speaks now goes on with, if any.
+  void go_on(const Pipeline& of, const Event& own) {
+    const int segment = now_ != nullptr ? now_->given.segments[own.segment] : own.segment;
+    for (Event& event : waiting_) {
+      const bool one = event.segment == segment ||
+                       parts_->told_as[event.segment] == parts_->told_as[segment];
+      if (!one || renumbered_.size() >= renumbered_.capacity()) continue;
+      renumbered_.push_back(
+          {&of, own.id, event.id, true, event.detected, event.decided, event.level});
+      event = waiting_.back();
+      waiting_.pop_back();
+      return;
+    }
+  }
+
+  const Renumbered* known(const Pipeline& of, int own) const {
+    for (const Renumbered& r : renumbered_) {
+      if (r.of == &of && r.own == own) return &r;
+    }
+    return nullptr;
   }
 
   void tell(Happened happened, const Event& event) {
@@ -309,22 +415,38 @@ class RedundantPipeline {
 
   // The number under which an event of the one that speaks is told.
   int number(const Pipeline& of, int own) {
-    for (const Renumbered& known : renumbered_) {
-      if (known.of == &of && known.own == own) return known.told;
-    }
+    if (const Renumbered* r = known(of, own)) return r->told;
     if (&of == &whole_ && now_ == nullptr && own >= next_) return own;
-    if (renumbered_.size() < renumbered_.capacity()) renumbered_.push_back({&of, own, next_});
+    if (renumbered_.size() < renumbered_.capacity()) renumbered_.push_back({&of, own, next_, false});
     return next_++;
   }
 
   void rename(Event& event) {
-    event.id = number(pipeline_of(now_), event.id);
+    const Pipeline& of = pipeline_of(now_);
+    const int own = event.id;
+    event.id = number(of, own);
+    if (const Renumbered* r = known(of, own); r != nullptr && r->continues) {
+      event.detected = r->detected;
+      event.level = std::max(event.level, r->level);
+      if (r->decided == r->decided) event.decided = r->decided;
+    }
     if (now_ != nullptr) event.segment = now_->given.segments[event.segment];
+  }
+
+  void rename(const Pipeline& of, Contact& contact) {
+    const Renumbered* r = known(of, contact.event);
+    if (r != nullptr && r->continues) contact.level = std::max(contact.level, r->level);
+    contact.event = number(of, contact.event);
   }
 
   // What a stand-in says, in the words of the whole robot.
   Result said(const Second& second, const Result& r) {
     const StandIn& by = second.given;
+    for (const EventChange& change : r.events) {  // before contacts ask for its number
+      const bool news = change.happened == Happened::began;
+      if (news && known(second.pipeline, change.event.id) == nullptr)
+        go_on(second.pipeline, change.event);
+    }
     put_row(second, r);
     std::fill(levels_.begin(), levels_.end(), 0);
     std::fill(quiet_.begin(), quiet_.end(), 0.0);
@@ -344,8 +466,7 @@ class RedundantPipeline {
       contacts_[i] = r.contacts[i];
       contacts_[i].segment = by.segments[contacts_[i].segment];
     }
-    for (std::size_t i = 0; i < count; ++i)
-      contacts_[i].event = number(second.pipeline, contacts_[i].event);
+    for (std::size_t i = 0; i < count; ++i) rename(second.pipeline, contacts_[i]);
     Result told = with_changes(r);
     told.estimate = Estimate(row_.data(), whole_.row_layout());
     told.levels = {levels_.data(), levels_.size()};
@@ -362,11 +483,12 @@ class RedundantPipeline {
     const Pipeline& speaker = pipeline_of(now_);
     for (EventChange change : r.events) {
       const int own = change.event.id;
+      if (change.happened == Happened::began) {
+        if (!told(own)) begin(speaker, change.event);
+        continue;
+      }
       rename(change.event);
-      const bool told = std::any_of(changes_.begin(), changes_.end(), [&](const EventChange& c) {
-        return c.happened == change.happened && c.event.id == change.event.id;
-      });
-      if (!told) tell(change.happened, change.event);
+      tell(change.happened, change.event);
       if (change.happened != Happened::ended) continue;
       renumbered_.erase(std::remove_if(renumbered_.begin(), renumbered_.end(),
                                        [&](const Renumbered& known) {
@@ -378,12 +500,21 @@ class RedundantPipeline {
     if (now_ == nullptr && !renumbered_.empty()) {
       for (std::size_t i = 0; i < r.contacts.size() && i < contacts_.size(); ++i) {
         contacts_[i] = r.contacts[i];
-        contacts_[i].event = number(whole_, contacts_[i].event);
+        rename(whole_, contacts_[i]);
       }
       told.contacts = {contacts_.data(), std::min(r.contacts.size(), contacts_.size())};
     }
     told.events = {changes_.data(), changes_.size()};
     return told;
+  }
+
+  // Has this sample's hand-over told of an event of the one that speaks now?
+  bool told(int own) const {
+    const Renumbered* r = known(now_ != nullptr ? now_->pipeline : whole_, own);
+    if (r == nullptr && now_ != nullptr) return false;
+    const int id = r != nullptr ? r->told : own;
+    return std::any_of(changes_.begin(), changes_.end(),
+                       [id](const EventChange& c) { return c.event.id == id; });
   }
 
   void put_row(const Second& second, const Result& r) {
@@ -414,6 +545,9 @@ class RedundantPipeline {
   std::vector<double> ratios_;  // (kAhead, channels)
   std::vector<std::unique_ptr<Second>> stand_ins_;
   Second *now_ = nullptr, *warming_ = nullptr;  // who speaks, if not the whole; who shall
+  Second* parts_ = nullptr;      // of the last hand-over: it says which segments are one
+  std::vector<Event> waiting_;   // that lasted then, and that the next one has not felt yet
+  double handed_over_ = kUnknown;  // [s]
   bool any_absent_ = false;
   std::size_t joints_ = 0;
   std::vector<char> absent_;  // per sensor, at the last sample

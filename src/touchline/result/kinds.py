@@ -53,3 +53,4 @@ class Fault(StrEnum):
     WILD = "wild"  # such jumps that go on
     STUCK = "stuck"  # the same value again and again while the arm moves
     DISAGREES = "disagrees"  # position or velocity: one is not the derivative of the other
+    ABSENT = "absent"  # position or velocity: not there, the other one stands in for it

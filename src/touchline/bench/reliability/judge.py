@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.bench.reliability.faults import Channel, FaultType, injected
-from touchline.bench.reliability.recordings import Recording
+from touchline.bench.reliability.recordings import PUSHED, RELEASED, Recording
 from touchline.health import Health
 from touchline.observer.observer import Estimate
 from touchline.observer.samples import Samples
@@ -45,8 +45,11 @@ class Outcome:
         named: the channel itself was named, or the sample was told as absent.
         harmless: events are those of the healthy recording.
         phantoms: events that the healthy recording does not have.
-        collisions: of those, collisions.
-        wrong: events with a sure body that is not the touched one.
+        again: of those, events that began during the push: it was told twice, late or otherwise.
+        collisions: of the phantoms, collisions that began while nothing touched the arm, or where
+            the healthy recording has no collision.
+        wrong: events with a sure body that is neither the touched one nor what the healthy
+            recording says as surely.
         lost: events of the healthy recording that are missing.
         recovery: after the fault's end until health and estimates are as without it [s].
         seconds: that it took.
@@ -62,6 +65,7 @@ class Outcome:
     named: bool = False
     harmless: bool = False
     phantoms: int = 0
+    again: int = 0
     collisions: int = 0
     wrong: int = 0
     lost: int = 0
@@ -112,11 +116,9 @@ def judge(
     told = np.flatnonzero(news[first:])
     phantoms = [e for e in said.events if not any(_same(e, other) for other in healthy.events)]
     lost = [e for e in healthy.events if not any(_same(other, e) for other in said.events)]
-    sure = [
-        e
-        for e in phantoms
-        if e.body is not None and (e.body_probability or 0.0) >= SURE and e.status == "located"
-    ]
+    sure = [e for e in phantoms if _sure(e)]
+    bodies = {recording.body, *(e.body for e in healthy.events if _sure(e))}
+    hard = any(e.level == ContactLevel.COLLISION for e in healthy.events)
     return Outcome(
         robot,
         fault,
@@ -127,8 +129,11 @@ def judge(
         named=any(c.startswith(channel.name) for c in said.named) or fault.group.startswith("abs"),
         harmless=not phantoms and not lost,
         phantoms=len(phantoms),
-        collisions=sum(e.level == ContactLevel.COLLISION for e in phantoms),
-        wrong=sum(e.body != recording.body for e in sure),
+        again=sum(map(_in_push, phantoms)),
+        collisions=sum(
+            e.level == ContactLevel.COLLISION and not (hard and _in_push(e)) for e in phantoms
+        ),
+        wrong=sum(e.body not in bodies for e in sure),
         lost=len(lost),
         recovery=_recovery(said, healthy, time, end),
         seconds=seconds,
@@ -141,6 +146,15 @@ def hash_of(*words: str) -> int:
     for letter in " ".join(words):
         value = (33 * value + ord(letter)) % (1 << 31)
     return value
+
+
+def _sure(event: Event) -> bool:
+    known = event.body is not None and event.status == "located"
+    return known and (event.body_probability or 0.0) >= SURE
+
+
+def _in_push(event: Event) -> bool:
+    return PUSHED <= event.detected <= RELEASED
 
 
 def _same(event: Event, other: Event) -> bool:

@@ -121,7 +121,10 @@ def _goals(
 
 def _by_fault(found: list[Outcome]) -> list[Row]:
     rows: list[Row] = [
-        ("fault", "runs", "told in time", "harmless", "median", "phantoms", "collisions", "wrong")
+        (
+            *("fault", "runs", "told in time", "harmless", "median"),
+            *("phantoms", "again", "collisions", "wrong"),
+        )
     ]
     groups: dict[str, list[Outcome]] = defaultdict(list)
     for o in found:
@@ -136,6 +139,7 @@ def _by_fault(found: list[Outcome]) -> list[Row]:
                 f"{100 * sum(o.harmless for o in part) / len(part):.0f} %",
                 f"{1e3 * np.median(told):.0f} ms" if told else "never",
                 str(sum(o.phantoms > 0 for o in part)),
+                str(sum(o.again > 0 for o in part)),
                 str(sum(o.collisions > 0 for o in part)),
                 str(sum(o.wrong > 0 for o in part)),
             )
@@ -165,7 +169,10 @@ types, channels and phases {count} were drawn at random.
 
 *In time* is the same sample for spikes and what is absent, 50 ms for what is stuck or wild, 1 s for
 signs, scales and delays, 2 s for biases. *Harmless*: events are those without the fault. A
-*phantom* is an event that is not among those; one that a drop-out has split counts as well.
+*phantom* is an event that is not among those. *Again*: phantoms that began during the push, which
+was told twice, late or otherwise. A phantom *collision* began while nothing touched the arm, or
+where the healthy recording has no collision. A *wrong* link is one that is at least 90 % sure, is
+not the touched one, and is not what the healthy recording says either.
 
 ```
 {text}

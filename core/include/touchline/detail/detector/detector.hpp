@@ -107,6 +107,23 @@ class Detector {
   double noise(int row) const { return meters_[row].sigma(); }
   double offset(int row) const { return states_[row].anchor; }
   double reference(int row) const { return states_[row].reference; }
+  // Over how long a row's baseline has been averaged [s].
+  double known_for(int row) const { return states_[row].age; }
+  // What another detector of this arm has learned of a row, which here stands at `baseline` while
+  // nothing touches: observation does not begin anew.
+  void go_on_from(const Detector& other, int of, int row, double baseline) {
+    RowState& s = states_[row];
+    const double moved = baseline - other.states_[of].baseline;
+    s = other.states_[of];
+    for (double* value : {&s.baseline, &s.anchor, &s.reference}) *value += moved;
+    s.trend = baseline;
+    spreads_[row] = other.spreads_[of];
+    meters_[row] = other.meters_[of];
+    Segment& segment = segments_[rows_[row].segment];
+    segment.age = std::max(segment.age, s.age);
+    segment.off = other.segments_[other.rows_[of].segment].off;
+    still_ = other.still_;
+  }
   const Observer& observer() const { return observer_; }
 
  private:

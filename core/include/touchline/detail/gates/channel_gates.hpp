@@ -13,7 +13,9 @@
 // for nothing.
 //
 // A velocity is the derivative of its position: what positions and velocities differ by, over some
-// samples, is compared with what they have differed by so far.
+// samples, is compared with what they have differed by so far. Where one of the two is not believed
+// the other stands in for it: a position is the way that its joint has come by its speed, for a
+// while; a speed is what positions show, low-passed.
 //
 // Limits follow from what this arm has shown, and from physics where it has shown nothing yet.
 #pragma once
@@ -56,6 +58,11 @@ class ChannelGates {
         drift_(at_.joints),
         usual_drift_(at_.joints),
         anchor_(at_.joints),
+        tracked_(at_.joints),
+        speed_(at_.joints),
+        acceleration_(at_.joints),
+        blind_(at_.joints),
+        same_(2 * at_.joints),
         far_(at_.joints),
         since_(at_.count()),
         calm_(at_.count()),
@@ -68,6 +75,10 @@ class ChannelGates {
     return_ = samples(kReturn, kGood);
     dwell_ = samples(kDwell, kLeastDwell);
     kept_ = std::exp(-period_ / std::max(kWindow, kWindowSamples * period_));
+    const double pole = std::exp(-std::min(kTracking, 0.5 / period_) * period_), off = 1.0 - pole;
+    follows_[0] = 1.0 - pole * pole * pole;
+    follows_[1] = 1.5 * off * off * (1.0 + pole) / period_;
+    follows_[2] = off * off * off / (period_ * period_);
   }
 
   const ChannelLayout& layout() const { return at_; }
@@ -83,6 +94,7 @@ class ChannelGates {
     const bool gap = !(dt < kGapPeriods * period_);
     if (!measure(dt) || !all_sound_ || absurd_ || gap) settle(dt, gap);
     learn();
+    track(dt, gap);
     if (!gap) compare_speeds(dt);
     if (moving()) count_changes(dt);
     std::copy(now_.begin(), now_.end(), last_.begin());
@@ -90,6 +102,8 @@ class ChannelGates {
   }
 
   bool all_sound() const { return all_sound_; }
+  // Of positions and velocities that were not there: what another one stands in for.
+  Health absent() const { return absent_; }
   // Per channel; ratio: of its last step over what is believed at once.
   const std::vector<Fault>& faults() const { return fault_; }
   const std::vector<double>& ratios() const { return ratio_; }
@@ -108,7 +122,7 @@ class ChannelGates {
   static constexpr double kJump = 20.0, kMoves = 6.0;
   static constexpr double kFastest = 10.0;      // [rad/s, m/s] no joint moves faster
   static constexpr double kLeastTravel = 0.01;  // [rad, m] that gravity hardly notices
-  static constexpr double kSpeedStep = 0.1;     // [rad/s, m/s] of one sample,
+  static constexpr double kSpeedStep = 0.05;    // [rad/s, m/s] of one sample,
   static constexpr double kHardest = 50.0;      // and [rad/s2, m/s2] times its period
   static constexpr double kLeastForce = 1.0, kLeastTorque = 0.2;  // [N, Nm] no contact is less
   static constexpr double kEqual = 0.05;        // of its ratio that another channel must have too
@@ -120,6 +134,8 @@ class ChannelGates {
   static constexpr int kSure = 3;               // samples at a new level that make it one
   static constexpr int kGood = 10;              // steps that bring a wild channel back
   static constexpr double kReturn = 2.0;        // [s] and what is elsewhere for good
+  static constexpr double kTracking = 200.0;    // [rad/s] at which speeds follow from positions
+  static constexpr double kWayBlind = 2.0;      // [s] for which a way follows from its speed
 
   static constexpr double kMoving = 0.02;     // [rad/s, m/s] of any joint: the arm moves
   static constexpr double kSilent = 0.02;     // [s] without a change before a channel is stuck,
@@ -137,6 +153,9 @@ class ChannelGates {
   static constexpr double kWindowSamples = 3.0;   // and so many samples
   static constexpr double kSpeedError = 0.1;      // [rad/s, m/s] that a speed may be wrong by
   static constexpr double kDisagrees = 10.0;      // times the mean difference
+  static constexpr double kStands = 5.0;          // samples: so long does no joint that moves stand
+  static constexpr double kSurely = 0.99;         // of samples with another velocity than before
+  static constexpr double kStale = 5.0;           // times what one that never changes counts
   static constexpr double kDwell = 0.01;          // [s] for which it lasts,
   static constexpr int kLeastDwell = 3;           // and so many samples
 
@@ -205,6 +224,7 @@ class ChannelGates {
       gather(sample);
       last_ = now_;
       for (std::size_t c = 0; c < at_.count(); ++c) take(c);
+      for (std::size_t j = 0; j < at_.joints; ++j) begin_tracking(j);
       all_sound_ = true;
     }
     return all_sound_ ? sample : believed(sample.time);
@@ -222,26 +242,33 @@ class ChannelGates {
     for (std::size_t c = n; c < count; ++c) step[c] = std::fabs(now[c] - last[c]);
     for (std::size_t j = 0; j < n; ++j)
       step[j] = std::fabs(now[j] - last[j] - 0.5 * dt * (now[n + j] + last[n + j]));
-    double worst = 0.0;
+    double worst = 0.0, all = 0.0;
     for (std::size_t c = 0; c < count; ++c) {
       const double usual = kJump * mean[c];
       ratio[c] = step[c] / (usual > floor[c] ? usual : floor[c]);
       worst = ratio[c] > worst ? ratio[c] : worst;
     }
-    return worst <= 1.0;  // infinite readings are none of them
+    for (std::size_t c = 0; c < 2 * n; ++c) all += now[c];
+    return worst <= 1.0 && all == all;  // infinite readings are none of them
   }
 
   // Not a usual sample: who is believed? Leaves in `now_` the readings to go on with, and in
   // `step_` those steps that something can be learned from.
   void settle(double dt, bool gap) {
     absurd_ = false;
+    absent_ = 0;
+    carry(dt);
     for (std::size_t c = 0; c < at_.count(); ++c) {
-      const bool jumps = ratio_[c] > 1.0 && !gap;
+      const bool jumps = ratio_[c] > 1.0 && !gap, motion = c < at_.tau();
       if (std::fabs(now_[c]) >= kAbsurd) {
-        now_[c] = kNever;  // told as such by the observer
+        now_[c] = kNever;  // told as such, of torques and wrenches by the observer
         absurd_ = true;
+        if (motion) absent_ |= kNonFinite;
+      } else if (motion && now_[c] != now_[c]) {
+        absent_ |= kMissing;
       }
-      if (watched(c) && (jumps || fault_[c] != Fault::none) && seen_ >= warm_up_) judge(c, dt);
+      const bool odd = jumps || fault_[c] != Fault::none || (motion && now_[c] != now_[c]);
+      if (watched(c) && odd && seen_ >= warm_up_) judge(c, dt);
       if (gap || fault_[c] != Fault::none) step_[c] = kNever;
       else if (jumps && seen_ >= warm_up_) step_[c] = gate(c);
     }
@@ -257,11 +284,13 @@ class ChannelGates {
 
   void judge(std::size_t c, double dt) {
     const double x = now_[c];
-    if (x != x) return take(c);
+    if (x != x) return c < at_.tau() ? leave(c, Fault::absent) : take(c);
     switch (fault_[c]) {
       case Fault::none:
         if (c < at_.qd() && wraps(c, dt)) {
-          last_[c] += kTurn * std::round((x - last_[c]) / kTurn);
+          const double turns = kTurn * std::round((x - last_[c]) / kTurn);
+          last_[c] += turns;
+          tracked_[c] += turns;
           return;
         }
         if (borne_out(c, dt)) return;
@@ -270,16 +299,81 @@ class ChannelGates {
         hold(c, dt);
         return;
       case Fault::spike: return go_on_holding(c, dt);
-      case Fault::wild: return wait_for_calm(c, dt);
+      case Fault::wild: return wait_for_calm(c);
+      case Fault::absent: return near(c) ? take(c) : leave(c, Fault::wild);
       case Fault::stuck:
-        if (step_[c] > 0.0 && ++since_[c] >= kChanges) take(c);
-        return;
+        if (now_[c] == last_[c] || ++since_[c] < kChanges) return;
+        return c >= at_.tau() || near(c) ? take(c) : leave(c, Fault::wild);
       case Fault::step:
         calm_[c] = ratio_[c] > 1.0 ? kSure : std::max(calm_[c] - 1, 0);
         if (calm_[c] == 1 || ++since_[c] >= return_) take(c);
         return;
       case Fault::disagrees: return;  // see `compare_speeds`
     }
+  }
+
+  // A reading counts no more.
+  void leave(std::size_t c, Fault fault) {
+    if (fault_[c] == fault) return;
+    const bool held = fault_[c] == Fault::none || fault_[c] == Fault::spike;
+    if (held && c < at_.qd()) {
+      anchor_[c] = out_way(c);
+      blind_[c] = 0.0;
+    }
+    fault_[c] = fault;
+    since_[c] = calm_[c] = 0;
+    if (c < at_.tau()) drift_[c % at_.joints] = 0.0;
+  }
+
+  // Where the joint was at the last sample, and has come since by its speed.
+  double out_way(std::size_t j) const {
+    return tracked_[j] + (time_ - tracked_at_) * (usable(at_.qd() + j) ? now_[at_.qd() + j] : speed_[j]);
+  }
+  bool usable(std::size_t c) const {
+    return (fault_[c] == Fault::none || fault_[c] == Fault::spike) && now_[c] == now_[c];
+  }
+
+  // Joints whose positions are not believed go on by their speeds.
+  void carry(double dt) {
+    for (std::size_t j = 0; j < at_.joints; ++j) {
+      if (fault_[j] == Fault::none || fault_[j] == Fault::spike) continue;
+      anchor_[j] += dt * (usable(at_.qd() + j) ? now_[at_.qd() + j] : kNever);
+      blind_[j] += dt;
+    }
+  }
+
+  // Is a reading that comes back where what stands in for it is, or is nothing known of it?
+  bool near(std::size_t c) const {
+    const double at = c < at_.qd() ? anchor_[c] : speed_[c - at_.qd()] + 0.0 * tracked_[c - at_.qd()];
+    return !(std::fabs(now_[c] - at) > gate(c));
+  }
+
+  // Follows the positions: where joints are and how fast, without the velocities.
+  void track(double dt, bool gap) {
+    const std::size_t n = at_.joints;
+    if (!all_sound_ || gap) {
+      for (std::size_t j = 0; j < n; ++j) {
+        const bool lost = !usable(j), jumped = std::fabs(now_[j] - tracked_[j]) > gate(j) + dt * kFastest;
+        if (gap || lost || jumped) begin_tracking(j);
+        else track_one(j, dt);
+      }
+    } else {
+      for (std::size_t j = 0; j < n; ++j) track_one(j, dt);
+    }
+    tracked_at_ = time_;
+  }
+  void track_one(std::size_t j, double dt) {
+    const double v = speed_[j], a = acceleration_[j], ahead = tracked_[j] + dt * (v + 0.5 * dt * a);
+    const double off = now_[j] - ahead;
+    tracked_[j] = ahead + follows_[0] * off;
+    speed_[j] = v + dt * a + follows_[1] * off;
+    acceleration_[j] = a + follows_[2] * off;
+  }
+  void begin_tracking(std::size_t j) {
+    tracked_[j] = usable(j) ? now_[j] : anchor_[j];
+    if (usable(at_.qd() + j)) speed_[j] = now_[at_.qd() + j];
+    acceleration_[j] = 0.0;
+    tracked_at_ = time_;
   }
 
   void go_on_holding(std::size_t c, double dt) {
@@ -296,26 +390,22 @@ class ChannelGates {
     }
     if (c >= at_.qd() && c < at_.tau() && borne_out(c, dt)) return take(c);
     if (++since_[c] < held_most_) return hold(c, dt);
-    fault_[c] = stays && c >= at_.tau() ? Fault::stuck : Fault::wild;
-    since_[c] = 0;
-    if (c < at_.tau()) drift_[c % at_.joints] = 0.0;
-    if (c < at_.qd()) anchor_[c] = last_[c];
+    leave(c, stays && c >= at_.tau() ? Fault::stuck : Fault::wild);
     last_[c] = x;
   }
 
   // A wild channel comes back after some usual steps; a position after the way that its joint has
   // come by its speed, or for good as another one.
-  void wait_for_calm(std::size_t c, double dt) {
+  void wait_for_calm(std::size_t c) {
     const bool calm = ratio_[c] <= 1.0 && lives(c, last_[c]);
     if (c < at_.qd()) {
-      anchor_[c] += dt * now_[at_.qd() + c];
-      if (std::fabs(now_[c] - anchor_[c]) <= gate(c)) return take(c);
+      if (near(c)) return take(c);
       since_[c] = calm ? since_[c] + 1 : 0;
       if (since_[c] >= return_) take(c);
       return;
     }
     if (!calm && c < at_.tau()) drift_[c - at_.qd()] = 0.0;
-    since_[c] = calm && (c >= at_.tau() || !far(c - at_.qd())) ? since_[c] + 1 : 0;
+    since_[c] = calm && (c >= at_.tau() || near(c)) ? since_[c] + 1 : 0;
     if (since_[c] >= kGood) take(c);
   }
 
@@ -329,6 +419,11 @@ class ChannelGates {
     since_[c] = 0;
     evidence_[c] = run_[c] = 0.0;
     if (c < at_.tau()) drift_[c % at_.joints] = 0.0;
+    if (c >= at_.qd()) return;
+    const std::size_t v = at_.qd() + c;
+    const bool nothing_known = tracked_[c] != tracked_[c];
+    if (nothing_known && fault_[v] == Fault::absent && now_[v] == now_[v]) fault_[v] = Fault::none;
+    begin_tracking(c);
   }
 
   // The last good reading stands for this one; a joint is where its speed has brought it.
@@ -418,6 +513,14 @@ class ChannelGates {
     const double* __restrict last = last_.data();
     double* __restrict drift = drift_.data();
     double* __restrict usual = usual_drift_.data();
+    const double silent = silent_;
+    double* __restrict same = same_.data();
+    double* __restrict often = often_.data();
+    for (std::size_t c = 0; c < 2 * n; ++c) {
+      const bool changes = !(now[c] == last[c]);
+      same[c] = changes ? 0.0 : same[c] + 1.0;
+      often[c] += same[c] < kStands ? rate_ * ((changes ? 1.0 : 0.0) - often[c]) : 0.0;
+    }
     const double least = least_drift();
     double worst = 0.0;
     for (std::size_t j = 0; j < n; ++j) {
@@ -427,14 +530,18 @@ class ChannelGates {
       const double most = kDisagrees * usual[j] > least ? kDisagrees * usual[j] : least;
       const double clipped = size < most ? size : most;
       usual[j] += rate_ * (clipped - usual[j]);
-      const double over = size / most;
+      const bool dead = same[n + j] >= kStands && often[n + j] > kSurely;
+      const double over = dead ? 2.0 : (same[n + j] < silent ? size : kStale * size) / most;
       worst = over > worst ? over : worst;
     }
     if (worst > 1.0 || any_far_) judge_speeds();
   }
   double least_drift() const { return kSpeedError * std::max(kWindow, kWindowSamples * period_); }
+  // One that has not changed for so long needs little to be told from one that is right.
+  bool stale(std::size_t c) const { return same_[c] >= silent_; }
   bool far(std::size_t j) const {
-    return std::fabs(drift_[j]) > std::max(kDisagrees * usual_drift_[j], least_drift());
+    const double off = std::fabs(drift_[j]) * (stale(at_.qd() + j) ? kStale : 1.0);
+    return off > std::max(kDisagrees * usual_drift_[j], least_drift());
   }
 
   void judge_speeds() {
@@ -448,11 +555,33 @@ class ChannelGates {
       } else {
         far_[j] = far(j) ? far_[j] + 1 : 0;
         const bool free = position == Fault::none && speed == Fault::none;
-        if (far_[j] >= dwell_ && free && seen_ > warm_up_) position = speed = Fault::disagrees;
+        const bool stands = same_[j] >= kStands && same_[at_.qd() + j] < 1.0;
+        if (!free || seen_ <= warm_up_) continue;
+        if (dead(j)) leave(at_.qd() + j, Fault::stuck);
+        else if (far_[j] >= dwell_ || (far_[j] > 0 && stands)) tell_one(j);
       }
       any_far_ = any_far_ || far_[j] > 0;
     }
     find_all_sound();
+  }
+
+  // Has a velocity that changes with each sample stopped to do so while its joint moves?
+  bool dead(std::size_t j) const {
+    const std::size_t v = at_.qd() + j;
+    const bool still = same_[v] >= kStands && often_[v] > kSurely;
+    return still && same_[j] < 1.0 && std::fabs(speed_[j]) > kMoving;
+  }
+
+  // Position and velocity of a joint disagree: one that has stood still since is the wrong one.
+  void tell_one(std::size_t j) {
+    const std::size_t v = at_.qd() + j;
+    if (same_[j] >= kStands && same_[v] < 1.0) {
+      leave(j, Fault::stuck);
+      anchor_[j] = now_[j] + same_[j] * period_ * now_[v];  // what it has missed so far
+      return;
+    }
+    if (same_[v] >= dwell_ && same_[j] < dwell_) return leave(v, Fault::stuck);
+    fault_[j] = fault_[v] = Fault::disagrees;
   }
 
   bool moving() const {
@@ -514,6 +643,12 @@ class ChannelGates {
   Sample believed(double time) {
     for (std::size_t c = 0; c < at_.count(); ++c)
       out_[c] = fault_[c] == Fault::none || fault_[c] == Fault::spike ? now_[c] : kNever;
+    for (std::size_t j = 0; j < at_.joints; ++j) {
+      const std::size_t v = at_.qd() + j;
+      const bool way = usable(j), speed = usable(v);
+      if (!way && speed && fault_[j] != Fault::none && blind_[j] < kWayBlind) out_[j] = anchor_[j];
+      if (!speed && way && fault_[v] != Fault::none) out_[v] = speed_[j];
+    }
     return {time, out_.data() + at_.q(), out_.data() + at_.qd(), out_.data() + at_.tau(),
             out_.data() + at_.wrench()};
   }
@@ -528,12 +663,17 @@ class ChannelGates {
   std::vector<double> mean_, step_, ratio_;                // of steps
   std::vector<double> often_, evidence_, run_, longest_, highest_, lowest_;  // of values that stay
   std::vector<double> drift_, usual_drift_, anchor_;      // of joints
+  std::vector<double> tracked_, speed_, acceleration_;  // position, velocity, acceleration, of positions
+  std::vector<double> blind_;  // [s] without a position that is believed
+  std::vector<double> same_;   // samples for which a position or velocity has been the same
+  double follows_[3] = {}, tracked_at_ = kNever;
   std::vector<int> far_;
   std::vector<int> since_, calm_;  // samples, of what a fault waits for
   std::vector<Fault> fault_;
   double time_ = kNever, memory_ = 0.0, rate_ = 0.0, kept_ = 0.0;
   int seen_ = 0, warm_up_ = 0, held_most_ = 1, silent_ = 0, return_ = 0, dwell_ = 0, refusals_ = 0;
   bool all_sound_ = true, any_far_ = false, absurd_ = false;
+  Health absent_ = 0;
 };
 
 }  // namespace touchline

@@ -15,7 +15,8 @@ enum class Fault : std::uint8_t {
   step,      // such a jump to a level that stays, and a sensor that must feel it feels nothing
   wild,      // such jumps that go on
   stuck,     // the same value again and again while the arm moves
-  disagrees  // position or velocity of a joint: one is not the derivative of the other
+  disagrees,  // position or velocity of a joint: one is not the derivative of the other
+  absent      // position or velocity of a joint: not there, the other one stands in for it
 };
 
 // Channels in the order of a sample: q, qd and tau of all joints, then six of each sensor.
