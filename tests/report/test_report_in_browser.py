@@ -154,3 +154,50 @@ def test_it_is_readable_without_script_and_in_print(browser, analysis):
     rows = np.flatnonzero(blue > 3)  # curves, without the script
     assert len(rows) > PLOT[1]
     assert browser.complaints == []
+
+
+SAVED = """(() => {
+  window.saved = [];
+  URL.createObjectURL = (blob) => {
+    const known = { type: blob.type, size: blob.size, text: "" };
+    saved.push(known);
+    blob.arrayBuffer().then((b) => { known.text = new TextDecoder("latin1").decode(b); });
+    return "#";
+  };
+  HTMLAnchorElement.prototype.click = function () { saved.at(-1).name = this.download; };
+})()"""
+
+
+def test_a_plot_is_saved_as_csv_and_png(report):
+    report.run(SAVED)
+    plot = "document.querySelector('[data-panel]')"
+    title = report.run(f"{plot}.querySelector('header b').textContent")
+    for kind in ("CSV", "PNG"):
+        report.run(
+            f"[...{plot}.querySelectorAll('.save')].find((b) => b.textContent === '{kind}').click()"
+        )
+    until(lambda: report.run("saved.length === 2 && saved.every((s) => s.text)"), pause=report.rest)
+    table, picture = sorted(report.run("saved"), key=lambda s: s["type"], reverse=True)
+    head, *rows = table["text"].splitlines()
+    assert head == "time,largest test least,largest test largest" and len(rows) > 500
+    numbers = np.array([[float(x or "nan") for x in row.split(",")] for row in rows])
+    assert (np.diff(numbers[:, 0]) > 0).all() and np.nanmax(numbers[:, 2]) > 1.0
+    assert (numbers[:, 2] >= numbers[:, 1])[np.isfinite(numbers[:, 1])].all()
+    assert picture["text"][1:4] == "PNG" and picture["size"] > 3000
+    assert table["name"].endswith(".csv") and title.split(":")[0] in table["name"]
+
+
+def test_an_address_names_a_time_or_an_event(browser, analysis):
+    browser.offline()
+    browser.resize(1200, 900)
+    page = (analysis.out / "report.html").as_uri()
+    shown = "document.getElementById('shown').textContent"
+    browser.open(f"{page}#t=2.5,4")
+    until(lambda: browser.run(shown) == "2.50 s to 4.00 s", pause=browser.rest)
+    event = analysis.events[0]
+    browser.run(f"location.hash = '#event-{event.id}'")
+    until(lambda: browser.run(shown) != "2.50 s to 4.00 s", pause=browser.rest)
+    first, last = (float(word.split()[0]) for word in browser.run(shown).split(" to "))
+    assert first < event.detected < last and last - first < 3.0
+    numbers = "[...document.querySelectorAll('svg text.number')].map((t) => t.textContent)"
+    assert str(event.id) in browser.run(numbers)

@@ -13,7 +13,7 @@ from touchline.view.scene import ALARM, TINT
 from touchline.view.server import PageServer
 from touchline.view.signals import JOINTS
 
-BLUE = COLOURS["truth"]
+VIOLET = COLOURS["truth"]
 
 
 class Visitor:
@@ -84,7 +84,9 @@ def test_a_replay_is_seen_played_and_jumped_in(browser, touched):
 
         assert "the truth of the simulation" in browser.text()
         visitor.until(
-            lambda: count_near(browser.picture(), *visitor.pixel(contact.position), BLUE, 25) > 15,
+            lambda: (
+                count_near(browser.picture(), *visitor.pixel(contact.position), VIOLET, 25) > 15
+            ),
             "the true point around it",
         )
         visitor.until(point_is_shown, "the contact's point")

@@ -33,19 +33,21 @@ def analyze(
     Example: touchline analyze run1.parquet --robot robot.yaml --out results
 
     Writes into DIR estimates.parquet (a row per sample), contacts.parquet (a row per contact and
-    sample), events.json (a list of contacts from beginning to end) and report.html (open it in a
-    browser; it needs no network); and for `touchline view DIR` analysis.json (what the results were
-    made from) and postures.parquet (joint positions, at most 100 a second). Prints a summary.
+    sample), events.json (a list of contacts from beginning to end) and report.html. Open the report
+    in a browser; it needs no network. For `touchline view DIR` it writes analysis.json (what the
+    results were made from) and postures.parquet (joint positions, at most 100 a second). Prints a
+    summary.
     Older results in DIR are replaced when the new ones are whole; other files in it are left alone.
     If it is stopped, the older results stand, and what was finished of the new ones is in the
     folder touchline.unfinished: events.json, and estimates.parts and contacts.parts with Parquet
     files.
 
-    Several recordings, a folder, a pattern ("runs/*.mcap"), a URL (s3://, http://) or a CSV list
-    with the columns log and robot are analyzed by all cores, each into a folder of its own below
-    DIR. fleet.html there tells what they have in common, tables the same as Parquet. manifest.jsonl
-    tells what became of each: ok, partial (something in it could not be read), failed or skipped,
-    why, and hashes of input, configuration and results. The same command goes on where it was
+    Several recordings are analyzed by all cores, each into a folder of its own below DIR. Name
+    them, or a folder, a pattern ("runs/*.mcap"), a URL (s3://, http://), or a CSV list with the
+    columns log and robot. The page fleet.html there tells what they have in common, and so do
+    tables as Parquet. The file manifest.jsonl tells what became of each and why: ok, partial
+    (something in it could not be read), failed or skipped. It has hashes of input, configuration
+    and results. The same command goes on where it was
     stopped, and leaves alone what is unchanged. Without --robot the robot.yaml in the recording's
     folder, or the nearest above it, is taken. Exit status then: 0 all ok, 3 some are not, 1 none.
 

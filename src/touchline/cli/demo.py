@@ -33,8 +33,8 @@ def demo(
     ends it.
 
     With --headless, the arm moves and is touched near its base, then on the structure, the handle
-    and the tool at once, and on the upper arm; the log is analyzed, compared with the truth of the
-    simulation, and the table of errors is printed.
+    and the tool at once, and on the upper arm. The log is analyzed and compared with the truth of
+    the simulation. The table of errors is printed.
 
     Args:
         headless: No page: simulate, analyze, print.

@@ -155,7 +155,7 @@ def _words(
         else "No mesh of the robot could be read: there are no pictures."
     )
     if pictures and analysis.comparisons:
-        words += " Blue is the truth of the simulation."
+        words += " Violet is the truth of the simulation."
     words += " Below: the wrench on the segment, its largest test, and the joint torques."
     total = len(analysis.events)
     if min(drawn, len(plots)) < total:

@@ -30,7 +30,8 @@ PLOT = (1030, 120)  # pixels
 HELP = (
     "Each point of a curve spans the least and the largest value of its piece of time. Drag over "
     "a plot to zoom in, with Shift to move; the wheel zooms a plot that was clicked; arrow keys, "
-    "plus and minus do the same; double-click or 0 shows all. Events are shaded."
+    "plus and minus do the same; double-click or 0 shows all. Events are shaded and numbered. "
+    "CSV and PNG save what a plot shows. The address names the event or time shown: send it on."
 )
 
 PAGE = """<!doctype html>

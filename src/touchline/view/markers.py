@@ -16,7 +16,7 @@ Colour = tuple[int, int, int]
 
 COLOURS: dict[str, Colour] = {
     "estimate": (213, 94, 0),
-    "truth": (0, 114, 178),
+    "truth": (106, 61, 154),
     "candidate": (230, 159, 0),
 }
 WEAK = 0.5  # N; a smaller force has no arrow

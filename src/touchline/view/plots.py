@@ -10,7 +10,7 @@ from touchline.view.history import SECONDS, History
 
 Array = NDArray[np.float64]
 
-COLOURS = ("#d55e00", "#009e73", "#0072b2")  # x, y, z; told apart by all kinds of eyes
+COLOURS = ("#c0392b", "#2c7a4b", "#2f6db3")  # x, y, z, as in the report
 HEIGHT = 160  # pixels
 QUANTITIES = {"force": (0, "f", "N", 5.0), "moment": (3, "m", "Nm", 1.0)}
 

@@ -34,7 +34,7 @@ HELP = (
     "Move **time**, press **Play**, or choose an event. Drag over the arm to look around it. "
     "Orange: what was felt; pale orange: places that cannot be told apart."
 )
-TRUTH = " Blue outlines: the truth of the simulation."
+TRUTH = " Violet outlines: the truth of the simulation."
 
 
 class ReplayPage:

@@ -173,6 +173,11 @@
     const size = { x: from, y, width: Math.max(to - from, 1), height };
     const rect = node("rect", { ...size, class: `event ${event.level} ${more}` }, svg);
     node("title", {}, rect).textContent = event.title;
+    const number = String(event.id);
+    if (size.width < 7 * number.length + 4) return;  // pixels: it would not fit
+    const strip = more === "strip";
+    const place = { x: from + 3, y: y + (strip ? Math.min(height - 1, 10) : 10), class: "number" };
+    if (!strip || height > 9) node("text", place, svg).textContent = number;
   };
   let clips = 0;
   const clipTo = (svg, frame) => {
@@ -198,7 +203,10 @@
     // Drawn last to first: the first curve is the one that matters most.
     for (let i = panel.columns.length - 1; i >= 0; i--) {
       const { path, wide } = outline(source, panel.columns[i], frame);
-      node("path", { d: path, class: `${plot.kinds[i]}${wide ? " boxes" : ""}`, ...clipped }, svg);
+      // Where two or three curves lie on each other, the lower ones are seen beside the upper.
+      const under = panel.columns.length <= 3 && !wide ? ` under${i}` : "";
+      const kind = `${plot.kinds[i]}${wide ? " boxes" : ""}${under}`;
+      node("path", { d: path, class: kind, ...clipped }, svg);
     }
   };
   const drawStrip = (plot) => {
@@ -265,6 +273,8 @@
     begun = null;
     if (!moves && b - a > (to - from) / 200) plot.group.show(a, b);
     else plot.group.draw();
+    if (plot.group === recording && recording.view !== recording.whole)
+      setFragment(`t=${recording.view.map((t) => clock(t).toFixed(3)).join(",")}`);
   };
   const KEYS = {
     "+": (g, t) => g.zoom(1 / TURN, t), "=": (g, t) => g.zoom(1 / TURN, t),
@@ -330,6 +340,83 @@
       readout.textContent = time === null ? "" : `at ${clock(time).toFixed(3)} s`;
   };
 
+  // Links: `#event-3` shows an event, `#t=2.5,4` the recording from 2.5 s to 4 s.
+  const setFragment = (words) => history.replaceState(null, "", `#${words}`);
+  const follow = () => {
+    const times = /^#t=(-?[\d.]+),(-?[\d.]+)$/.exec(location.hash);
+    const number = /^#event-(\d+)$/.exec(location.hash);
+    if (times) {
+      recording.show(Number(times[1]) - clock(0), Number(times[2]) - clock(0));
+      document.getElementById("plots").scrollIntoView();
+    } else if (number) {
+      const index = data.events.findIndex((event) => event.id === Number(number[1]));
+      if (index >= 0) goTo({ dataset: { event: index } });
+    }
+  };
+
+  // What a plot shows, as a file: its pieces of time as CSV, the picture as PNG.
+  const save = (name, blob) => {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(blob);
+    link.download = name;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  };
+  const csv = (plot, names) => {
+    const { source, panel } = plot, frame = { from: plot.group.view[0], to: plot.group.view[1] };
+    const lines = [["time", ...names.flatMap((name) => [`${name} least`, `${name} largest`])]];
+    const [from, to] = pieces(source, frame);
+    for (let i = from; i < to; i++) {
+      const values = panel.columns.flatMap((column) =>
+        [source.curves[column].low[i], source.curves[column].high[i]]);
+      if (values.some(Number.isFinite))
+        lines.push([clock(source.start + i * source.width).toFixed(6),
+          ...values.map((v) => (Number.isFinite(v) ? v.toPrecision(7) : ""))]);
+    }
+    return lines.map((cells) => cells.join(",")).join("\n") + "\n";
+  };
+  const PAINT = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-opacity", "font",
+    "stroke-dasharray", "vector-effect", "color"];
+  const png = (plot, done) => {
+    const { svg } = plot, copy = svg.cloneNode(true), { width, height } = svg.viewBox.baseVal;
+    const own = [...svg.querySelectorAll("*")];
+    [...copy.querySelectorAll("*")].forEach((one, i) => {
+      const style = getComputedStyle(own[i]);
+      one.setAttribute("style", PAINT.map((key) => `${key}:${style.getPropertyValue(key)}`).join(";"));
+    });
+    copy.setAttribute("xmlns", "http://www.w3.org/2000/svg");
+    copy.setAttribute("width", 2 * width);
+    copy.setAttribute("height", 2 * height);
+    const image = new Image();
+    image.onload = () => {
+      const canvas = document.createElement("canvas");
+      [canvas.width, canvas.height] = [2 * width, 2 * height];
+      const pen = canvas.getContext("2d");
+      pen.fillStyle = getComputedStyle(document.body).backgroundColor;
+      pen.fillRect(0, 0, canvas.width, canvas.height);
+      pen.drawImage(image, 0, 0);
+      canvas.toBlob(done, "image/png");
+    };
+    image.src = "data:image/svg+xml;charset=utf-8," +
+      encodeURIComponent(new XMLSerializer().serializeToString(copy));
+  };
+  const offer = (holder, plot) => {
+    const header = holder.querySelector("header");
+    const title = header.querySelector("b").textContent;
+    const names = [...header.querySelectorAll(".key")].map((key) => key.firstChild.textContent);
+    const file = title.replace(/[^A-Za-z0-9]+/g, "_");
+    const button = (kind, act) => {
+      const made = document.createElement("button");
+      made.className = "save";
+      made.textContent = kind;
+      made.setAttribute("aria-label", `save ${title} as ${kind}`);
+      made.addEventListener("click", act);
+      header.append(made);
+    };
+    button("CSV", () => save(`${file}.csv`, new Blob([csv(plot, names)], { type: "text/csv" })));
+    button("PNG", () => png(plot, (blob) => save(`${file}.png`, blob)));
+  };
+
   const length = Math.max(data.count * data.width, 1e-9);
   const recording = new Group([0, length], 4 * data.width);
   const overall = { start: 0, width: data.width, count: data.count, curves: data.curves.map(unpack) };
@@ -344,6 +431,7 @@
     const plot = { svg, group, source, panel, draw, values, kinds, height };
     group.plots.push(plot);
     interact(plot);
+    if (panel) offer(holder, plot);
   };
   document.querySelectorAll("[data-panel]").forEach((holder) => {
     const panel = data.panels[Number(holder.dataset.panel)];
@@ -378,15 +466,19 @@
     if (event === undefined) return;
     const room = 0.5 * (event.to - event.from) + 0.2;
     recording.show(event.from - room, event.to + room);
+    setFragment(`event-${event.id}`);
     const place = document.getElementById(`event-${event.id}`) || document.getElementById("plots");
     place.scrollIntoView();
   };
   document.querySelectorAll("[data-event]").forEach((row) =>
     row.addEventListener("click", () => goTo(row)));
+
   const button = document.getElementById("reset");
   if (button) button.addEventListener("click", () => recording.reset());
   const redraw = () => [recording, ...besides].forEach((group) => group.draw());
   let late = 0;
   window.addEventListener("resize", () => { clearTimeout(late); late = setTimeout(redraw, 120); });
   redraw();
+  window.addEventListener("hashchange", follow);
+  follow();
 })();
