@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings with exact dynamics, made without a simulator."""
 
+from dataclasses import replace
+
 import numpy as np
 
 import touchline as tl
+from touchline.observer.dynamics import contact_loads
 from touchline.observer.samples import Samples
 
 
@@ -47,3 +50,14 @@ def free_motion(robot, seconds=20.0, rate=200.0, seed=0, noise=0.01):
     tau += rng.normal(0, noise, tau.shape)
     wrench += rng.normal(0, noise, wrench.shape)
     return Samples(time, q, qd, tau, wrench)
+
+
+def pushed(robot, samples, link, rows, force):
+    """With a force [N] in world on the origin of a link, as all sensors and joints feel it."""
+    q, tau, wrench = samples.q[rows], samples.tau.copy(), samples.wrench.copy()
+    places = np.array([robot.T_world_links(x)[link][:3, 3] for x in q])
+    forces = np.tile(force, (len(q), 1))
+    loads = contact_loads(robot, q, link, np.hstack([forces, np.cross(places, forces)]))
+    tau[rows] -= loads.torque
+    wrench[rows] -= loads.wrench
+    return replace(samples, tau=tau, wrench=wrench)

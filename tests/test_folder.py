@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from free_motion import free_motion
+from free_motion import free_motion, pushed
 
 import touchline as tl
 from touchline import folder
@@ -140,7 +140,7 @@ def test_what_cannot_be_written_is_told_before_the_work(tmp_path):
 def log(tmp_path_factory):
     robot = tl.load_robot("sara")
     samples = free_motion(robot, seconds=5.0, rate=200.0)
-    samples.wrench[500:600, 0, 0] -= 30.0
+    samples = pushed(robot, samples, "link0", slice(500, 600), [30.0, 0.0, 0.0])
     path = tmp_path_factory.mktemp("logs") / "log.parquet"
     write_table(path, samples, robot.description)
     return path

@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from free_motion import free_motion
+from free_motion import free_motion, pushed
 
 import touchline as tl
 from touchline.cli import main
 from touchline.cli.bench import BENCHMARKS
 from touchline.logs import write_table
-from touchline.observer.dynamics import contact_loads
 
 TOUCH = slice(1000, 1200)  # samples
 
@@ -29,17 +28,6 @@ def recording(robot):
     samples = free_motion(robot, seconds=6.0, rate=400.0)
     samples = pushed(robot, samples, "link2", TOUCH, [20.0, 0.0, 0.0])
     return pushed(robot, samples, "link2", slice(2200, None), [0.0, -100.0, 0.0])
-
-
-def pushed(robot, samples, link, rows, force):
-    """With a force [N] in world on the origin of a link, as all sensors and joints feel it."""
-    q, tau, wrench = samples.q[rows], samples.tau.copy(), samples.wrench.copy()
-    places = np.array([robot.T_world_links(x)[link][:3, 3] for x in q])
-    forces = np.tile(force, (len(q), 1))
-    loads = contact_loads(robot, q, link, np.hstack([forces, np.cross(places, forces)]))
-    tau[rows] -= loads.torque
-    wrench[rows] -= loads.wrench
-    return replace(samples, tau=tau, wrench=wrench)
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from free_motion import free_motion
+from free_motion import free_motion, pushed
 
 import touchline as tl
 from touchline.cli import main
@@ -289,10 +289,9 @@ sys.exit(main(sys.argv[1:]))
 
 def test_a_killed_run_leaves_what_it_had_finished(robot, tmp_path):
     samples = free_motion(robot, seconds=15.0, rate=200.0)
-    wrench = samples.wrench.copy()
-    wrench[1000:1100, 0, 0] -= 30.0
+    samples = pushed(robot, samples, "link0", slice(1000, 1100), [30.0, 0.0, 0.0])
     log, out = tmp_path / "log.parquet", tmp_path / "r"
-    write_table(log, replace(samples, wrench=wrench), robot.description)
+    write_table(log, samples, robot.description)
     arguments = ["analyze", str(log), "--robot", "sara", "--out", str(out)]
     process = subprocess.Popen(
         [sys.executable, "-c", SLOW, *arguments], stdout=subprocess.PIPE, text=True

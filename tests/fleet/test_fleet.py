@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from free_motion import free_motion
+from free_motion import free_motion, pushed
 
 import touchline as tl
 from touchline.cli import main
@@ -39,7 +39,7 @@ def made(robot, tmp_path_factory):
     """Six recordings, of which two are whole, and a list of them."""
     folder = tmp_path_factory.mktemp("logs")
     samples = free_motion(robot, seconds=2.0, rate=200.0)
-    samples.wrench[200:300, 0, 0] -= 30.0
+    samples = pushed(robot, samples, "link0", slice(200, 300), [30.0, 0.0, 0.0])
     (folder / "a").mkdir()
     write_table(folder / "a" / "whole.parquet", samples, robot.description)
     write_table(folder / "b.csv.gz", samples, robot.description)

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
-from free_motion import free_motion
+from free_motion import free_motion, pushed
 
 import touchline as tl
 from touchline.cli import main
@@ -28,7 +28,7 @@ def made(tmp_path_factory):
     robot = tl.load_robot("sara")
     for seed, name in enumerate(("a", "b", "c")):
         samples = free_motion(robot, seconds=2.0, rate=200.0, seed=seed)
-        samples.wrench[200:300, 0, 0] -= 30.0
+        samples = pushed(robot, samples, "link0", slice(200, 300), [30.0, 0.0, 0.0])
         write_table(folder / f"{name}.parquet", samples, robot.description)
     (folder / "empty.csv").write_bytes(b"")
     (folder / "notes.txt").write_text("mine")

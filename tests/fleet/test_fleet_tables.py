@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 import pytest
-from free_motion import free_motion
+from free_motion import free_motion, pushed
 
 import touchline as tl
 from touchline.cli import main
@@ -29,7 +29,7 @@ def made(tmp_path_factory):
     robot = tl.load_robot("sara")
     for name, start in (("plain", 0.0), ("dated", EPOCH + 100.0), ("over & out", EPOCH + 3597.0)):
         samples = free_motion(robot, seconds=6.0, rate=200.0)
-        samples.wrench[800:900, -1, 0] -= 30.0
+        samples = pushed(robot, samples, "handle", slice(800, 900), [30.0, 0.0, 0.0])
         samples.wrench[100:110, 0, 1] = np.nan
         samples.time[:] += start
         write_table(folder / f"{name}.parquet", samples, robot.description)

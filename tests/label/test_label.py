@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from free_motion import free_motion
+from free_motion import free_motion, pushed
 
 import touchline as tl
 from touchline.cli import main
@@ -29,9 +29,9 @@ def robot():
 
 @pytest.fixture(scope="module")
 def episodes(robot):
-    """Free motion; in one episode the wrist sensor feels 40 N for a second."""
+    """Free motion; in one episode the handle is pushed with 40 N for a second."""
     made = [free_motion(robot, seconds=5.0, rate=RATE, seed=seed) for seed in range(EPISODES)]
-    made[TOUCHED].wrench[TOUCH, -1, 0] -= 40.0
+    made[TOUCHED] = pushed(robot, made[TOUCHED], "handle", TOUCH, [40.0, 0.0, 0.0])
     return made
 
 

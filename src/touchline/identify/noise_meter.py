@@ -24,7 +24,8 @@ class NoiseMeter:
             return
         d = np.diff(np.where(np.isfinite(values), values, np.nan), ORDER, axis=0)
         known = np.isfinite(d)
-        squares = np.where(known, d, 0.0) ** 2
+        with np.errstate(over="ignore"):  # readings beyond all reason have an infinite noise
+            squares = np.where(known, d, 0.0) ** 2
         for j in np.flatnonzero(known.any(axis=0)):
             own = squares[known[:, j], j]
             typical = float(np.median(own)) / 0.455  # of the square of a normal variable
