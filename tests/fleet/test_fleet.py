@@ -223,8 +223,9 @@ def test_a_killed_run_goes_on_where_it_was(made, tmp_path):
         process.send_signal(stop)
         status = process.wait()
         assert status == (-signal.SIGKILL if stop == signal.SIGKILL else 130)
-    finished = {n: row["outputs"] for n, row in Manifest(out).rows.items()}
-    assert len(finished) >= 4
+    left = Manifest(out).rows  # of which one may have been in work when the run was stopped
+    finished = {n: row["outputs"] for n, row in left.items() if row["status"] == "ok"}
+    assert len(finished) >= len(left) - 1 >= 3
     deadline = time.monotonic() + 60  # the killed run's worker ends when its pipe is closed
     while main(command[3:]) == 2 and time.monotonic() < deadline:
         time.sleep(0.5)
