@@ -12,6 +12,7 @@
 
 #include "touchline/detail/detector/activity.hpp"
 #include "touchline/detail/detector/baseline_posture.hpp"
+#include "touchline/detail/detector/borne_out.hpp"
 #include "touchline/detail/detector/detection_row.hpp"
 #include "touchline/detail/detector/motion_spread.hpp"
 #include "touchline/detail/detector/noise_meter.hpp"
@@ -34,6 +35,7 @@ class Detector {
         baseline_posture_(settings_.sum_limits.size(), observer.row_layout().joints),
         states_(rows_.size()),
         spreads_(rows_.size()),
+        borne_out_(rows_.size()),
         samples_(rows_.size()),
         segments_(settings_.sum_limits.size()),
         first_(segments_.size() + 1, 0),
@@ -52,8 +54,11 @@ class Detector {
       tests_.emplace_back(observer, own, settings_);
       joint_tests_ = joint_tests_ || tests_.back().used();
     }
-    for (const DetectionRow& row : rows_)
-      meters_.emplace_back(bandwidth(row), row.contact / std::max(row.seen, 1.0));
+    for (const DetectionRow& row : rows_) {
+      const double least = row.contact / std::max(row.seen, 1.0);
+      meters_.emplace_back(bandwidth(row), least);
+      trend_meters_.emplace_back(bandwidth(row) / kTrend, least);
+    }
     slowest_.assign(segments_.size(), kAbsurd);
     for (const DetectionRow& row : rows_)
       slowest_[row.segment] = std::min(slowest_[row.segment], bandwidth(row));
@@ -71,11 +76,11 @@ class Detector {
     if (dt > 0.0) follow_motion(q, qd, dt);
     for (std::size_t g = 0; g < segments_.size(); ++g) {
       Segment& s = segments_[g];
-      s.peak = s.sum = s.collision = 0.0;
+      s.peak = s.slow = s.sum = s.collision = s.borne = s.borne_sum = s.borne_collision = 0.0;
       s.off = false;
       read_segment(g);
       if (known(g)) s.age += dt;
-      for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) test_row(i);
+      for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) test_row(i, dt);
       judge(g, dt);
       decide(g, dt);
     }
@@ -146,9 +151,11 @@ class Detector {
     Origin origin = Origin::start;
     double age = 0.0;     // since its first settled sample [s]
     double lasted = 0.0;  // for how long the present event has [s]
+    double slow = 0.0;  // the largest share of its rows' trends
     double peak = 0.0, sum = 0.0, collision = 0.0;  // of the normalized rows
+    double borne = 0.0, borne_sum = 0.0, borne_collision = 0.0;  // of what no single sample moves
     double above = 0.0, above_collision = 0.0, below = 0.0;  // for how long [s]
-    double score = 0.0;  // of all tests, in thresholds
+    double score = 0.0, borne_score = 0.0;  // of all tests, in thresholds
     double top = 0.0;    // the largest mean of the last moments since then, in limits
     double rest = 0.0;   // for how long little has been left of it, and that has not changed [s]
     bool pending = false, pending_collision = false;
@@ -171,6 +178,7 @@ class Detector {
   static constexpr double kSlow = 0.2;    // [rad/s]; a joint that is about to turn, or just has
   static constexpr double kCreep = 0.25;  // of what was there before: a push adds more in 2 / K
   static constexpr double kHand = 2.0;    // a push on an arm in motion rarely lasts longer [s]
+  static constexpr double kAlone = 4.0;  // thresholds: a sample that no noise makes needs no other
   static constexpr double kMost = 1.5;  // thresholds that a sum can grow to while all is felt
 
   void follow_motion(const double* q, const double* qd, double dt) {
@@ -196,7 +204,9 @@ class Detector {
     for (std::size_t i = 0; i < rows_.size(); ++i) {
       const std::size_t at = i * (rows_.size() + 1);
       const double K = bandwidth(rows_[i]), kept = std::min(1.0, 0.5 * K * settings_.noise.period);
-      meters_[i].tell(kept * told_.reading()[at], K * K * told_.momentum()[at]);
+      const double readings = kept * told_.reading()[at], velocities = K * K * told_.momentum()[at];
+      meters_[i].tell(readings, velocities);
+      trend_meters_[i].tell((readings + kept * velocities) / (1.0 + kTrend), 0.0);
     }
   }
 
@@ -246,12 +256,13 @@ class Detector {
     return observer_.sensors()[observer_.layout().segments[row.segment].sensor].bandwidth;
   }
 
-  void test_row(std::size_t i) {
+  void test_row(std::size_t i, double dt) {
     const DetectionRow& row = rows_[i];
     RowState& s = states_[i];
     RowSample& sample = samples_[i];
     normalized_[i] = 0.0;
-    if (!sample.known) return;
+    if (!sample.known) return borne_out_[i].interrupt();
+    borne_out_[i].add(sample.residual, dt, bandwidth(row));
     if (!s.started) {  // what stands there when observation begins is an offset
       s.baseline = s.anchor = s.reference = s.trend = sample.residual;
       s.started = true;
@@ -264,8 +275,29 @@ class Detector {
     const double x = normalized_[i] / limits_[i];
     Segment& segment = segments_[row.segment];
     segment.peak = std::max(segment.peak, std::fabs(x));
-    if (!(learns(i) && spreads_[i].limit() > row.contact)) segment.sum += x * x;
-    segment.collision = std::max(segment.collision, std::fabs(x) * row.contact / row.collision);
+    segment.slow = std::max(segment.slow, slow_share(i));
+    const double borne = (borne_out_[i].value() - s.baseline) / (row.contact * limits_[i]);
+    segment.borne = std::max(segment.borne, std::fabs(borne));
+    if (!(learns(i) && spreads_[i].limit() > row.contact)) {
+      segment.sum += x * x;
+      segment.borne_sum += borne * borne;
+    }
+    const double least = row.contact / row.collision;
+    segment.collision = std::max(segment.collision, std::fabs(x) * least);
+    segment.borne_collision = std::max(segment.borne_collision, std::fabs(borne) * least);
+  }
+
+  // What lasts of a row, in what the noise of its trend lets expect. Noise of velocities is nearly
+  // white in the residual and dies out in the trend, so that this finds weak loads that last, of an
+  // arm that stands: of one that moves the model's errors are larger than noise.
+  double slow_share(std::size_t i) const {
+    const DetectionRow& row = rows_[i];
+    const RowState& s = states_[i];
+    if (row.seen <= 0.0 || still_ < kPause || samples_[i].gap_std > 0.0) return 0.0;
+    const double now = samples_[i].residual - s.baseline, mean = s.trend - s.baseline;
+    if (now * mean <= 0.0) return 0.0;
+    const double limit = std::max(row.contact, trend_meters_[i].limit(row.seen));
+    return std::min(std::fabs(now), std::fabs(mean)) / limit;
   }
 
   // What a row's load must exceed now [N or Nm]: the larger of what noise as told and as seen would.
@@ -298,14 +330,19 @@ class Detector {
       }
       tests_[g].step(samples_.data() + first_[g], dt, gap_, adapts(g), activity_.activity(), most);
     }
-    s.score = 0.0;
+    s.score = s.borne_score = 0.0;
     for (std::size_t t = 0; t < settings_.tests.size(); ++t) {
       const TestSetting& setting = settings_.tests[t];
       double& statistic = statistics_[g * settings_.tests.size() + t];
-      statistic = setting.test == Test::rows ? std::max(s.peak, std::sqrt(s.sum / settings_.sum_limits[g]))
-                  : placed_                  ? tests_[g].statistic(setting.test)
-                                             : 0.0;
+      const double sum = std::sqrt(s.sum / settings_.sum_limits[g]);
+      const bool rows = setting.test == Test::rows;
+      statistic = rows      ? std::max({s.peak, s.slow, sum})
+                  : placed_ ? tests_[g].statistic(setting.test)
+                            : 0.0;
       s.score = std::max(s.score, statistic / setting.limits[g]);
+      const double borne_sum = std::sqrt(s.borne_sum / settings_.sum_limits[g]);
+      const double borne = rows ? std::max({s.borne, s.slow, borne_sum}) : statistic;
+      s.borne_score = std::max(s.borne_score, borne / setting.limits[g]);
     }
   }
 
@@ -317,8 +354,8 @@ class Detector {
     // What motion shows soon exceeds no limit; it need not fall below a part of it.
     const double release = own_doing(g) ? 1.0 : settings_.times.release;
     s.below = lasting(s.score < release, dt, s.below);
-    if (s.pending && s.above >= settings_.times.min_duration) levels_[g] = std::max(levels_[g], 1);
-    if (s.pending_collision && s.above_collision >= settings_.times.min_duration) levels_[g] = 2;
+    if (lasts(s.pending, s.above, s.score, s.borne_score)) levels_[g] = std::max(levels_[g], 1);
+    if (lasts(s.pending_collision, s.above_collision, s.collision, s.borne_collision)) levels_[g] = 2;
     if (levels_[g] == 0) s.top = s.rest = s.below = s.lasted = 0.0;
     if (levels_[g] == 0) return;
     s.lasted += dt;
@@ -327,6 +364,13 @@ class Detector {
     if (s.below >= settings_.times.hold) levels_[g] = 0;
     const double least = kRest / slowest_[g];
     if (levels_[g] > 0 && s.rest >= (stands() ? least : std::max(least, kLeft))) come_to_rest(g);
+  }
+
+  // Has a test held for long enough, and not by one sample alone? Where a test need not last, its
+  // threshold is one of calibration, which has met such samples.
+  bool lasts(bool pending, double duration, double score, double borne) const {
+    if (!pending || duration < settings_.times.min_duration) return false;
+    return settings_.times.min_duration <= 0.0 || borne > 1.0 || score > kAlone;
   }
 
   // For how long something has held, but for single samples of noise.
@@ -433,10 +477,16 @@ class Detector {
       if (s.referred > 0.0) s.reference += (value - s.reference) * std::min(1.0, dt / s.referred);
     }
     const bool stopped = still_ >= kPause && still_ - dt < kPause;
-    if (levels_[row.segment] > 0) return meters_[i].interrupt();
+    if (levels_[row.segment] > 0) {
+      meters_[i].interrupt();
+      return trend_meters_[i].interrupt();
+    }
     if (stopped && segments_[row.segment].off && row.seen > 0.0) rest(i);
     if (segments_[row.segment].pending) return;
-    if (dt > 0.0) meters_[i].add(value, dt);
+    if (dt > 0.0) {
+      meters_[i].add(value, dt);
+      trend_meters_[i].add(s.trend, dt);
+    }
     quiet_[row.segment] = s.age += dt;
     const double tau = std::min(s.age, settings_.times.baseline);
     if (tau <= 0.0) return;
@@ -481,12 +531,13 @@ class Detector {
   BaselinePosture baseline_posture_;
   std::vector<RowState> states_;
   std::vector<MotionSpread> spreads_;  // per row
+  std::vector<BorneOut> borne_out_;    // per row
   std::vector<RowSample> samples_;
   std::vector<Segment> segments_;
   std::vector<double> slowest_;     // per segment: the least bandwidth of its rows [rad/s]
   std::vector<std::size_t> first_;  // per segment: its first row; they stand together
   std::vector<SegmentTests> tests_;
-  std::vector<NoiseMeter> meters_;  // per row
+  std::vector<NoiseMeter> meters_, trend_meters_;  // per row: of the residual, of its trend
   std::vector<double> normalized_, limits_, drift_;
   std::vector<int> levels_;
   std::vector<double> quiet_, statistics_;
