@@ -14,16 +14,17 @@ class BorneOut {
  public:
   // The next residual [N or Nm], `dt` [s] after the one before, of a filter with `bandwidth` [rad/s].
   void add(double residual, double dt, double bandwidth) {
-    const double kept = std::exp(-bandwidth * std::max(dt, 0.0));
-    if (!running_ || !(kept < 1.0)) {
-      if (!running_) value_ = last_ = first_ = second_ = residual;
+    if (!running_) {
       running_ = true;
+      value_ = last_ = first_ = second_ = residual;
       return;
     }
-    const double load = (residual - kept * last_) / (1.0 - kept);
+    if (!(dt > 0.0)) return;
+    if (dt != dt_) kept_ = std::exp(-bandwidth * (dt_ = dt));
+    const double load = (residual - kept_ * last_) / (1.0 - kept_);
     const double median =
         std::max(std::min(load, second_), std::min(std::max(load, second_), first_));
-    value_ = kept * value_ + (1.0 - kept) * median;
+    value_ = kept_ * value_ + (1.0 - kept_) * median;
     first_ = second_;
     second_ = load;
     last_ = residual;
@@ -37,6 +38,7 @@ class BorneOut {
  private:
   double value_ = 0.0, last_ = 0.0;
   double first_ = 0.0, second_ = 0.0;  // the two loads before
+  double dt_ = 0.0, kept_ = 1.0;           // what the filter keeps over `dt_` [s]
   bool running_ = false;
 };
 
