@@ -34,7 +34,7 @@ class Fault:
 
     name: str
     arm: Callable[[Mechanism, np.random.Generator], Mechanism]
-    read: Callable[[Samples, np.random.Generator], Samples]
+    read: Callable[[Robot, Samples, np.random.Generator], Samples]
 
     def moving(self, robot: Robot, rng: np.random.Generator) -> Robot:
         """The arm as it is."""
@@ -45,7 +45,7 @@ def _same(mechanism: Mechanism, _: np.random.Generator) -> Mechanism:
     return mechanism
 
 
-def _true(samples: Samples, _: np.random.Generator) -> Samples:
+def _true(_robot: Robot, samples: Samples, _: np.random.Generator) -> Samples:
     return samples
 
 
@@ -81,7 +81,7 @@ def _about(mass: float, r: Array) -> Array:
     return np.asarray(mass * (float(r @ r) * np.eye(3) - np.outer(r, r)), dtype=np.float64)
 
 
-def _biased(samples: Samples, rng: np.random.Generator) -> Samples:
+def _biased(_: Robot, samples: Samples, rng: np.random.Generator) -> Samples:
     if samples.wrench.shape[1] == 0:
         return replace(samples, tau=samples.tau + BIAS * rng.choice([-1.0, 1.0]))
     way = rng.normal(size=3)
@@ -90,14 +90,31 @@ def _biased(samples: Samples, rng: np.random.Generator) -> Samples:
     return replace(samples, wrench=wrench)
 
 
-def _scaled(samples: Samples, rng: np.random.Generator) -> Samples:
+def _scaled(_: Robot, samples: Samples, rng: np.random.Generator) -> Samples:
     gains = 1.0 + GAIN * rng.choice([-1.0, 1.0], samples.tau.shape[1])
     wrench = samples.wrench * (1.0 + GAIN * rng.choice([-1.0, 1.0], samples.wrench.shape[1:]))
     return replace(samples, tau=samples.tau * gains, wrench=wrench)
 
 
-def _rubbing(samples: Samples, _: np.random.Generator) -> Samples:
+def _rubbing(_robot: Robot, samples: Samples, _: np.random.Generator) -> Samples:
     return replace(samples, tau=samples.tau + COULOMB * np.tanh(samples.qd / TURN))
+
+
+def _noisier(factor: float) -> Callable[[Robot, Samples, np.random.Generator], Samples]:
+    """With `factor` times the noise that is told."""
+    more = np.sqrt(factor**2 - 1.0)
+
+    def read(robot: Robot, s: Samples, rng: np.random.Generator) -> Samples:
+        noise = robot.description.noise
+        sensors = np.array([noise.sensors[name] for name in robot.sensor_names]).reshape(-1, 6)
+        return replace(
+            s,
+            qd=s.qd + more * np.array(noise.qd) * rng.normal(size=s.qd.shape),
+            tau=s.tau + more * np.array(noise.tau) * rng.normal(size=s.tau.shape),
+            wrench=s.wrench + more * sensors * rng.normal(size=s.wrench.shape),
+        )
+
+    return read
 
 
 FAULTS = (
@@ -109,4 +126,6 @@ FAULTS = (
     Fault("bias 2 N", _same, _biased),
     Fault("gains 1 %", _same, _scaled),
     Fault("friction 1 Nm", _same, _rubbing),
+    Fault("noise x 3", _same, _noisier(3.0)),
+    Fault("noise x 10", _same, _noisier(10.0)),
 )

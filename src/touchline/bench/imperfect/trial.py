@@ -73,7 +73,7 @@ class Trials:
         n = q.shape[1]
         loads[:, :n] -= contact.torque
         loads[:, n:] -= contact.wrench.reshape(len(q), -1)
-        s = fault.read(maker.sensed(q, qd, loads, rng), rng)
+        s = fault.read(self._robot, maker.sensed(q, qd, loads, rng), rng)
         pipeline = Pipeline(self._robot, period=1.0 / RATE, skin=self._skin)
         pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
         return _judged(pipeline.events, maker.time, path)

@@ -139,6 +139,7 @@ class Detector {
     double seconds = 0.0;  // since the first settled sample
     double trend = 0.0;   // mean of the last moments
     double age = 0.0, referred = 0.0;  // over how long they have been averaged [s]
+    double side = 1.0, turns = 0.0;  // of its trend it was last far off on, and how often of late
     bool started = false;
   };
   enum class Origin {  // what an event began with
@@ -170,6 +171,9 @@ class Detector {
   static constexpr double kTrace = 0.25;  // of an event's peak: what two contacts hardly leave
   static constexpr double kBarely = 1.5;  // limits: models of arms in motion are not better
   static constexpr double kSpike = 5.0;    // samples of calm that one of noise takes away
+  static constexpr double kFro = 0.5;     // limits: half of what noise is to exceed hardly ever
+  static constexpr double kMemory = 8.0;  // times 1 / K: for how long turns to and fro count
+  static constexpr double kTurns = 3.0;   // at K = 100 a hand that trembles at 10 Hz makes 1.6 of them
   static constexpr double kTrend = 2.0;   // times 1 / K: time constant of the mean of the last moments
   static constexpr double kRest = 5.0;    // times 1 / K: how long rests what has come to rest
   static constexpr double kLeft = 0.15;   // and at least so long while the arm moves [s]
@@ -354,8 +358,8 @@ class Detector {
     // What motion shows soon exceeds no limit; it need not fall below a part of it.
     const double release = own_doing(g) ? 1.0 : settings_.times.release;
     s.below = lasting(s.score < release, dt, s.below);
-    if (lasts(s.pending, s.above, s.score, s.borne_score)) levels_[g] = std::max(levels_[g], 1);
-    if (lasts(s.pending_collision, s.above_collision, s.collision, s.borne_collision)) levels_[g] = 2;
+    if (lasts(g, s.pending, s.above, s.score, s.borne_score)) levels_[g] = std::max(levels_[g], 1);
+    if (lasts(g, s.pending_collision, s.above_collision, s.collision, s.borne_collision)) levels_[g] = 2;
     if (levels_[g] == 0) s.top = s.rest = s.below = s.lasted = 0.0;
     if (levels_[g] == 0) return;
     s.lasted += dt;
@@ -366,12 +370,16 @@ class Detector {
     if (levels_[g] > 0 && s.rest >= (stands() ? least : std::max(least, kLeft))) come_to_rest(g);
   }
 
-  // Has a test held for long enough, and not by one sample alone? Where a test need not last, its
-  // threshold is one of calibration, which has met such samples.
-  bool lasts(bool pending, double duration, double score, double borne) const {
+  // Has a test held for long enough, not by one sample alone, and not by noise that has yet to be
+  // seen? Where a test need not last, its threshold is one of calibration, which has met all that.
+  bool lasts(std::size_t g, bool pending, double duration, double score, double borne) const {
     if (!pending || duration < settings_.times.min_duration) return false;
-    return settings_.times.min_duration <= 0.0 || borne > 1.0 || score > kAlone;
+    if (settings_.times.min_duration <= 0.0 || score > kAlone) return true;
+    return borne > 1.0 && !young(g);
   }
+
+  // Is too little seen of a segment to know its noise?
+  bool young(std::size_t g) const { return segments_[g].age < kConfirm / slowest_[g]; }
 
   // For how long something has held, but for single samples of noise.
   static double lasting(bool holds, double dt, double duration) {
@@ -477,16 +485,11 @@ class Detector {
       if (s.referred > 0.0) s.reference += (value - s.reference) * std::min(1.0, dt / s.referred);
     }
     const bool stopped = still_ >= kPause && still_ - dt < kPause;
-    if (levels_[row.segment] > 0) {
-      meters_[i].interrupt();
-      return trend_meters_[i].interrupt();
-    }
+    const bool felt = levels_[row.segment] > 0;
+    meter_noise(i, felt || segments_[row.segment].pending, dt);
+    if (felt) return;
     if (stopped && segments_[row.segment].off && row.seen > 0.0) rest(i);
     if (segments_[row.segment].pending) return;
-    if (dt > 0.0) {
-      meters_[i].add(value, dt);
-      trend_meters_[i].add(s.trend, dt);
-    }
     quiet_[row.segment] = s.age += dt;
     const double tau = std::min(s.age, settings_.times.baseline);
     if (tau <= 0.0) return;
@@ -494,6 +497,22 @@ class Detector {
     const double most = learns(i) ? std::max(row.baseline_limit, spreads_[i].limit()) : row.baseline_limit;
     s.baseline = std::clamp(next, s.anchor - most, s.anchor + most);
     if (s.age < kTrend / bandwidth(row)) s.anchor = s.baseline;
+  }
+
+  // Noise is measured while nothing is felt, and of what is felt where it goes to and fro more often
+  // within the filter's memory than a hand can.
+  void meter_noise(std::size_t i, bool felt, double dt) {
+    if (dt <= 0.0) return;
+    RowState& s = states_[i];
+    const double off = samples_[i].residual - s.trend, most = kFro * limits_[i] * rows_[i].contact;
+    s.turns *= std::max(0.0, 1.0 - dt * bandwidth(rows_[i]) / kMemory);
+    if (off * s.side < -most) s.turns += 1.0;
+    if (std::fabs(off) > most) s.side = off > 0.0 ? 1.0 : -1.0;
+    const std::size_t g = rows_[i].segment;
+    const bool held_back = levels_[g] == 0 && young(g);
+    const bool counts = !felt || held_back || s.turns > kTurns;
+    meters_[i].add(samples_[i].residual, dt, counts);
+    trend_meters_[i].add(s.trend, dt, counts);
   }
 
   // What stood there at the first sample may be a rest of settling, or of an arm that is set going:

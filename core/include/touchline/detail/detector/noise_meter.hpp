@@ -23,11 +23,8 @@ class NoiseMeter {
     passed_ = sum > 0.0 ? (of_readings * kMean / (1.0 + kMean) + of_velocities) / sum : 1.0;
   }
 
-  // The next value does not follow those before: the mean begins anew, the figure stays.
-  void interrupt() { running_ = false; }
-
-  // A residual [N or Nm], `dt` [s] after the one before.
-  void add(double value, double dt) {
+  // The next residual [N or Nm], `dt` [s] after the one before; `counts` unless it may be a contact's.
+  void add(double value, double dt, bool counts) {
     if (!running_) {
       running_ = true;
       mean_ = value;
@@ -35,6 +32,7 @@ class NoiseMeter {
     }
     const double off = value - mean_;
     mean_ += off * std::min(1.0, dt * bandwidth_ / kMean);
+    if (!counts) return;
     double square = off * off / passed_;  // of what lasts the mean takes a part
     // Squares of filtered noise are like each other for 1 / 2K.
     double news = std::tanh(bandwidth_ * dt);
