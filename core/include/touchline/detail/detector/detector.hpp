@@ -508,9 +508,7 @@ class Detector {
     s.turns *= std::max(0.0, 1.0 - dt * bandwidth(rows_[i]) / kMemory);
     if (off * s.side < -most) s.turns += 1.0;
     if (std::fabs(off) > most) s.side = off > 0.0 ? 1.0 : -1.0;
-    const std::size_t g = rows_[i].segment;
-    const bool held_back = levels_[g] == 0 && young(g);
-    const bool counts = !felt || held_back || s.turns > kTurns;
+    const bool counts = !felt || s.turns > kTurns;
     meters_[i].add(samples_[i].residual, dt, counts);
     trend_meters_[i].add(s.trend, dt, counts);
   }
