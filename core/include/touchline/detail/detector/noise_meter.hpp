@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace touchline {
 
@@ -34,8 +35,7 @@ class NoiseMeter {
     mean_ += off * std::min(1.0, dt * bandwidth_ / kMean);
     if (!counts) return;
     double square = off * off / passed_;  // of what lasts the mean takes a part
-    // Squares of filtered noise are like each other for 1 / 2K.
-    double news = std::tanh(bandwidth_ * dt);
+    double news = news_after(dt);
     const double most = kFar * kFar * std::max(variance_, told_ * told_);
     const bool far = square > most;
     square = std::min(square, most);
@@ -70,6 +70,21 @@ class NoiseMeter {
   static constexpr double kSure = 4.0;     // sigmas of a variance, against what is told
   static constexpr double kFew = 5.0;      // values: fewer may be the beginning of a contact
 
+  // How much of a value is new after dt [s]: squares of filtered noise are like each other for
+  // 1 / 2K. The stamps of a steady clock differ by two numbers that take turns, as they are rounded:
+  // both are remembered, since the function is dear.
+  double news_after(double dt) {
+    if (dt == known_.dt) return known_.news;
+    std::swap(known_, other_);
+    if (dt != known_.dt) known_ = {dt, std::tanh(bandwidth_ * dt)};
+    return known_.news;
+  }
+
+  struct News {
+    double dt = 0.0, news = 0.0;  // [s], of a value
+  };
+
+  News known_, other_;
   double bandwidth_, least_, told_, passed_ = 1.0, mean_ = 0.0, variance_ = 0.0, count_ = 0.0;
   bool running_ = false;
 };
