@@ -85,6 +85,7 @@ class Mesh {
           const Vec3 beside = centre - dot(centre, line.direction) * line.direction;
           return norm(beside) - 0.5 * norm(high - low);
         },
+        [](double distance) { return distance; },
         [&](const Triangle& tri, SurfacePoint& best) { nearer_to_line(tri, line, best); });
   }
 
@@ -111,8 +112,9 @@ class Mesh {
         [&](const Box& b) {
           const Vec3 d{outside(p.x, b.low.x, b.high.x), outside(p.y, b.low.y, b.high.y),
                        outside(p.z, b.low.z, b.high.z)};
-          return norm(d);
+          return dot(d, d);
         },
+        [](double distance) { return distance * distance; },
         [&](const Triangle& tri, SurfacePoint& best) {
           if (std::fabs(dot(tri.normal, p - tri.a)) < best.distance)
             offer(tri, nearest_on(tri, p), p, best);
@@ -242,8 +244,10 @@ class Mesh {
     return true;
   }
 
-  template <class Bound, class Offer>
-  SurfacePoint nearest(double limit, Bound&& bound, Offer&& offer_triangle) const {
+  // `bound(box)`: what the `measure` of the distance of anything in a box is not less than.
+  template <class Bound, class Measure, class Offer>
+  SurfacePoint nearest(double limit, Bound&& bound, Measure&& measure,
+                       Offer&& offer_triangle) const {
     SurfacePoint best;
     best.distance = limit;
     if (empty()) return best;
@@ -255,7 +259,7 @@ class Mesh {
     stack[size++] = {bound(boxes_[0]), 0};
     while (size > 0) {
       const Entry entry = stack[--size];
-      if (entry.bound >= best.distance) continue;
+      if (entry.bound >= measure(best.distance)) continue;
       const Box& box = boxes_[entry.box];
       if (box.count > 0) {
         for (int i = box.next; i < box.next + box.count; ++i) offer_triangle(triangles_[i], best);

@@ -197,13 +197,15 @@ class Explanations {
     const double limit = std::min(kFar, kSigmas * widest(G, line.direction));
     for (int s : *view.surfaces) {
       surfaces_.around(s, line, limit, fitter_.steepest(), [&](const SurfacePoint& p) {
+        const double chi2 = view.floor + squared(G, p.point - nearest(p.point));
+        if (!(chi2 < best_ + kSigmas * kSigmas)) return;
         Candidate k;
         k.surface = s;
         k.view = index(view);
         k.point = p.point;
         k.normal = p.normal;
         k.fit.cone = fitter_.cone_cost(-dot(p.normal, line.direction));
-        k.fit.chi2 = view.floor + squared(G, p.point - nearest(p.point));
+        k.fit.chi2 = chi2;
         if (k.fit.cost() < best_ + kSigmas * kSigmas && !entered(k))
           found = insert(starts, kPassed, found, k, kApart);
       });

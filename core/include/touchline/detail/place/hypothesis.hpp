@@ -54,17 +54,28 @@ inline void tangents(const Vec3& n, Vec3& s, Vec3& t) {
 class ForceFitter {
  public:
   explicit ForceFitter(const LocalizerSettings& settings)
-      : settings_(settings), cone_(std::atan(settings.friction)) {}
+      : settings_(settings), cone_(std::atan(settings.friction)) {
+    for (int i = 0; i < kDirections; ++i) {
+      const double angle = kTurn * i / kDirections;
+      directions_[i] = {angle, std::cos(angle), std::sin(angle)};
+    }
+  }
 
   // The force at `point` that explains best, in the friction cone of the outward `normal`, or, if
-  // it may be `grasped`, in any direction. Beyond a chi2 of `limit` nothing is worked out.
+  // it may be `grasped`, in any direction. Beyond a chi2 of `limit` nothing is worked out, nor where
+  // no force at all can cost less than `worth`.
   Fit fit(const Quadratic& q, const Vec3& point, const Vec3& normal, bool grasped,
-          double limit = std::numeric_limits<double>::infinity()) const {
+          double limit = std::numeric_limits<double>::infinity(),
+          double worth = std::numeric_limits<double>::infinity()) const {
     double A[9], g[3];
     reduce(q, point, A, g);
     Fit free;
     free.cone = std::numeric_limits<double>::infinity();
-    if (solve(A, g, free.force)) judge(q, point, normal, grasped, free);
+    if (solve(A, g, free.force)) {
+      judge(q, point, normal, grasped, free);
+      // It has the least of chi2 and the cost of its size together, which the cone only adds to.
+      if (free.chi2 + size_cost(norm(free.force)) >= worth) return free;
+    }
     if (grasped || free.cone < 1.0 || free.chi2 > limit) return free;
     const Fit bound = on_cone(q, point, normal, A, g);
     return bound.cost() < free.cost() ? bound : free;
@@ -95,7 +106,7 @@ class ForceFitter {
     const double size = norm(fit.force);
     fit.cosine = size > 0.0 ? -dot(normal, fit.force) / size : 0.0;
     fit.cone = grasped ? 0.0 : cone_cost(fit.cosine);
-    fit.cone += size * size / (settings_.force_scale * settings_.force_scale);
+    fit.cone += size_cost(size);
   }
 
   // Logarithm of how dense forces are, per volume: their directions, in the friction cone or all
@@ -217,6 +228,13 @@ class ForceFitter {
  private:
   static constexpr double kSlant = 0.3, kSlantSigma = 0.2;  // of pushes from the normal [rad]
 
+  static constexpr int kDirections = 8;
+  static constexpr double kTurn = 6.283185307179586;
+
+  double size_cost(double size) const {
+    return size * size / (settings_.force_scale * settings_.force_scale);
+  }
+
   static Vec3 unit(int i) { return {i == 0 ? 1.0 : 0.0, i == 1 ? 1.0 : 0.0, i == 2 ? 1.0 : 0.0}; }
 
   // chi2(f) = constant - 2 g . f + f^T A f for a force at `point`, plus the force's prior.
@@ -257,8 +275,8 @@ class ForceFitter {
     tangents(normal, s, t);
     double best = 0.0, at = 0.0;
     Vec3 force;
-    const auto offer = [&](double angle) {
-      const Vec3 u = settings_.friction * (std::cos(angle) * s + std::sin(angle) * t) - normal;
+    const auto offer = [&](double angle, double cosine, double sine) {
+      const Vec3 u = settings_.friction * (cosine * s + sine * t) - normal;
       const double x[3] = {u.x, u.y, u.z};
       double along = 0.0, curve = 0.0;
       for (int i = 0; i < 3; ++i) {
@@ -270,13 +288,11 @@ class ForceFitter {
       at = angle;
       force = (along / curve) * u;
     };
-    constexpr int kDirections = 8;
-    constexpr double kTurn = 6.283185307179586;
-    for (int i = 0; i < kDirections; ++i) offer(kTurn * i / kDirections);
+    for (const Direction& d : directions_) offer(d.angle, d.cosine, d.sine);
     for (double step = 0.5 * kTurn / kDirections; step > 0.05; step *= 0.5) {
       const double middle = at;
-      offer(middle - step);
-      offer(middle + step);
+      offer(middle - step, std::cos(middle - step), std::sin(middle - step));
+      offer(middle + step, std::cos(middle + step), std::sin(middle + step));
     }
     Fit fit;
     fit.force = force;
@@ -285,8 +301,13 @@ class ForceFitter {
     return fit;
   }
 
+  struct Direction {
+    double angle, cosine, sine;  // [rad]
+  };
+
   const LocalizerSettings& settings_;
   double cone_;
+  Direction directions_[kDirections];  // around the edge of the cone, tried first
 };
 
 }  // namespace touchline

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "touchline/detail/model/dense.hpp"
 #include "touchline/detail/place/hypothesis.hpp"
@@ -73,8 +74,11 @@ class Refinement {
     const SurfacePoint p = surfaces_.nearest(k.surface, target, limit);
     if (p.face < 0) return false;
     const bool grasped = surfaces_[k.surface].graspable;
-    const Fit fit = fitter_.fit(view.q, view.earlier(p.point), p.normal, grasped);
-    if (!(fit.cost() < k.fit.cost() - 1e-6)) return false;
+    const double cost = k.fit.cost();
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    const Fit fit =
+        fitter_.fit(view.q, view.earlier(p.point), p.normal, grasped, kInfinity, cost);
+    if (!(fit.cost() < cost - 1e-6)) return false;
     k.point = p.point;
     k.normal = p.normal;
     k.fit = fit;
