@@ -12,12 +12,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from free_motion import free_motion, pushed
 
 import touchline as tl
 from touchline.cli import main
 from touchline.errors import InputError
+from touchline.fleet.forecast import forecast, forecast_text
 from touchline.fleet.manifest import MANIFEST, Manifest
 from touchline.fleet.plan import is_single, make_plan
 from touchline.fleet.pool import Pool
@@ -128,14 +131,46 @@ def test_results_do_not_depend_on_the_processes(made, results, tmp_path):
 def test_the_plan_does_nothing(made, tmp_path, capsys):
     assert run(made, "--robot", "sara", "--out", tmp_path / "r", "--dry-run") == 0
     out = capsys.readouterr().out
-    assert "6 of 6 recordings" in out and "a/whole" in out and not (tmp_path / "r").exists()
+    assert "3 of 6 recordings, 0.00 hours and 2 of unknown length" in out
+    assert "a/whole  with sara" in out and not (tmp_path / "r").exists()
+    for name in ("empty", "foreign", "other"):  # what cannot be read at all is told beforehand
+        (line,) = (line for line in out.splitlines() if f"  {name}  (" in line)
+        assert line.startswith("skip")
     assert run(made, "--out", tmp_path / "r", "--dry-run") == 0
     assert "no robot: give --robot" in capsys.readouterr().out
+
+
+def test_the_plan_tells_hours_and_time(robot, results, tmp_path):
+    samples = free_motion(robot, seconds=36.0, rate=200.0)
+    for name in ("log.csv", "log.parquet"):
+        write_table(tmp_path / name, samples, robot.description)
+    plan = make_plan([str(tmp_path / n) for n in ("log.csv", "log.parquet")], "sara")
+    told = forecast(plan, tmp_path, "none", 2)
+    assert [round(t / 36.0, 2) for t in told.durations.values()] == [1.0, 1.0]
+    assert told.measured == 0 and told.seconds == pytest.approx(36.0 * told.cost, rel=0.02)
+    measured = forecast(plan, results, "none", 1)  # by what recordings there took
+    done = [row for row in rows(results).values() if row["duration"]]
+    cost = sum(r["cpu_seconds"] for r in done) / sum(r["duration"] for r in done)
+    assert measured.measured == 3 and measured.seconds == pytest.approx(72.0 * cost, rel=0.02)
+    lines = forecast_text(told).splitlines()
+    assert lines[-2].startswith("2 of 2 recordings, 0.02 hours, ") and "2 processes" in lines[-1]
 
 
 def test_lists_patterns_and_robots_beside_the_recordings(made, tmp_path):
     plan = {r.name: r for r in make_plan([str(made / "list.csv")], None)}
     assert plan["a/whole"].robot == "sara" and plan["missing"].problem == "no such file"
+    names = {"log": ["a/whole.parquet", "missing.csv"], "robot": ["sara", None]}
+    pq.write_table(pa.table(names), made / "list.parquet")
+    try:
+        listed = {r.name: r for r in make_plan([str(made / "list.parquet")], None)}
+        assert listed["a/whole"] == plan["a/whole"] and listed["missing"].robot == ""
+        assert not is_single([str(made / "list.parquet")])
+        assert len(make_plan([str(made)], "sara")) == 6
+        pq.write_table(pa.table({"log": ["", "b.csv.gz"]}), made / "list.parquet")
+        with pytest.raises(InputError, match="row 1: names no log"):
+            make_plan([str(made / "list.parquet")], "sara")
+    finally:
+        (made / "list.parquet").unlink()
     assert [r.name for r in make_plan([str(made / "*.gz")], "sara")] == ["b", "cut"]
     assert len(make_plan([str(made), str(made / "b.csv.gz")], "sara")) == 6
     with pytest.raises(InputError, match="no such file matches"):

@@ -43,13 +43,13 @@ def analyze(
     files.
 
     Several recordings are analyzed by all cores, each into a folder of its own below DIR. Name
-    them, or a folder, a pattern ("runs/*.mcap"), a URL (s3://, http://), or a CSV list with the
-    columns log and robot. The page fleet.html there tells what they have in common, and so do
-    tables as Parquet. The file manifest.jsonl tells what became of each and why: ok, partial
+    them, or a folder, a pattern ("runs/*.mcap"), a URL (s3://, http://), or a list (CSV, Parquet)
+    with the columns log and robot. The page fleet.html there tells what they have in common, and so
+    do tables as Parquet. The file manifest.jsonl tells what became of each and why: ok, partial
     (something in it could not be read), failed or skipped. It has hashes of input, configuration
-    and results. The same command goes on where it was
-    stopped, and leaves alone what is unchanged. Without --robot the robot.yaml in the recording's
-    folder, or the nearest above it, is taken. Exit status then: 0 all ok, 3 some are not, 1 none.
+    and results. The same command goes on where it was stopped, and leaves alone what is unchanged.
+    Without --robot the robot.yaml in the recording's folder, or the nearest above it, is taken.
+    Exit status then: 0 all ok, 3 some are not, 1 none.
 
     Args:
         logs: The recordings, or URLs of them: tables (.parquet, .csv, .csv.gz) or rosbag2 (.mcap,
@@ -65,20 +65,20 @@ def analyze(
         reach: Free space that a push needs: length of a finger or tool [m]. Default: as described.
         rerun: Also a file for Rerun (.rrd): arm, contacts, curves, events. Of one recording.
         foxglove: The same for Foxglove (.mcap).
-        dry_run: Print what would be done.
+        dry_run: Print what would be done: files, hours, bytes, about how long, what is skipped.
         workers: Processes for several recordings. Default: one per core.
         time_limit: For each of several recordings [s].
         memory_limit: For each process of several recordings [MB].
         cluster: Of a dask scheduler, such as tcp://host:8786, for several recordings; its workers
             see the same folders.
     """
+    from touchline.fleet.forecast import forecast, forecast_text
     from touchline.fleet.plan import is_single, make_plan
-    from touchline.fleet.run import plan_text
 
     if not logs:
         raise InputError("LOG: name at least one recording, folder, pattern or list")
     if dry_run:
-        print(plan_text(make_plan(logs, robot)))
+        print(forecast_text(forecast(make_plan(logs, robot), out, report, workers)))
         return 0
     options = {"bandwidth": bandwidth, "method": method, "report": report}
     options |= {"friction": friction, "reach": reach}

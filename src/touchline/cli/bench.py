@@ -290,6 +290,32 @@ def logs(*, samples: int = 100_000, minutes: float = 6.0) -> int:
     return main(samples, minutes)
 
 
+def fleet(
+    *, recordings: int = 10_000, kills: int = 20, stops: int = 2, workers: int = 2, seed: int = 0
+) -> int:
+    """Many recordings of which 2 % are damaged in eight ways, while processes are killed (Linux).
+
+    Example: touchline bench fleet --recordings 500
+
+    Analyzes all in one process, and again with several of which some are killed. Each recording
+    must be accounted for once, with the same hashes. Exit status 1 where that is not so.
+
+    Args:
+        recordings: Number of them, of 0.4 s at 1 kHz.
+        kills: Of workers, at random.
+        stops: Kills of the process that gives them work; the same command then goes on.
+        workers: Number of processes.
+        seed: Of all that is random.
+    """
+    from touchline.bench.fleet.run import main
+    from touchline.numbers import check_least
+
+    check_least(50, recordings=recordings)
+    check_least(0, kills=kills, stops=stops)
+    check_least(1, workers=workers)
+    return main(recordings, kills, stops, workers, seed)
+
+
 def interface(
     *,
     runs: int = 100,
@@ -362,6 +388,7 @@ def reliability(
 BENCHMARKS: dict[str, Callable[..., int]] = {
     "observer": observer,
     "logs": logs,
+    "fleet": fleet,
     "deadline": deadline,
     "localization": localization,
     "classification": classification,

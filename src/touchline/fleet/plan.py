@@ -6,6 +6,7 @@ import glob
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from touchline.errors import InputError
 from touchline.fleet.manifest import MANIFEST
@@ -58,9 +59,9 @@ def make_plan(logs: Sequence[str], robot: str | None) -> list[Recording]:
     """All recordings that were named, in a fixed order, each once.
 
     Args:
-        logs: files, folders, patterns such as `runs/*.mcap`, CSV lists with the columns `log`
-            and `robot` (paths in a list count from where it is), or URLs of files, folders and
-            patterns.
+        logs: files, folders, patterns such as `runs/*.mcap`, CSV or Parquet lists with the columns
+            `log` and `robot` (paths in a list count from where it is), or URLs of files, folders
+            and patterns.
         robot: of all; default: what a list says, else the `robot.yaml` in the recording's folder
             or the nearest above it.
 
@@ -145,8 +146,12 @@ def _is_bag_folder(path: Path) -> bool:
 
 
 def _is_list(path: Path) -> bool:
-    """Whether a CSV file is a list of recordings and not one itself."""
-    if path.suffix.lower() != ".csv" or not path.is_file():
+    """Whether a table is a list of recordings and not one itself."""
+    if not path.is_file():
+        return False
+    if path.suffix.lower() == ".parquet":
+        return LOG_COLUMN in _parquet_columns(path)
+    if path.suffix.lower() != ".csv":
         return False
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
@@ -156,16 +161,45 @@ def _is_list(path: Path) -> bool:
     return LOG_COLUMN in [name.strip() for name in head]
 
 
+def _parquet_columns(path: Path) -> list[str]:
+    """Columns of a Parquet file; none of one that cannot be read."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        return pq.read_schema(path).names
+    except (pa.ArrowException, OSError):
+        return []
+
+
 def _listed(path: Path) -> Iterator[tuple[str, str]]:
+    for place, row in _list_rows(path):
+        log = str(row.get(LOG_COLUMN) or "").strip()
+        if not log:
+            raise InputError(f"{path}: {place}: names no {LOG_COLUMN}")
+        robot = str(row.get(ROBOT_COLUMN) or "").strip()
+        beside = path.parent / robot
+        source = log if is_url(log) else str(path.parent / log)
+        yield source, str(beside) if robot and beside.is_file() else robot
+
+
+def _list_rows(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Rows of a list, and where each stands."""
+    if path.suffix.lower() == ".parquet":
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        columns = [c for c in (LOG_COLUMN, ROBOT_COLUMN) if c in _parquet_columns(path)]
+        try:
+            rows = pq.read_table(path, columns=columns).to_pylist()
+        except (pa.ArrowException, OSError) as error:
+            raise InputError(f"{path}: damaged: {error}") from error
+        for number, row in enumerate(rows, 1):
+            yield f"row {number}", row
+        return
     with path.open(encoding="utf-8-sig", newline="") as file:
         for number, row in enumerate(csv.DictReader(file, skipinitialspace=True), 2):
-            log = (row.get(LOG_COLUMN) or "").strip()
-            if not log:
-                raise InputError(f"{path}: line {number}: names no {LOG_COLUMN}")
-            robot = (row.get(ROBOT_COLUMN) or "").strip()
-            beside = path.parent / robot
-            place = log if is_url(log) else str(path.parent / log)
-            yield place, str(beside) if robot and beside.is_file() else robot
+            yield f"line {number}", row
 
 
 def _nearest_robot(log: Path) -> str:

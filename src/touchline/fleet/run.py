@@ -201,19 +201,6 @@ def _bar(jobs: list[Job]) -> Any:
     return tqdm(total=total, desc="recordings", bar_format=form, disable=None, leave=False)
 
 
-def plan_text(plan: Sequence[Recording]) -> str:
-    """What a run would do."""
-    lines = [
-        f"{'skip' if r.problem else 'analyze':8}{r.size / 1e6:9.1f} MB  {r.name}"
-        + (f"  ({r.problem})" if r.problem else f"  with {r.robot}")
-        for r in plan
-    ]
-    todo = [r for r in plan if not r.problem]
-    size = sum(r.size for r in todo) / 1e6
-    lines.append(f"{len(todo)} of {len(plan)} recordings, {size:.1f} MB; nothing was done")
-    return "\n".join(lines)
-
-
 def outcome_text(outcome: Outcome, out: Path) -> str:
     """What became of the recordings: each that is not ok, and a line of sums."""
     lines = [

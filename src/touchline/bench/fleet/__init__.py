@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Many recordings of which some are damaged, while processes are killed."""
