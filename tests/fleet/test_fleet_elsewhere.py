@@ -122,7 +122,7 @@ def test_limits_of_a_cluster_are_its_own(made, tmp_path, capsys):
         assert "not with --cluster" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [1, 2, 4])
 def test_a_cluster_gives_the_same_results(made, tmp_path, local, workers):
     distributed = pytest.importorskip(
         "distributed", reason="distributed is not installed: touchline[fleet]"

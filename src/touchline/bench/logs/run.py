@@ -118,6 +118,14 @@ def _readers(folder: Path, robot: Robot, samples: Any) -> str:
     rate = _least(lambda: _read(table, robot) and cells)
     text.append(("touchline, to samples", "CSV", f"{1e-6 * rate:.0f}"))
     text.append(("pyarrow, to a table", "CSV", f"{1e-6 * _least(lambda: _arrow_csv(table)):.0f}"))
+    packed = folder / "log.parquet"
+    write_table(packed, samples, robot.description)
+    with open_log(packed, robot.description) as log:
+        numbers = 8 * len(samples) * len(log.columns)
+    rate = _least(lambda: _read(packed, robot) and numbers)
+    text.append(("touchline, to samples", "Parquet", f"{1e-6 * rate:.0f}"))
+    rate = _least(lambda: _arrow_parquet(packed) and numbers)
+    text.append(("pyarrow, to a table", "Parquet", f"{1e-6 * rate:.0f}"))
     return f"{aligned(rows, (0, 1))}\n\n{aligned(text, (0, 1))}"
 
 
@@ -132,6 +140,12 @@ def _arrow_csv(path: Path) -> int:
     options = pyarrow.csv.ReadOptions(use_threads=False)
     pyarrow.csv.read_csv(path, read_options=options)
     return path.stat().st_size
+
+
+def _arrow_parquet(path: Path) -> int:
+    import pyarrow.parquet
+
+    return pyarrow.parquet.read_table(path, use_threads=False).num_rows
 
 
 def _peers(files: dict[str, Path], count: int) -> list[Row]:
