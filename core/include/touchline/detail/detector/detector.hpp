@@ -124,6 +124,7 @@ class Detector {
     s.trend = baseline;
     spreads_[row] = other.spreads_[of];
     meters_[row] = other.meters_[of];
+    trend_meters_[row] = other.trend_meters_[of];
     Segment& segment = segments_[rows_[row].segment];
     segment.age = std::max(segment.age, s.age);
     segment.off = other.segments_[other.rows_[of].segment].off;
