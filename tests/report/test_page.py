@@ -48,6 +48,8 @@ def test_every_tag_is_closed_and_names_are_escaped(page):
 def test_nothing_is_fetched(page):
     body = re.sub(r'id="data">.*?</script>', "", page, flags=re.S)
     body = re.sub(r' href="(data:image/webp;base64,[A-Za-z0-9+/=]*|#event-[0-9]+)"', "", body)
+    for saved in ("link.href = URL.createObjectURL(blob)", 'image.src = "data:image/svg+xml;'):
+        body = body.replace(saved, "")  # what the page itself holds, as a file
     assert "default-src 'none'" in body
     assert not re.search(r"""(src|href)\s*=|@import|url\((?!#)|fetch\(|XMLHttp""", body)
     addresses = set(re.findall(r"https?://[^\"' )]+", body))

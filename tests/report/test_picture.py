@@ -43,8 +43,8 @@ def is_orange(colour):
     return colour[0] > 170 and colour[0] - colour[2] > 90
 
 
-def is_blue(colour):
-    return colour[2] > 120 and colour[2] - colour[0] > 60
+def is_violet(colour):
+    return colour[2] > 120 and colour[2] - colour[1] > 50 and colour[0] - colour[1] > 15
 
 
 def test_camera_projects_by_similar_triangles():
@@ -114,13 +114,13 @@ def test_contacts_have_their_colours_where_the_camera_says(robot):
     scene.add_contact(high, (0, 0, -20), "estimate")
     scene.add_contact(high + [0.25, 0, 0], (0, 0, -20), "truth")
     image = scene.render(camera, SIZE)
-    for mark, has_its_colour in zip(scene.marks, (is_orange, is_blue), strict=True):
+    for mark, has_its_colour in zip(scene.marks, (is_orange, is_violet), strict=True):
         tail, tip = scene.arrow(mark)
         (shaft, point), _ = camera.project(np.array([(tail + tip) / 2, tip]), SIZE)
         assert has_its_colour(at(image, point)) and has_its_colour(at(image, shaft))
     clean = Scene(robot, Q).render(camera, SIZE)
     pixels, _ = camera.project(np.array([scene.arrow(m)[1] for m in scene.marks]), SIZE)
-    assert not any(is_orange(at(clean, p)) or is_blue(at(clean, p)) for p in pixels)
+    assert not any(is_orange(at(clean, p)) or is_violet(at(clean, p)) for p in pixels)
 
 
 def test_the_arrow_ends_at_the_contact_and_is_longer_for_more_force(robot):
