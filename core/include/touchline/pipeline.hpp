@@ -140,7 +140,8 @@ class Pipeline {
     const Estimate estimate(row, observer_.row_layout());
     const Span<double> normalized{detector_.normalized().data(), detector_.normalized().size()};
     if (touched_) {
-      localizer_.set_state(sample.q, sample.qd, detector_.drift().data(), detector_.quiet().data());
+      localizer_.set_state(sample.q, sample.qd, detector_.drift().data(), detector_.quiet().data(),
+                           detector_.excess().data());
     }
     for (std::size_t segment = 0; segment < levels_.size(); ++segment) {
       const int g = static_cast<int>(segment);

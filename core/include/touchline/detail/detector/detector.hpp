@@ -42,6 +42,7 @@ class Detector {
         normalized_(rows_.size(), 0.0),
         limits_(rows_.size(), 1.0),
         drift_(rows_.size(), 0.0),
+        excess_(rows_.size(), 1.0),
         levels_(segments_.size(), 0),
         quiet_(segments_.size(), 0.0),
         statistics_(segments_.size() * settings_.tests.size(), 0.0) {
@@ -95,6 +96,8 @@ class Detector {
   const std::vector<double>& limits() const { return limits_; }
   // Per row: one sigma of what the model's errors may have added since the baseline [N or Nm].
   const std::vector<double>& drift() const { return drift_; }
+  // Per row: how many times as large as told its noise is seen to be, at least 1.
+  const std::vector<double>& excess() const { return excess_; }
   const std::vector<int>& levels() const { return levels_; }  // per segment
   // Per segment: over how long its baseline has been averaged [s].
   const std::vector<double>& quiet() const { return quiet_; }
@@ -212,6 +215,7 @@ class Detector {
       const double readings = kept * told_.reading()[at], velocities = K * K * told_.momentum()[at];
       meters_[i].tell(readings, velocities);
       trend_meters_[i].tell((readings + kept * velocities) / (1.0 + kTrend), 0.0);
+      excess_[i] = meters_[i].excess();
     }
   }
 
@@ -556,7 +560,7 @@ class Detector {
   std::vector<std::size_t> first_;  // per segment: its first row; they stand together
   std::vector<SegmentTests> tests_;
   std::vector<NoiseMeter> meters_, trend_meters_;  // per row: of the residual, of its trend
-  std::vector<double> normalized_, limits_, drift_;
+  std::vector<double> normalized_, limits_, drift_, excess_;
   std::vector<int> levels_;
   std::vector<double> quiet_, statistics_;
   double time_ = 0.0, since_ = 0.0;

@@ -53,6 +53,9 @@ class NoiseMeter {
     return count_ > kFew && variance_ > told_ * told_ * (1.0 + kSure * std::sqrt(2.0 / count_));
   }
 
+  // How many times as large as told it is; 1 where that is not certain.
+  double excess() const { return contradicts() ? sigma() / told_ : 1.0; }
+
   // What noise exceeds as rarely as a normal variable exceeds `sigmas` of its true sigma. Where
   // seen noise speaks against the told one that is the quantile of Student's t for so many
   // independent values (Wallace 1959): few values tell little.

@@ -72,10 +72,11 @@ class Localizer {
   }
 
   // The configuration of the sample; what the model's errors may have added to each row of the
-  // detector since its baseline; for how long the baseline of each segment has been averaged. All
-  // but `q` may be null.
-  void set_state(const double* q, const double* qd, const double* drift, const double* quiet) {
-    measurement_.set_state(q, qd, drift, quiet);
+  // detector since its baseline; for how long the baseline of each segment has been averaged; and how
+  // many times as large as told the noise of each row is. All but `q` may be null.
+  void set_state(const double* q, const double* qd, const double* drift, const double* quiet,
+                 const double* excess = nullptr) {
+    measurement_.set_state(q, qd, drift, quiet, excess);
     said_ = 0;
     shared_ = false;
   }

@@ -42,9 +42,11 @@ class Measurement {
   }
 
   // The configuration of the sample; `qd` may be null. What the model's errors may have added to each
-  // row of the detector since its baseline, and for how long the baseline of each segment has been
-  // averaged [s]; or null.
-  void set_state(const double* q, const double* qd, const double* drift, const double* quiet) {
+  // row of the detector since its baseline, for how long the baseline of each segment has been
+  // averaged [s], and how many times as large as told the noise of each row is; or null.
+  void set_state(const double* q, const double* qd, const double* drift, const double* quiet,
+                 const double* excess) {
+    excess_ = excess;
     posture_.set(q, qd);
     drift_ = drift;
     quiet_ = quiet;
@@ -326,8 +328,31 @@ class Measurement {
       }
     }
     noise_.covariance(size_, has_wrench_ ? 3 : 0, covariance_.data());
+    if (excess_ != nullptr) exceed();
     add_gaps();
     return lasts_ || factor();
+  }
+
+  // Noise as seen, where it is larger than told. A wrench keeps the shape of its covariance.
+  void exceed() {
+    double wrench = 1.0;
+    std::fill_n(factor_.data(), size_, 1.0);
+    const int first = has_wrench_ ? 6 : 0;
+    for (std::size_t t = 0; t < tests(); ++t) {
+      const DetectionRow& test = offsets_.tests()[t];
+      if (test.segment != segment_) continue;
+      if (test.component >= 0) wrench = std::max(wrench, excess_[t]);
+      for (int i = 0; i < count_ && test.component < 0; ++i) {
+        if (used_[i]->joint == test.joint) factor_[first + i] = excess_[t];
+      }
+    }
+    std::fill_n(factor_.data(), first, wrench);
+    for (int i = 0; i < count_; ++i) {
+      if (used_[i]->joint < 0) factor_[first + i] = wrench;
+    }
+    for (int i = 0; i < size_; ++i) {
+      for (int j = 0; j <= i; ++j) covariance_[i * size_ + j] *= factor_[i] * factor_[j];
+    }
   }
 
   // And by what lost samples may have left: of the segment's force and its moment about its sensor,
@@ -377,7 +402,7 @@ class Measurement {
   RowNoise noise_;
 
   int segment_ = 0, count_ = 0, size_ = 0;
-  const double *row_ = nullptr, *drift_ = nullptr, *quiet_ = nullptr;
+  const double *row_ = nullptr, *drift_ = nullptr, *quiet_ = nullptr, *excess_ = nullptr;
   bool has_wrench_ = false, lasts_ = false;
   double wrench_[6] = {}, raw_wrench_[6] = {};
   std::vector<const SegmentRow*> used_;
