@@ -253,6 +253,19 @@ inline nb::tuple rest(Pipeline& p) {
   return nb::make_tuple(meter.seconds(), meter.torque(), meter.wrench());
 }
 
+// Per row of the detector: what stood there at the start and stands there now, seen noise, its ratio.
+inline nb::object standing(Pipeline& p) {
+  std::vector<double> numbers;
+  {
+    const guard::Turn turn(p.turn);
+    for (std::size_t i = 0; i < p.value->rows(); ++i) {
+      const tl::Standing s = p.value->standing(static_cast<int>(i));
+      numbers.insert(numbers.end(), {s.start, s.now, s.seen, s.ratio});
+    }
+  }
+  return arrays::table(numbers, 4);
+}
+
 inline nb::dict slices(const Pipeline& p) {
   const Snapshot at(*p.value);
   nb::dict d;
@@ -361,6 +374,7 @@ inline void bind(nb::module_& m) {
            "lost"_a)
       .def_prop_ro("lost", [](const Pipeline& p) { return p.value->lost(); })
       .def("rest", &rest)
+      .def("standing", &standing, nb::sig("def standing(self) -> numpy.typing.NDArray[numpy.float64]"))
       .def_prop_ro("time", [](const Pipeline& p) { return p.value->time(); })
       .def("region",
            [](Pipeline& p) {

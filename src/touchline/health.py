@@ -18,3 +18,5 @@ class Health(IntFlag):
     PERIOD = 256  # stamps are not as far apart as the pipeline was told: thresholds do not fit
     NO_ROOM = 512  # more events at a time than there is room for: the oldest was ended
     FAULTY = 1024  # a channel is not believed: `Result.faults` names it
+    OFFSET = 2048  # what stands there without a touch exceeds a threshold: `Pipeline.standing`
+    NOISY = 4096  # a residual's noise is over 1.5 times what was told: `Pipeline.standing`

@@ -88,6 +88,8 @@ class Pipeline {
   // been averaged [s]; and takes what another pipeline of this arm has learned of its row `of`.
   double baseline(int row) const { return detector_.baseline(row); }
   double known_for(int row) const { return detector_.known_for(row); }
+  // How far a row of the detector has shown that the arm is not as told.
+  Standing standing(int row) const { return detector_.standing(row); }
   void go_on_from(const Pipeline& other, int of, int row, double baseline) {
     detector_.go_on_from(other.detector_, of, row, baseline);
   }
@@ -198,7 +200,8 @@ class Pipeline {
     const RowLayout& layout = observer_.row_layout();
     const Health health = static_cast<Health>(row[layout.health()]) |
                           (period_.differs() ? kPeriodDiffers : 0) |
-                          (recorder_.crowded() ? kNoRoom : 0);
+                          (recorder_.crowded() ? kNoRoom : 0) |
+                          (detector_.stands_off() ? kOffset : 0) | (detector_.noisy() ? kNoisy : 0);
     return {sample.time,
             health,
             Estimate(row, layout),

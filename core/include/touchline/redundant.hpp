@@ -152,6 +152,7 @@ class RedundantPipeline {
   const Tuning& tuning() const { return whole_.tuning(); }
   const std::vector<LinkSurface>& surfaces() const { return whole_.surfaces(); }
   std::size_t rows() const { return whole_.rows(); }
+  Standing standing(int row) const { return whole_.standing(row); }
 
  private:
   static constexpr std::size_t kAhead = 64;  // samples that are judged before they are taken

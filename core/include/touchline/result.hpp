@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <limits>
 
+#include "touchline/detail/detector/standing.hpp"
 #include "touchline/detail/gates/fault.hpp"
 #include "touchline/detail/observer/health.hpp"
 #include "touchline/detail/observer/row.hpp"
@@ -20,6 +21,8 @@ namespace touchline {
 constexpr Health kPeriodDiffers = 256;  // stamps are not as far apart as the noise figures are for
 constexpr Health kNoRoom = 512;         // more events at a time than there is room for: one was ended
 constexpr Health kFaulty = 1024;        // a channel is not believed: `Result::faults`
+constexpr Health kOffset = 2048;        // what stands there and is no touch exceeds a threshold
+constexpr Health kNoisy = 4096;         // a residual's noise is clearly larger than told
 
 // A view of numbers that belong to someone else.
 template <class T>

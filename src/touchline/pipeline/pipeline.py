@@ -19,7 +19,7 @@ from touchline.localizer.localizer import (
 from touchline.localizer.region import Region
 from touchline.localizer.skin import Skin
 from touchline.model.corrections import with_loads, with_offsets
-from touchline.model.description import Load
+from touchline.model.description import AXES, Load
 from touchline.model.robot import Robot, load_robot
 from touchline.native import core
 from touchline.observer.observer import Estimate, Observer, require_seconds
@@ -30,6 +30,7 @@ from touchline.pipeline.table import ContactTable
 from touchline.result.event import Event
 from touchline.result.fault import FaultChange, changes_of, channel_names
 from touchline.result.native import Names
+from touchline.result.standing import Standing
 from touchline.suggest import unknown
 
 Array = NDArray[np.float64]
@@ -301,6 +302,29 @@ class Pipeline:
     def lost(self) -> list[str]:
         """Sensors that are done without: they have been absent for longer than 5 / bandwidth."""
         return [self.robot.sensor_names[s] for s in self._core.lost]
+
+    @property
+    def standing(self) -> tuple[Standing, ...]:
+        """What stands on each signal of the detector without a touch, and its noise so far.
+
+        Where any of it exceeds a threshold, `health` has `Health.OFFSET`; where noise is over 1.5
+        times what was told, `Health.NOISY`.
+        """
+        robot = self.robot
+        return tuple(
+            Standing(
+                segment := robot.segment_names[row.segment],
+                robot.joint_names[row.joint]
+                if row.joint >= 0
+                else f"{segment}.{AXES[row.component]}",
+                "N" if 0 <= row.component < 3 else "Nm",
+                row.contact,
+                *numbers,
+            )
+            for row, numbers in zip(
+                self.thresholds.rows, self._core.standing().tolist(), strict=True
+            )
+        )
 
     def beside(self, slots: int) -> core.Runner:
         """A native thread that takes samples for this pipeline; it gives what `result` reads.

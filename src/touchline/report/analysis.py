@@ -40,6 +40,7 @@ from touchline.report.outputs import (
 from touchline.report.statistics import Statistics
 from touchline.result.event import Event
 from touchline.result.kinds import Watch
+from touchline.result.standing import Standing, standing_lines, unlike_told
 
 Report = Literal["full", "summary", "none"]
 
@@ -66,6 +67,7 @@ class Analysis:
         poses: how the robot stood at each of them.
         windows: the curves around them.
         comparisons: of the events with the truth of a simulated log.
+        standing: what stood on the arm without a touch, and its noise.
         faint: touches, true or felt, that lie below what can be felt on their link, a line each.
         report: which page there is: "full", "summary" or "none".
         warnings: what the user should know.
@@ -85,6 +87,7 @@ class Analysis:
     poses: EventPoses
     windows: EventWindows
     comparisons: list[Comparison]
+    standing: tuple[Standing, ...]
     faint: list[str]
     report: Report
     warnings: list[str]
@@ -149,10 +152,12 @@ def analyze(
             warnings = bandwidth_warnings(bandwidths(model, bandwidth), run.period)
             warnings += [*recording.warnings, *model.warnings, *run.pipeline.skin.lost]
             warnings += watch_warnings(model, run.statistics)
+            warnings += standing_lines(run.pipeline.standing)
             warnings += [f"check: {line}" for line in found]
             analysis = run.finish(log, out, method, bandwidth, report, warnings, recording.losses)
             where = origin or str(log.resolve())
             facts = _origin(analysis) | {"findings": found}
+            facts |= {"standing": [s.to_dict() for s in unlike_told(analysis.standing)]}
             write_origin(folder.draft / ANALYSIS, where, source, facts)
             if report != "none":
                 from touchline.report.page import page_text
@@ -271,6 +276,7 @@ class _Run:
             poses=self._poses,
             windows=self._windows,
             comparisons=comparisons,
+            standing=self.pipeline.standing,
             faint=faint_lines(events, comparisons, able),
             report=report,
             warnings=warnings,

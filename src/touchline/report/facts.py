@@ -23,7 +23,11 @@ HEALTH_MEANING = {
     Health.SATURATED: "a reading is at the end of its range",
     Health.SENSOR_EXCLUDED: "a sensor has been absent for longer than a gap",
     Health.MODEL_LIMIT: "a joint is outside its limits in the model",
+    Health.PERIOD: "stamps are not as far apart as expected; thresholds do not fit",
+    Health.NO_ROOM: "more events at a time than there is room for; the oldest was ended",
     Health.FAULTY: "a channel reports what cannot be; it is held or left out",
+    Health.OFFSET: "what stands there without a touch exceeds a threshold",
+    Health.NOISY: "a residual is noisier than the description tells",
 }
 
 

@@ -20,7 +20,8 @@ Array = NDArray[np.float64]
 
 SURE = 0.9  # probability of a body: a confident link
 SAME = 0.02  # s by which the times of an event may differ
-SILENT = Health.SETTLING | Health.PERIOD | Health.NO_ROOM  # tell of no fault by themselves
+# Bits that tell of no fault by themselves.
+SILENT = Health.SETTLING | Health.PERIOD | Health.NO_ROOM | Health.OFFSET | Health.NOISY
 TELLS = np.uint32(sum(bit for bit in Health if bit not in SILENT))
 
 

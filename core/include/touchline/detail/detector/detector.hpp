@@ -14,10 +14,12 @@
 #include "touchline/detail/detector/baseline_posture.hpp"
 #include "touchline/detail/detector/borne_out.hpp"
 #include "touchline/detail/detector/detection_row.hpp"
+#include "touchline/detail/detector/first_look.hpp"
 #include "touchline/detail/detector/motion_spread.hpp"
 #include "touchline/detail/detector/noise_meter.hpp"
 #include "touchline/detail/detector/row_covariance.hpp"
 #include "touchline/detail/detector/segment_tests.hpp"
+#include "touchline/detail/detector/standing.hpp"
 #include "touchline/detail/model/posture.hpp"
 #include "touchline/detail/observer/observer.hpp"
 
@@ -43,6 +45,8 @@ class Detector {
         limits_(rows_.size(), 1.0),
         drift_(rows_.size(), 0.0),
         excess_(rows_.size(), 1.0),
+        standing_(rows_.size()),
+        first_looks_(rows_.size()),
         levels_(segments_.size(), 0),
         quiet_(segments_.size(), 0.0),
         statistics_(segments_.size() * settings_.tests.size(), 0.0) {
@@ -85,7 +89,11 @@ class Detector {
       judge(g, dt);
       decide(g, dt);
     }
-    for (std::size_t i = 0; i < rows_.size(); ++i) follow_offset(i, dt);
+    offset_ = false;
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      follow_offset(i, dt);
+      offset_ = offset_ || stands_off(i);
+    }
     if (dt > 0.0 && sound_) follow_drift(q, dt);
   }
 
@@ -114,6 +122,15 @@ class Detector {
   double limit(int row) const { return limits_[row] * rows_[row].contact; }
   double noise(int row) const { return meters_[row].sigma(); }
   double offset(int row) const { return states_[row].anchor; }
+  // How far the arm has shown that it is not as told, per row; does anything stand there now that
+  // exceeds a threshold; is the noise of any row clearly larger than told?
+  Standing standing(int row) const {
+    Standing standing = standing_[row];
+    standing.now = stands_off(row) ? states_[row].anchor : 0.0;
+    return standing;
+  }
+  bool stands_off() const { return offset_; }
+  bool noisy() const { return noisy_; }
   double reference(int row) const { return states_[row].reference; }
   // Over how long a row's baseline has been averaged [s].
   double known_for(int row) const { return states_[row].age; }
@@ -127,6 +144,7 @@ class Detector {
     s.trend = baseline;
     spreads_[row] = other.spreads_[of];
     meters_[row] = other.meters_[of];
+    first_looks_[row] = other.first_looks_[of];
     trend_meters_[row] = other.trend_meters_[of];
     Segment& segment = segments_[rows_[row].segment];
     segment.age = std::max(segment.age, s.age);
@@ -161,6 +179,7 @@ class Detector {
     double borne = 0.0, borne_sum = 0.0, borne_collision = 0.0;  // of what no single sample moves
     double above = 0.0, above_collision = 0.0, below = 0.0;  // for how long [s]
     double score = 0.0, borne_score = 0.0;  // of all tests, in thresholds
+    double highest = 0.0;  // of the score while a test holds
     double top = 0.0;    // the largest mean of the last moments since then, in limits
     double rest = 0.0;   // for how long little has been left of it, and that has not changed [s]
     bool pending = false, pending_collision = false;
@@ -187,6 +206,7 @@ class Detector {
   static constexpr double kCreep = 0.25;  // of what was there before: a push adds more in 2 / K
   static constexpr double kHand = 2.0;    // a push on an arm in motion rarely lasts longer [s]
   static constexpr double kAlone = 4.0;  // thresholds: a sample that no noise makes needs no other
+  static constexpr double kUnseen = 10.0;  // thresholds: noise that has yet to be seen is below it
   static constexpr double kMost = 1.5;  // thresholds that a sum can grow to while all is felt
 
   void follow_motion(const double* q, const double* qd, double dt) {
@@ -214,9 +234,15 @@ class Detector {
       const double K = bandwidth(rows_[i]), kept = std::min(1.0, 0.5 * K * settings_.noise.period);
       const double readings = kept * told_.reading()[at], velocities = K * K * told_.momentum()[at];
       meters_[i].tell(readings, velocities);
+      first_looks_[i].tell(readings, velocities, K, settings_.noise.period);
       trend_meters_[i].tell((readings + kept * velocities) / (1.0 + kTrend), 0.0);
       excess_[i] = meters_[i].excess();
+      if (excess_[i] > standing_[i].ratio) {
+        standing_[i].ratio = excess_[i];
+        standing_[i].seen = meters_[i].sigma();
+      }
     }
+    noisy_ = std::any_of(excess_.begin(), excess_.end(), [](double x) { return x > 1.0; });
   }
 
   // The residuals and innovations of a segment's rows.
@@ -305,7 +331,7 @@ class Detector {
     if (row.seen <= 0.0 || still_ < kPause || samples_[i].gap_std > 0.0) return 0.0;
     const double now = samples_[i].residual - s.baseline, mean = s.trend - s.baseline;
     if (now * mean <= 0.0) return 0.0;
-    const double limit = std::max(row.contact, trend_meters_[i].limit(row.seen));
+    const double limit = std::max(row.contact, trend_meters_[i].limit(row.seen, first_looks_[i].ratio()));
     return std::min(std::fabs(now), std::fabs(mean)) / limit;
   }
 
@@ -313,7 +339,7 @@ class Detector {
   double largest_noise(std::size_t i) const {
     const DetectionRow& row = rows_[i];
     double most = row.contact;
-    if (row.seen > 0.0) most = std::max(most, meters_[i].limit(row.seen));
+    if (row.seen > 0.0) most = std::max(most, meters_[i].limit(row.seen, first_looks_[i].ratio()));
     if (learns(i)) most = std::max(most, spreads_[i].limit());
     const double gap = samples_[i].gap_std;
     return gap > 0.0 ? std::hypot(most, kGapSigmas * gap) : most;
@@ -359,6 +385,7 @@ class Detector {
     Segment& s = segments_[g];
     if (levels_[g] == 0 && !s.pending) s.origin = origin(g, dt);
     advance(s.score > 1.0, dt, s.pending, s.above);
+    s.highest = s.pending ? std::max(s.highest, s.score) : 0.0;
     advance(s.collision > 1.0, dt, s.pending_collision, s.above_collision);
     // What motion shows soon exceeds no limit; it need not fall below a part of it.
     const double release = own_doing(g) ? 1.0 : settings_.times.release;
@@ -379,12 +406,25 @@ class Detector {
   // seen? Where a test need not last, its threshold is one of calibration, which has met all that.
   bool lasts(std::size_t g, bool pending, double duration, double score, double borne) const {
     if (!pending || duration < settings_.times.min_duration) return false;
-    if (settings_.times.min_duration <= 0.0 || score > kAlone) return true;
-    return borne > 1.0 && !young(g);
+    if (settings_.times.min_duration <= 0.0) return true;
+    const Segment& s = segments_[g];
+    const bool barely = s.highest < kBarely && s.off && still_ < kPause;
+    if (barely && duration < kTrend / slowest_[g]) return false;  // an error of the model passes
+    if (young(g)) return score > (looked_at(g) ? kAlone : kUnseen);
+    return score > kAlone || borne > 1.0;
   }
 
   // Is too little seen of a segment to know its noise?
-  bool young(std::size_t g) const { return segments_[g].age < kConfirm / slowest_[g]; }
+  bool young(std::size_t g) const {
+    return segments_[g].age < kConfirm / slowest_[g] || !looked_at(g);
+  }
+
+  // Have the first moments shown whether there is more noise in a segment than is told?
+  bool looked_at(std::size_t g) const {
+    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i)
+      if (samples_[i].known && !first_looks_[i].ready()) return false;
+    return true;
+  }
 
   // For how long something has held, but for single samples of noise.
   static double lasting(bool holds, double dt, double duration) {
@@ -473,6 +513,11 @@ class Detector {
     pending = holds;
   }
 
+  // Does more than a threshold stand on a row of an arm that has shown that it is not as told?
+  bool stands_off(std::size_t i) const {
+    return std::min(std::fabs(states_[i].anchor), states_[i].shown) > rows_[i].contact;
+  }
+
   void follow_offset(std::size_t i, double dt) {
     RowState& s = states_[i];
     const DetectionRow& row = rows_[i];
@@ -494,7 +539,11 @@ class Detector {
     meter_noise(i, felt || segments_[row.segment].pending, dt);
     if (felt) return;
     if (stopped && segments_[row.segment].off && row.seen > 0.0) rest(i);
-    if (segments_[row.segment].pending) return;
+    // In the first moments what noise beyond the told one can bring is averaged, too: one sample of
+    // it is no baseline.
+    const Segment& segment = segments_[row.segment];
+    const bool noise = first_looks_[i].ratio() > 1.0 && young(row.segment) && segment.score < kUnseen;
+    if (segment.pending && !noise) return;
     quiet_[row.segment] = s.age += dt;
     const double tau = std::min(s.age, settings_.times.baseline);
     if (tau <= 0.0) return;
@@ -514,6 +563,7 @@ class Detector {
     if (off * s.side < -most) s.turns += 1.0;
     if (std::fabs(off) > most) s.side = off > 0.0 ? 1.0 : -1.0;
     const bool counts = !felt || s.turns > kTurns;
+    first_looks_[i].add(samples_[i].residual);
     meters_[i].add(samples_[i].residual, dt, counts);
     trend_meters_[i].add(s.trend, dt, counts);
   }
@@ -527,7 +577,9 @@ class Detector {
     if (before >= end || s.seconds < end) return;
     const double least = std::min(std::fabs(s.trend), std::fabs(s.anchor));
     const double most = std::max(std::fabs(s.trend), std::fabs(s.anchor));
-    if (s.trend * s.anchor > 0.0 && most < kAlike * least) s.shown = std::max(s.shown, least);
+    if (!(s.trend * s.anchor > 0.0 && most < kAlike * least)) return;
+    s.shown = std::max(s.shown, least);
+    if (least > rows_[i].contact) standing_[i].start = std::copysign(least, s.anchor);
   }
 
   // Drifts of the rows, from where the arm was while the baselines were averaged.
@@ -561,11 +613,14 @@ class Detector {
   std::vector<SegmentTests> tests_;
   std::vector<NoiseMeter> meters_, trend_meters_;  // per row: of the residual, of its trend
   std::vector<double> normalized_, limits_, drift_, excess_;
+  std::vector<Standing> standing_;  // per row
+  std::vector<FirstLook> first_looks_;  // per row
   std::vector<int> levels_;
   std::vector<double> quiet_, statistics_;
   double time_ = 0.0, since_ = 0.0;
   double still_ = kPause;  // for how long the arm has stood [s]
   bool timed_ = false, placed_ = false, gap_ = false, joint_tests_ = false, sound_ = false;
+  bool offset_ = false, noisy_ = false;
 };
 
 }  // namespace touchline

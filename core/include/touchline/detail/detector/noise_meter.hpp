@@ -20,7 +20,8 @@ class NoiseMeter {
   // velocities, which is nearly white.
   void tell(double of_readings, double of_velocities) {
     const double sum = of_readings + of_velocities;
-    told_ = std::max(least_, std::sqrt(sum));
+    bare_ = std::sqrt(sum);
+    told_ = std::max(least_, bare_);
     passed_ = sum > 0.0 ? (of_readings * kMean / (1.0 + kMean) + of_velocities) / sum : 1.0;
   }
 
@@ -49,23 +50,34 @@ class NoiseMeter {
 
   // Does what is seen speak against what is told? A variance of `count_` values has the relative
   // standard deviation sqrt(2 / count_).
-  bool contradicts() const {
-    return count_ > kFew && variance_ > told_ * told_ * (1.0 + kSure * std::sqrt(2.0 / count_));
-  }
+  bool contradicts() const { return exceeds(told_); }
 
-  // How many times as large as told it is; 1 where that is not certain.
-  double excess() const { return contradicts() ? sigma() / told_ : 1.0; }
+  // How many times as large as told it is; 1 where that is not certain, or no more than noise figures
+  // err by.
+  double excess() const {
+    const double ratio = bare_ > 0.0 && exceeds(bare_) ? sigma() / bare_ : 1.0;
+    return ratio > kNoisier ? ratio : 1.0;
+  }
 
   // What noise exceeds as rarely as a normal variable exceeds `sigmas` of its true sigma. Where
   // seen noise speaks against the told one that is the quantile of Student's t for so many
   // independent values (Wallace 1959): few values tell little.
-  double limit(double sigmas) const {
-    if (!contradicts()) return sigmas * told_;
+  // Until then noise may be `first` times as large as told.
+  double limit(double sigmas, double first) const {
+    const double least = count_ < kEnough ? std::max(told_, first * bare_) : told_;
+    if (!contradicts()) return sigmas * least;
     const double n = count_, z = sigmas * (8.0 * n + 3.0) / (8.0 * n + 1.0);
-    return std::max(sigmas * told_, sigma() * std::sqrt(n * std::expm1(z * z / n)));
+    return std::max(sigmas * least, sigma() * std::sqrt(n * std::expm1(z * z / n)));
   }
 
  private:
+  static constexpr double kNoisier = 1.5;  // times told: noise figures are no better than this
+
+  bool exceeds(double told) const {
+    return count_ > kFew && variance_ > told * told * (1.0 + kSure * std::sqrt(2.0 / count_));
+  }
+
+  static constexpr double kEnough = 20.0;  // values: a sigma of so many is right by a sixth
   static constexpr double kMean = 2.0;     // times 1 / K: the mean that the scatter is about
   static constexpr double kMost = 500.0;   // values that are remembered: 5 s at K = 100
   static constexpr double kFar = 3.0;      // sigmas: an outlier is further off
@@ -88,7 +100,7 @@ class NoiseMeter {
   };
 
   News known_, other_;
-  double bandwidth_, least_, told_, passed_ = 1.0, mean_ = 0.0, variance_ = 0.0, count_ = 0.0;
+  double bandwidth_, least_, told_, bare_ = 0.0, passed_ = 1.0, mean_ = 0.0, variance_ = 0.0, count_ = 0.0;
   bool running_ = false;
 };
 

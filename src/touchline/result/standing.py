@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What stands on an arm without a touch, and how much more noise it has than was told."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+NOISIER = 1.5  # times told; noise figures are no better than this, as in the core
+MOST = 4  # of signals that a line names; the largest come first
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How far one signal of the detector has shown that the arm is not as told.
+
+    Attributes:
+        segment: that it belongs to.
+        signal: "JOINT" for a joint's torque, "SENSOR.fx" for a wrench in that sensor's frame.
+        unit: "N" or "Nm" of the next four.
+        threshold: that a touch must exceed.
+        start: stood there when observation began, and still a while later: a touch, or an error of
+            the model or a bias; 0 where no more than the threshold did.
+        now: stands there now, since the start or since a touch, and does not change; 0 likewise.
+        seen: one sigma of the residual's noise, when it was largest against what was told.
+        noise: of that to the sigma that is told; 1 where nothing speaks against what is told.
+    """
+
+    segment: str
+    signal: str
+    unit: str
+    threshold: float
+    start: float
+    now: float
+    seen: float
+    noise: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in `analysis.json`."""
+        return dict(vars(self))
+
+
+def unlike_told(all_signals: Sequence[Standing]) -> list[Standing]:
+    """Those that have shown anything."""
+    return [s for s in all_signals if s.start or s.now or s.noise > NOISIER]
+
+
+def standing_lines(all_signals: Sequence[Standing]) -> list[str]:
+    """What stands there and what is noisier than told, with what mends it, in sentences."""
+    lines: list[str] = []
+    began = [s for s in all_signals if s.start]
+    if began:
+        what = _largest([(abs(s.start) / s.threshold, _amount(s, s.start)) for s in began])
+        lines.append(
+            f"offset since the start: {what}. Something touched the arm then, or its model or a "
+            "bias is off. It counts as no touch. `touchline calibrate` takes it off"
+        )
+    stayed = [s for s in all_signals if s.now and not s.start]
+    if stayed:
+        what = _largest([(abs(s.now) / s.threshold, _amount(s, s.now)) for s in stayed])
+        lines.append(
+            f"offset since a touch or a stop: {what} still stand there at the end and do not "
+            "change, as friction does. `touchline calibrate` identifies it"
+        )
+    noisy = [s for s in all_signals if s.noise > NOISIER]
+    if noisy:
+        what = _largest([(s.noise, f"{s.signal} {s.noise:.2g} times") for s in noisy])
+        lines.append(
+            f"noise is larger than `noise` in the description tells: residual of {what}. "
+            "Thresholds and places follow what is seen. `touchline calibrate` measures it"
+        )
+    return lines
+
+
+def _amount(of: Standing, value: float) -> str:
+    return f"{of.signal} {value:+.2f} {of.unit} (threshold {of.threshold:.2g})"
+
+
+def _largest(named: list[tuple[float, str]]) -> str:
+    words = [text for _, text in sorted(named, reverse=True)[:MOST]]
+    more = [f"{len(named) - MOST} more"] if len(named) > MOST else []
+    return ", ".join([*words, *more])
