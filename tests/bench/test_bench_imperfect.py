@@ -19,8 +19,7 @@ def trials():
 def test_a_push_on_a_standing_arm_is_found_and_ends(trials, fault):
     outcome = trials.play(fault, False, (1,))
     assert outcome.found and outcome.cleared
-    if not fault.name.startswith("noise"):  # places believe the noise that is told, as the docs say
-        assert not outcome.wrong and not outcome.before
+    assert not outcome.wrong and not outcome.before
 
 
 def test_pushes_in_motion_are_found_and_end(trials):
