@@ -17,7 +17,7 @@ STANDING = Health.OFFSET | Health.NOISY
 
 
 def watched(bias=0.0, noise=1.0, push=0.0, seed=0):
-    """A standing arm of which joint 2 reads `bias` [Nm] too little, with `noise` times what is told.
+    """A standing arm with `noise` times what is told, of which joint 2 reads `bias` [Nm] too little.
 
     From 1.5 s on link 4 is pushed down by `push` [N].
     """
