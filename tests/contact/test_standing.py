@@ -17,9 +17,9 @@ STANDING = Health.OFFSET | Health.NOISY
 
 
 def watched(bias=0.0, noise=1.0, push=0.0, seed=0):
-    """A standing arm with `noise` times what is told, of which joint 2 reads `bias` [Nm] too little.
+    """A standing arm with `noise` times what is told.
 
-    From 1.5 s on link 4 is pushed down by `push` [N].
+    Joint 2 reads `bias` [Nm] too little. From 1.5 s on link 4 is pushed down by `push` [N].
     """
     rng = np.random.default_rng(seed)
     n = round(SECONDS * RATE)
