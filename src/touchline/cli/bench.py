@@ -385,6 +385,30 @@ def reliability(
     return main(Plan(seeds, share, healthy), page)
 
 
+def fuzz(
+    *, runs: int = 1000, seed: int = 0, keep: Annotated[Path | None, arg(metavar="DIR")] = None
+) -> int:
+    """Damaged descriptions, models, meshes and logs: each is read, or refused in words.
+
+    Example: touchline bench fuzz --runs 20000 --keep found
+
+    Prints, for each kind of file, how many were neither, and the longest time that one took.
+
+    Exit status: 1 where there was one, or one took more than 30 s.
+
+    Args:
+        runs: Damaged files of each kind.
+        seed: Of the damages; file and seed give the same damage again.
+        keep: Folder that gets the files that were neither read nor refused.
+    """
+    from touchline.bench.fuzz import main
+    from touchline.numbers import check_least
+
+    check_least(1, runs=runs)
+    check_least(0, seed=seed)
+    return main(runs, seed, keep)
+
+
 BENCHMARKS: dict[str, Callable[..., int]] = {
     "observer": observer,
     "logs": logs,
@@ -401,4 +425,5 @@ BENCHMARKS: dict[str, Callable[..., int]] = {
     "real": real,
     "interface": interface,
     "reliability": reliability,
+    "fuzz": fuzz,
 }

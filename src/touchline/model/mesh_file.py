@@ -112,7 +112,8 @@ def _read_stl(path: Path) -> Triangles:
     else:
         count = int.from_bytes(data[80:84], "little")
         facets = np.frombuffer(data, _FACET, count, STL_HEADER)
-        vertices = facets["vertices"].astype(float).reshape(-1, 3)
+        with np.errstate(invalid="ignore"):  # numbers that are none are refused below
+            vertices = facets["vertices"].astype(float).reshape(-1, 3)
     return vertices, np.arange(len(vertices)).reshape(-1, 3)
 
 

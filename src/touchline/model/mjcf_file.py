@@ -26,6 +26,20 @@ def compile_mjcf(path: Path) -> tuple[Any, list[LostMesh]]:
         InputError: MuJoCo's own message; or the mass of a body comes from a lost mesh.
     """
     mujoco: Any = need("mujoco")
+    warnings: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(warnings.append)  # else a log in the working directory gets them
+    try:
+        compiled = _compiled(mujoco, path)
+    finally:
+        mujoco.set_mju_user_warning(before)
+    nan = [warning for warning in warnings if "NaN" in warning]
+    if nan:
+        raise InputError(f"{path}: {nan[0]}")
+    return compiled
+
+
+def _compiled(mujoco: Any, path: Path) -> tuple[Any, list[LostMesh]]:
     try:
         return mujoco.MjModel.from_xml_path(str(path)), []
     except ValueError as error:
