@@ -401,7 +401,7 @@ def fuzz(
         seed: Of the damages; file and seed give the same damage again.
         keep: Folder that gets the files that were neither read nor refused.
     """
-    from touchline.bench.fuzz import main
+    from touchline.cli.fuzz import main
     from touchline.numbers import check_least
 
     check_least(1, runs=runs)

@@ -13,6 +13,7 @@ from touchline.fleet.manifest import MANIFEST
 from touchline.fleet.remote import found, is_url
 from touchline.fleet.tables import COMMON
 from touchline.logs.log import BAGS, TABLES
+from touchline.logs.parquet import damages, first_line
 from touchline.report.outputs import ANALYSIS, NAMES
 
 ROBOT_FILE = "robot.yaml"
@@ -163,12 +164,11 @@ def _is_list(path: Path) -> bool:
 
 def _parquet_columns(path: Path) -> list[str]:
     """Columns of a Parquet file; none of one that cannot be read."""
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
         return pq.read_schema(path).names
-    except (pa.ArrowException, OSError):
+    except damages():
         return []
 
 
@@ -186,14 +186,13 @@ def _listed(path: Path) -> Iterator[tuple[str, str]]:
 def _list_rows(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
     """Rows of a list, and where each stands."""
     if path.suffix.lower() == ".parquet":
-        import pyarrow as pa
         import pyarrow.parquet as pq
 
         columns = [c for c in (LOG_COLUMN, ROBOT_COLUMN) if c in _parquet_columns(path)]
         try:
             rows = pq.read_table(path, columns=columns).to_pylist()
-        except (pa.ArrowException, OSError) as error:
-            raise InputError(f"{path}: damaged: {error}") from error
+        except damages() as error:
+            raise InputError(f"{path}: damaged: {first_line(error)}") from error
         for number, row in enumerate(rows, 1):
             yield f"row {number}", row
         return

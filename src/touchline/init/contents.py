@@ -59,15 +59,16 @@ def read_contents(path: Path) -> Contents:
 
 
 def _parquet(path: Path) -> dict[str, np.ndarray]:
-    import pyarrow as pa
     import pyarrow.parquet as parquet
+
+    from touchline.logs.parquet import damages
 
     try:
         file = parquet.ParquetFile(path)
+        names = file.schema_arrow.names
         batch = next(file.iter_batches(LOOKED_AT), None)
-    except (pa.ArrowException, OSError) as error:
+    except damages() as error:
         raise InputError(f"{path}: cannot be read: {' '.join(str(error).split())}") from None
-    names = file.schema_arrow.names
     if batch is None:
         return {name: np.empty(0) for name in names}
     return {name: _numbers(batch.column(name).to_pylist()) for name in names}

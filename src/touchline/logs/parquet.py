@@ -30,7 +30,6 @@ class ParquetSource:
             InputError: no Parquet file, one cut off before its footer, no rows, or columns are
                 missing.
         """
-        import pyarrow as pa
         import pyarrow.parquet as pq
 
         self.path = path
@@ -39,12 +38,12 @@ class ParquetSource:
             self._file = pq.ParquetFile(
                 path, pre_buffer=False, buffer_size=1 << 20, page_checksum_verification=True
             )
-        except (pa.ArrowException, OSError) as error:
+            self.columns = tuple(self._file.schema_arrow.names)
+        except damages() as error:
             raise InputError(
                 f"{path}: not a readable Parquet file; a file cut off before its footer cannot "
-                f"be read ({str(error).splitlines()[0]})"
+                f"be read ({first_line(error)})"
             ) from error
-        self.columns = tuple(self._file.schema_arrow.names)
         self.topics: dict[str, str] = {}
         self.warnings: list[str] = []
         self.losses: list[str] = []
@@ -60,7 +59,11 @@ class ParquetSource:
         self.without_velocity = self._selection.without_velocity
         self.rows = self._file.metadata.num_rows
         self.metadata = _metadata(self._file.schema_arrow.metadata or {})
-        self.duration = self._duration(naming)
+        try:
+            self.duration = self._duration(naming)
+        except damages() as error:
+            self.close()
+            raise InputError(f"{path}: damaged footer: {first_line(error)}") from error
         self._read_rows = 0
 
     def _check_types(self) -> None:
@@ -83,6 +86,7 @@ class ParquetSource:
         if at is None:
             return None
         meta = self._file.metadata
+        read_first_rows(self._file, naming.time.name)
         chunks = [meta.row_group(g).column(at).statistics for g in range(meta.num_row_groups)]
         ranges = [(s.min, s.max) for s in chunks if s is not None and s.has_min_max]
         if not ranges or len(ranges) < len(chunks):
@@ -106,8 +110,6 @@ class ParquetSource:
             yield block
 
     def _blocks(self, rows: int) -> Iterator[Block]:
-        import pyarrow as pa
-
         done = 0
         try:
             for batch in self._file.iter_batches(batch_size=rows, columns=self._selection.names):
@@ -115,8 +117,12 @@ class ParquetSource:
                     lambda name, batch=batch: numbers(batch.column(name)), batch.num_rows
                 )
                 done += batch.num_rows
-        except (pa.ArrowException, OSError) as error:
-            raise InputError(f"{self.path}: damaged after row {done}: {error}") from error
+        except InputError:
+            raise
+        except damages() as error:
+            raise InputError(
+                f"{self.path}: damaged after row {done}: {first_line(error)}"
+            ) from error
 
     def progress(self) -> float:
         """Fraction of the rows read."""
@@ -125,6 +131,31 @@ class ParquetSource:
     def close(self) -> None:
         """Release the file."""
         self._file.close(force=True)
+
+
+def read_first_rows(file: Any, column: str) -> None:
+    """Reads a row of each group of an open Parquet file.
+
+    pyarrow ends the process where it is asked for statistics of a damaged column, but raises an
+    error where it reads the column: so this goes first.
+
+    Raises:
+        Exception: one of `damages()`.
+    """
+    for group in range(file.metadata.num_row_groups):
+        next(file.iter_batches(1, [group], [column]), None)
+
+
+def damages() -> tuple[type[Exception], ...]:
+    """What pyarrow raises for a damaged file: names that are no text, sizes that no memory has."""
+    import pyarrow as pa
+
+    return pa.ArrowException, OSError, ValueError, MemoryError, OverflowError
+
+
+def first_line(error: Exception) -> str:
+    """What an error says, in one line."""
+    return next(iter(str(error).splitlines()), type(error).__name__)
 
 
 def numbers(column: Any) -> np.ndarray:
@@ -146,10 +177,9 @@ def _metadata(raw: dict[bytes, bytes]) -> dict[str, Any]:
 
 def table_metadata(path: Path) -> dict[str, Any]:
     """What the writer of a table left; empty where the file cannot be read."""
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
         return _metadata(pq.read_schema(path).metadata or {})
-    except (pa.ArrowException, OSError):
+    except damages():
         return {}

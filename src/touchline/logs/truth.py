@@ -9,6 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.errors import InputError
+from touchline.logs.parquet import damages, first_line
+
 Array = NDArray[np.float64]
 
 
@@ -57,15 +60,21 @@ def read_truth(log: Path) -> list[TrueContact]:
     """The true contacts of a simulated Parquet log, in the order of their beginning.
 
     Empty for a log without truth, as those of real robots are.
+
+    Raises:
+        InputError: the file is damaged.
     """
     import pyarrow.parquet as pq
 
     if log.suffix != ".parquet":
         return []
-    schema = pq.read_schema(log)
-    slots = [i for i in range(len(schema.names)) if set(_columns(i)) <= set(schema.names)]
-    links = _links(schema.metadata or {})
-    contacts = [contact for slot in slots for contact in _contacts(log, slot, links)]
+    try:
+        schema = pq.read_schema(log)
+        slots = [i for i in range(len(schema.names)) if set(_columns(i)) <= set(schema.names)]
+        links = _links(schema.metadata or {})
+        contacts = [contact for slot in slots for contact in _contacts(log, slot, links)]
+    except damages() as error:
+        raise InputError(f"{log}: its truth is damaged: {first_line(error)}") from error
     return sorted(contacts, key=lambda contact: contact.time[0])
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.errors import InputError
+from touchline.logs.parquet import damages, first_line, read_first_rows
 
 MOST_HELD = 160  # pieces of columns in memory, at most 1 MB each
 
@@ -29,15 +30,15 @@ class TimedTable:
     """
 
     def __init__(self, path: Path) -> None:
-        import pyarrow as pa
         import pyarrow.parquet as pq
 
         try:
             self._file = pq.ParquetFile(path)
-        except (OSError, pa.ArrowInvalid) as error:
-            raise InputError(f"{path}: cannot be read: {error}") from error
+            self.columns = tuple(self._file.schema_arrow.names)
+            read_first_rows(self._file, "time")
+        except damages() as error:
+            raise InputError(f"{path}: cannot be read: {first_line(error)}") from error
         self.path = path
-        self.columns = tuple(self._file.schema_arrow.names)
         if self.columns[:1] != ("time",):
             raise InputError(f"{path}: its first column is not 'time'; analyze again")
         metadata = self._file.metadata

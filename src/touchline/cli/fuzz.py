@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`touchline bench fuzz`: damaged files for each parser; what is not refused in words is printed."""
+"""`touchline bench fuzz`: damaged files for each parser; prints those not refused in words."""
 
 import csv
 import gzip
 import io
+import multiprocessing
+import os
 import resource
 import tempfile
 import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +21,8 @@ from touchline.bench.tables import Row, aligned
 from touchline.errors import InputError
 
 LONGEST = 30.0  # s that a file may take
+STARTS = 60.0  # s that a process may take to begin
+SPAWN = multiprocessing.get_context("spawn")  # what has been imported here counts for nothing there
 EXTREMES = (
     b"0",
     b"-1",
@@ -46,7 +51,8 @@ WORDS = (
         b"..\n",
     ),
 )
-URDF = b"""<robot name="two"><link name="a"/><link name="b"><inertial><origin xyz="0 0 .1" rpy="0 0 0"/>
+URDF = b"""<robot name="two"><link name="a"/><link name="b">
+<inertial><origin xyz="0 0 .1" rpy="0 0 0"/>
 <mass value="2"/><inertia ixx=".01" iyy=".01" izz=".01" ixy="0" ixz="0" iyz="0"/></inertial>
 <collision><geometry><box size=".1 .1 .2"/></geometry></collision></link>
 <joint name="j" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0 0 1" rpy="0 1 0"/>
@@ -218,17 +224,18 @@ def _stl() -> bytes:
 
 
 def _ascii_stl() -> bytes:
-    face = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
+    corners = "vertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+    face = f"facet normal 0 0 1\nouter loop\n{corners}endloop\nendfacet\n"
     return f"solid x\n{face}endsolid x\n".encode()
 
 
 def fuzz(
-    parser: Parser, folder: Path, runs: int, seed: int, others: tuple[bytes, ...]
+    parser: Parser, folder: Path, numbers: range, seed: int, others: tuple[bytes, ...]
 ) -> tuple[list[Failure], float]:
-    """Reads `runs` damaged files; returns the failures and the longest time of one [s]."""
+    """Reads damaged files of these numbers; the failures, and the longest time of one [s]."""
     found, longest = [], 0.0
     path = folder / parser.file
-    for number in range(runs):
+    for number in numbers:
         rng = np.random.default_rng([seed, number])
         data = damaged(
             parser.seeds[rng.integers(0, len(parser.seeds))],
@@ -243,8 +250,9 @@ def fuzz(
 
 
 def read_one(parser: Parser, path: Path, data: bytes) -> tuple[str, float]:
-    """Reads one file; returns what is wrong with how it was taken ("": nothing), and the time [s]."""
+    """Reads one file: what is wrong with how it was taken ("": nothing), and the time [s]."""
     path.write_bytes(data)
+    (path.parent / "last").write_bytes(data)
     start = time.perf_counter()
     what = ""
     try:
@@ -257,18 +265,98 @@ def read_one(parser: Parser, path: Path, data: bytes) -> tuple[str, float]:
     return what or (f"took {seconds:.0f} s" if seconds > LONGEST else ""), seconds
 
 
+def fuzz_apart(
+    name: str,
+    folder: Path,
+    runs: int,
+    seed: int,
+    kinds: Callable[[Path], list[Parser]] = parsers,
+) -> tuple[list[Failure], float, float]:
+    """As `fuzz` with all files of a kind, in processes of their own, which a file may end.
+
+    `kinds`: makes all parsers, in that process too.
+
+    Returns:
+        The failures, the longest time of one file [s], and the largest memory [MB].
+    """
+    found: list[Failure] = []
+    longest = most = 0.0
+    begin = 0
+    while begin < runs:
+        ours, theirs = SPAWN.Pipe(duplex=False)
+        numbers = range(begin, runs)
+        process = SPAWN.Process(
+            target=_work, args=(theirs, kinds, name, folder, numbers, seed), daemon=True
+        )
+        process.start()
+        theirs.close()
+        number, waited = begin, True
+        answer: tuple[list[Failure], float, float] | None = None
+        try:
+            while answer is None and (waited := ours.poll(STARTS + LONGEST)):
+                told = ours.recv()
+                if isinstance(told, int):
+                    number = told
+                else:
+                    answer = told
+        except EOFError:  # it has ended
+            pass
+        if not waited:
+            process.kill()
+        process.join()
+        if answer is None:
+            what = (
+                f"ended the process ({process.exitcode})"
+                if waited
+                else f"took over {LONGEST:.0f} s"
+            )
+            found.append(Failure(name, number, what, (folder / "last").read_bytes()))
+            begin = number + 1
+            continue
+        failures, seconds, memory = answer
+        found += failures
+        longest, most, begin = max(longest, seconds), max(most, memory), runs
+    return found, longest, most
+
+
+def _work(
+    told: Connection,
+    make: Callable[[Path], list[Parser]],
+    name: str,
+    folder: Path,
+    numbers: range,
+    seed: int,
+) -> None:
+    """In a process of its own: tells each number before its file is read, and all at the end."""
+    kinds = make(folder)
+    others = tuple(s for parser in kinds for s in parser.seeds)
+    parser = next(parser for parser in kinds if parser.name == name)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # what libraries print of damaged files
+    failures, longest = [], 0.0
+    for number in numbers:
+        told.send(number)
+        found, seconds = fuzz(parser, folder, range(number, number + 1), seed, others)
+        failures += found
+        longest = max(longest, seconds)
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    told.send((failures, longest, most))
+
+
 def main(runs: int, seed: int, keep: Path | None) -> int:
     """Prints a line for each kind of file; 1 where one was not refused in words."""
-    rows: list[Row] = [("files", "damaged", "failed", "longest")]
+    rows: list[Row] = [("files", "damaged", "failed", "longest", "memory")]
     failed = 0
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        kinds = parsers(folder)
-        others = tuple(s for parser in kinds for s in parser.seeds)
-        for parser in kinds:
-            found, longest = fuzz(parser, folder, runs, seed, others)
+        for parser in parsers(folder):
+            found, longest, most = fuzz_apart(parser.name, folder, runs, seed)
             failed += len(found)
-            rows.append((parser.name, str(runs), str(len(found)), f"{1e3 * longest:.0f} ms"))
+            rows.append(
+                (
+                    *(parser.name, str(runs), str(len(found))),
+                    *(f"{1e3 * longest:.0f} ms", f"{most:.0f} MB"),
+                )
+            )
             for failure in found[:3]:
                 print(f"{failure.parser} {failure.number}:\n{failure.what}")
             if keep is not None:
@@ -277,6 +365,4 @@ def main(runs: int, seed: int, keep: Path | None) -> int:
                     stem = f"{failure.parser.replace(' ', '_')}_{failure.number}"
                     (keep / stem).write_bytes(failure.data)
     print(aligned(rows))
-    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    print(f"\nlargest memory {most:.0f} MB")
     return int(failed > 0)

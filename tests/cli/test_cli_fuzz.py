@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Damaged files of each kind are read or refused in words; the runner finds what is neither."""
 
+import os
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import touchline as tl
-from touchline.bench.fuzz import Parser, damaged, fuzz, parsers
+from touchline.cli import main
+from touchline.cli.fuzz import Parser, damaged, fuzz, fuzz_apart, parsers, read_one
 
 RUNS, SEED = 40, 1
 
@@ -30,7 +34,7 @@ def test_damaged_files_are_refused_in_words(tmp_path):
     kinds = parsers(tmp_path)
     others = tuple(s for parser in kinds for s in parser.seeds)
     for parser in kinds:
-        found, longest = fuzz(parser, tmp_path, RUNS, SEED, others)
+        found, longest = fuzz(parser, tmp_path, range(RUNS), SEED, others)
         assert [(f.parser, f.number, f.what) for f in found] == []
         assert longest < 30.0
 
@@ -42,13 +46,13 @@ def test_the_runner_finds_what_is_not_refused_in_words(tmp_path, error):
             raise error
         return path
 
-    found, _ = fuzz(Parser("odd", "a.bin", (b"abc123",), read), tmp_path, 30, 0, (b"zz",))
+    found, _ = fuzz(Parser("odd", "a.bin", (b"abc123",), read), tmp_path, range(30), 0, (b"zz",))
     assert 3 < len(found) < 30
     assert type(error).__name__ in found[0].what and len(found[0].data) % 2
 
 
 def test_a_number_that_is_none_in_an_mjcf_is_refused_and_leaves_no_log(tmp_path, monkeypatch):
-    from touchline.bench.fuzz import MJCF
+    from touchline.cli.fuzz import MJCF
 
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "arm.xml"
@@ -56,3 +60,35 @@ def test_a_number_that_is_none_in_an_mjcf_is_refused_and_leaves_no_log(tmp_path,
     with pytest.raises(tl.InputError, match=r"arm\.xml: .*NaN"):
         tl.load_robot(path)
     assert [p.name for p in tmp_path.iterdir()] == ["arm.xml"]
+
+
+DAMAGED_FOOTER = Path(__file__).parent / "corpus" / "statistics_of_another_size.parquet"
+
+
+def test_a_parquet_file_that_ends_pyarrow_is_refused_in_one_line(tmp_path, capsys):
+    for parser in parsers(tmp_path):
+        if parser.name == "Parquet":
+            what, _ = read_one(parser, tmp_path / parser.file, DAMAGED_FOOTER.read_bytes())
+            assert what == ""
+    (tmp_path / "log.parquet").write_bytes(DAMAGED_FOOTER.read_bytes())
+    log, robot = tmp_path / "log.parquet", tmp_path / "whole.yaml"
+    status = main(["analyze", str(log), "--robot", str(robot), "--out", str(tmp_path / "out")])
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert status == 2 and len(lines) == 1 and "log.parquet: damaged" in lines[0]
+
+
+def ending(folder):
+    """A kind of file that ends its process now and then."""
+
+    def read(path):
+        if len(path.read_bytes()) % 3 == 0:
+            os.abort()
+        return path
+
+    return [Parser("ending", "a.bin", (b"abc123",), read)]
+
+
+def test_a_file_that_ends_its_process_is_found_and_the_rest_is_read(tmp_path):
+    found, _, _ = fuzz_apart("ending", tmp_path, 12, SEED, ending)
+    assert 1 <= len(found) <= 8 and found[0].data
+    assert all("ended the process" in f.what and len(f.data) % 3 == 0 for f in found)
