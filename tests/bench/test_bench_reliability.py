@@ -85,3 +85,12 @@ def test_the_tables_count_what_was_missed(listened):
     text, missed = tables(outcomes, 1.0, ["sara: tau.joint1 stuck"] * 2)
     assert "delay, tau" in text and "spike, tau" in text
     assert missed
+
+
+def test_a_push_that_a_slow_joint_feels_first_is_felt_until_its_end():
+    """Its first sample over a limit is a slow joint's alone: no friction, the base feels it too."""
+    recording = record(tl.load_robot("sara"), 0)
+    said = listen(tl.Pipeline(recording.robot), recording.samples)
+    assert [(e.segment, e.detected < 0.93, e.cleared > 1.39) for e in said.events] == [
+        ("base", True, True)
+    ]

@@ -384,6 +384,7 @@ class Detector {
   void decide(std::size_t g, double dt) {
     Segment& s = segments_[g];
     if (levels_[g] == 0 && !s.pending) s.origin = origin(g, dt);
+    if (s.origin == Origin::reversal && pushed(g)) s.origin = Origin::push;
     advance(s.score > 1.0, dt, s.pending, s.above);
     s.highest = s.pending ? std::max(s.highest, s.score) : 0.0;
     advance(s.collision > 1.0, dt, s.pending_collision, s.above_collision);
@@ -450,6 +451,18 @@ class Detector {
       creeps = creeps && std::fabs(quick) < kCreep * std::fabs(before);
     }
     return slow ? Origin::reversal : creeps ? Origin::creep : Origin::push;
+  }
+
+  // Has a sensor's wrench stepped over its limit? Friction in joints, whichever moves them, does not
+  // load a sensor: what began with joints that hardly move is a push after all.
+  bool pushed(std::size_t g) const {
+    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+      if (rows_[i].component < 0 || std::fabs(normalized_[i]) < limits_[i]) continue;
+      const RowState& s = states_[i];
+      const double quick = samples_[i].residual - s.trend, before = s.trend - s.baseline;
+      if (std::fabs(quick) >= kCreep * std::fabs(before)) return true;
+    }
+    return false;
   }
 
   // Is what is felt of a segment most likely the arm's own doing: an error of its model in motion?
