@@ -7,8 +7,21 @@ import pytest
 import touchline as tl
 from touchline.bench.reliability.faults import FAULTS, channels_of, injected
 from touchline.bench.reliability.judge import judge, listen
-from touchline.bench.reliability.recordings import PHASES, record
+from touchline.bench.reliability.recordings import (
+    FORCE,
+    MODEL_ERROR,
+    PHASES,
+    PUSHED,
+    RELEASED,
+    SECONDS,
+    SPEED,
+    record,
+)
 from touchline.bench.reliability.run import tables
+from touchline.simulation.contacts import Profile, ScriptedContact
+from touchline.simulation.noise import SensorNoise
+from touchline.simulation.scenario import scripted
+from touchline.simulation.scene import Run
 
 AT_ONCE = ("spike", "spikes", "rail", "NaN", "infinite", "absurd")
 
@@ -89,8 +102,17 @@ def test_the_tables_count_what_was_missed(listened):
 
 def test_a_push_that_a_slow_joint_feels_first_is_felt_until_its_end():
     """Its first sample over a limit is a slow joint's alone: no friction, the base feels it too."""
-    recording = record(tl.load_robot("sara"), 0)
-    said = listen(tl.Pipeline(recording.robot), recording.samples)
+    robot = tl.load_robot("sara")
+    point, force = np.array([-0.03061891, -0.00220524, 0.18129566]), np.array([0.0, -FORCE, 0.0])
+    profile = Profile(PUSHED, RELEASED - PUSHED - 0.04, 0.02, 0.02)
+    push = ScriptedContact("link5", point, force, profile, force_frame="link")
+    settings = Run(seed=0, noise=SensorNoise(), model_error=MODEL_ERROR, physics=2000.0)
+    said = listen(tl.Pipeline(robot), scripted(robot, [push], SECONDS, SPEED, settings).samples)
     assert [(e.segment, e.detected < 0.93, e.cleared > 1.39) for e in said.events] == [
         ("base", True, True)
     ]
+
+
+def test_what_is_pushed_can_be_reached_from_outside():
+    recording = record(tl.load_robot("sara"), 0)
+    assert recording.body != "link5"  # its first draw lies inside link6

@@ -13,12 +13,13 @@ from touchline.simulation.contacts import Profile, ScriptedContact
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scenario import scripted
 from touchline.simulation.scene import Run
-from touchline.simulation.touchable import TouchableSurface, structure_links
+from touchline.simulation.touchable import SurfacePoint, TouchableSurface, structure_links
 
 ROBOTS = ("sara", "sara-full", "ur5", "panda")
 SECONDS, SPEED, FORCE, MODEL_ERROR = 2.4, 0.5, 25.0, 0.02  # s, rad/s, N
 PUSHED, RELEASED = 0.9, 1.4  # s
 PHASES = {"free": 0.6, "onset": PUSHED, "contact": 1.15, "release": RELEASED}  # s: a fault begins
+DRAWS = 1000  # points that are tried
 OUTBOARD = 4  # so many of the outermost links are pushed: all layouts feel these
 
 
@@ -80,10 +81,29 @@ def record(robot: Robot, seed: int, pushed: bool = True, seconds: float = SECOND
     """The arm swings; one of its outer links is pushed for half a second."""
     rng = np.random.default_rng([seed, 11])
     settings = Run(seed=seed, noise=SensorNoise(), model_error=MODEL_ERROR, physics=2000.0)
-    at = TouchableSurface(robot).draw(rng, structure_links(robot)[-OUTBOARD:])
+    free = scripted(robot, [], seconds, SPEED, settings).samples
+    at = _reachable(robot, free, rng)
     profile = Profile(PUSHED, RELEASED - PUSHED - 0.04, 0.02, 0.02)
     push = ScriptedContact(at.link, at.point, -FORCE * at.normal, profile, force_frame="link")
-    contacts = [push] if pushed else []
-    samples = scripted(robot, contacts, seconds, SPEED, settings).samples
+    samples = scripted(robot, [push], seconds, SPEED, settings).samples if pushed else free
     body = next(body.name for body in robot.bodies if at.link in body.links)
     return Recording(robot, seed, samples, body)
+
+
+def _reachable(robot: Robot, free: Samples, rng: np.random.Generator) -> SurfacePoint:
+    """A point that a finger reaches from outside in all postures of the push."""
+    surface = TouchableSurface(robot)
+    poses = [
+        robot.T_world_links(free.q[np.searchsorted(free.time, time)])
+        for time in np.linspace(PUSHED, RELEASED, 6)
+    ]
+    for _ in range(DRAWS):
+        at = surface.draw(rng, structure_links(robot)[-OUTBOARD:])
+        for T in poses:
+            surface.place(T)
+            R, p = T[at.link][:3, :3], T[at.link][:3, 3]
+            if not surface.reachable(R @ at.point + p, R @ at.normal):
+                break
+        else:
+            return at
+    raise InputError(f"robot {robot.name}: no reachable point in {DRAWS} on its outer links")
