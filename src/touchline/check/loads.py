@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.check.averages import averaged
 from touchline.check.findings import Findings
 from touchline.identify.evidence import Evidence, gather
 from touchline.identify.fit import main_links
@@ -24,6 +25,8 @@ from touchline.observer.samples import Samples
 Array = NDArray[np.float64]
 
 MOST = 400_000  # samples that are looked at
+RATE = 100.0  # Hz; loads change slowly beside it, and quicker samples are averaged
+INSTANTS = 500  # that are weighed, over the whole recording
 OFFSET = 0.3  # Nm or N, 1 sigma: what offsets and friction leave in any row of a sound robot
 OFFSET_SHARE = 0.01  # the same, as a part of the largest reading
 CENTRE = 0.1  # m, 1 sigma of a payload's centre about a hand's breadth before the flange
@@ -63,9 +66,10 @@ class Explanation:
 def explain_weights(robot: Robot, parts: Iterable[Samples], findings: Findings) -> Robot:
     """Finds missing or surplus bodies and a tilted base; returns the robot as it then would be."""
     try:
-        evidence = gather(robot, [_first(parts)])
+        evidence = gather(robot, [averaged(_first(parts), RATE)])
     except ValueError:
         return robot
+    evidence = evidence.part(np.arange(0, len(evidence), -(-len(evidence) // INSTANTS)))
     touched = touched_instants(evidence)
     if touched.mean() > MOST_TOUCHED or not evidence.used.any():
         return robot
