@@ -36,8 +36,9 @@ def averaged(parts: Iterable[Samples], rate: float) -> Iterator[Samples]:
             rising = (np.diff(time, axis=1) > 0.0).all(axis=1)
             short = time[:, -1] - time[:, 0] <= LONGER * count * period
         keep = rising & short
-        means = (_means(x, count)[keep] for x in (part.q, part.qd, part.tau, part.wrench))
-        yield Samples(time[keep].mean(axis=1), *means, part.row)
+        signals = (part.q, part.qd, part.tau, part.wrench)
+        q, qd, tau, wrench = (_means(values, count)[keep] for values in signals)
+        yield Samples(time[keep].mean(axis=1), q, qd, tau, wrench, part.row)
 
 
 def _means(values: np.ndarray, count: int) -> np.ndarray:
