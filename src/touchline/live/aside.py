@@ -34,6 +34,8 @@ IDLE = 0.02  # s that the reading process waits for samples or a command
 START = 30.0  # s until the reading process must have answered; ROS 2 takes long to import
 LEAVE = 2.0  # s that it may take to end
 READ = 1 << 16  # bytes at once
+# Of the reading process. With `-m` Python warns, since the package has imported the module already.
+READING = "import sys; from touchline.live import aside; sys.exit(aside.main(int(sys.argv[1])))"
 
 
 class ReadAside:
@@ -80,7 +82,7 @@ class ReadAside:
     def _start(self) -> None:
         self._kill()
         ours, theirs = socket.socketpair()
-        command = [sys.executable, "-m", "touchline.live.aside", str(theirs.fileno())]
+        command = [sys.executable, "-c", READING, str(theirs.fileno())]
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, pass_fds=[theirs.fileno()])
         theirs.close()
         self._socket, self._begun = ours, b""
@@ -299,7 +301,3 @@ def main(number: int) -> int:
     except (BrokenPipeError, ConnectionResetError):
         pass
     os._exit(0)  # whatever threads a library has left
-
-
-if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1])))
