@@ -34,7 +34,7 @@ FULL = 0.5  # of the largest step of a press; a smaller mean is of a force that 
 LATEST = 0.25  # s; a finger that is not on a widget by then only passes over it
 SURE = 0.9  # probability of being on a widget, from which it counts
 GESTURE_MOST = 60.0  # N; what presses harder means no gesture
-AVERAGE = 0.03  # s, over which the place of a press is averaged
+AVERAGE = 0.03  # s, over which the place of a press, or its way along a slider, is averaged
 STROKE_LEAST = 0.01  # m; a shorter way on a pad is a press, no stroke
 BESIDE = 0.1  # s; another contact that began later has to last as long to be more than a doubt
 PAUSE = 0.01  # s between two looks at what is before a finger lands, or at whether it is one
@@ -140,6 +140,7 @@ class Press:
     crest: float = 0.0  # the largest step of this contact [Nm]
     places: deque[tuple[float, Array, float]] = field(default_factory=deque)
     steps: deque[tuple[float, Array]] = field(default_factory=deque)
+    ways: deque[tuple[float, float]] = field(default_factory=deque)  # beside others
     full: tuple[Array, Array] | None = None  # joint positions (n,), and the largest mean step (n,)
     widget: Widget | None = None
     trace: list[tuple[float, float, float, float]] = field(default_factory=list)
@@ -553,7 +554,10 @@ class Touch:
         return self.widgets[name], probability
 
     def _along(self, press: Press, result: Result, poses) -> tuple[float, Array] | None:
-        """Way and force (3,) of a slider's finger where others touch its segment, too."""
+        """Way and force (3,) of a slider's finger where others touch its segment, too.
+
+        The way is a mean, as a place is: between two hands one instant tells little.
+        """
         widget, finger = press.widget, press.finger
         if widget is None or widget.name not in self._paths or press.before is None:
             return None
@@ -562,7 +566,11 @@ class Touch:
             return None
         node, path = self._paths[widget.name]
         beside = self._beside[str(finger.segment)]
-        return beside.along(poses, node, path, self._change(press, result), others)
+        way, force = beside.along(poses, node, path, self._change(press, result), others)
+        press.ways.append((result.time, way))
+        while press.ways[0][0] < result.time - AVERAGE:
+            press.ways.popleft()
+        return float(np.mean([way for _, way in press.ways])), force
 
     def _rows(self, result: Result, segment: str | None, alone: bool = True) -> Array:
         """What a segment's sensor and the joints show (6 + n,); joints only if all is on it."""
