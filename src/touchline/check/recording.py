@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from touchline.check.coarse import is_off, next_step
 from touchline.check.findings import Findings
@@ -24,6 +25,8 @@ from touchline.observer.samples import Samples
 STILL = 0.01  # rad/s or m/s
 CHUNK = 1 << 15  # samples that are read at once
 MOST_STEPS = 8  # things that hide each other
+MOMENT = 0.2  # s before and after what was felt: a touch begins unfelt, and filters forget it late
+LEAST_UNTOUCHED = 0.2  # of the samples: a recording of touches has pauses
 
 
 GROSS = (  # words of findings that must be mended before weights mean anything
@@ -78,23 +81,46 @@ def check_recording(robot: Robot, path: Path, findings: Findings) -> None:
     findings.take(plain)
 
 
-def glance(robot: Robot, parts: list[Samples]) -> list[str]:
+def glance(
+    robot: Robot, parts: list[Samples], felt: list[NDArray[np.bool_]], off: bool
+) -> list[str]:
     """What a short look at a recording tells: units, order, signs, unmodelled weights, noise.
 
-    It may hold touches: what these look like (offsets, gains, delays) is not judged.
+    It may hold touches: what these look like (offsets, gains, delays) is not judged, and what the
+    detector felt is left out. Where hardly anything else is left, weights are judged only if the
+    arm was off from the first moments on: a wrong description is, a touch comes later.
 
     Args:
         robot: as described.
         parts: some samples, in order.
+        felt: of each part, (N,): did the detector feel something then?
+        off: did more stand there than thresholds allow when observation began?
     """
     found = Findings()
-    mending, seen = _mend(robot, lambda: iter(parts), found)
-    if seen is None or not seen.stamps.credible:
+    untouched = list(_untouched(parts, felt))
+    enough = sum(map(len, untouched)) >= LEAST_UNTOUCHED * sum(map(len, parts))
+    judged = untouched if enough else parts if off else []
+    mending, seen = _mend(robot, lambda: iter(judged), found)
+    whole = look(robot, parts, mending)
+    if whole is None or not whole.stamps.credible:
         return found.findings
-    check_noise(robot, seen, found)
-    if is_off(robot, seen):
-        explain_weights(robot, mending.apply(parts), found)
+    check_noise(robot, whole, found)
+    if seen is not None and is_off(robot, seen):
+        explain_weights(robot, mending.apply(judged), found)
     return found.findings
+
+
+def _untouched(parts: list[Samples], felt: list[NDArray[np.bool_]]) -> Iterator[Samples]:
+    """The pieces in which nothing was felt, nor a moment before or after."""
+    times = [part.time[mask] for part, mask in zip(parts, felt, strict=True)]
+    touched = np.sort(np.concatenate(times)) if times else np.empty(0)
+    for part in parts:
+        before = np.searchsorted(touched, part.time - MOMENT)
+        free = before == np.searchsorted(touched, part.time + MOMENT, side="right")
+        edges = np.flatnonzero(np.diff(free)) + 1
+        for piece in np.split(np.arange(len(part)), edges):
+            if len(piece) and free[piece[0]]:
+                yield part.where(piece)
 
 
 def _mend(

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from touchline.check.felt import felt
 from touchline.check.recording import glance
@@ -146,9 +147,9 @@ def analyze(
             run = _Run(Pipeline(model, bandwidth, method, period), folder.draft, period)
             glanced = Glance()
             for part in _with_progress(recording, chain([first], parts)):
-                run.add(part)
-                glanced.add(part)
-            found = glance(model, glanced.parts)
+                glanced.add(part, run.add(part))
+            off = any(s.start for s in run.pipeline.standing)
+            found = glance(model, glanced.parts, glanced.felt, off)
             warnings = bandwidth_warnings(bandwidths(model, bandwidth), run.period)
             warnings += [*recording.warnings, *model.warnings, *run.pipeline.skin.lost]
             warnings += watch_warnings(model, run.statistics)
@@ -168,16 +169,24 @@ def analyze(
 
 
 class Glance:
-    """Keeps the first samples of a recording, for a check of what they are."""
+    """Keeps the first samples of a recording, for a check of what they are.
+
+    Attributes:
+        parts: of the recording.
+        felt: of each part, (N,): did the detector feel something then?
+    """
 
     def __init__(self) -> None:
         self.parts: list[Samples] = []
+        self.felt: list[NDArray[np.bool_]] = []
         self._kept = 0
 
-    def add(self, part: Samples) -> None:
+    def add(self, part: Samples, felt: NDArray[np.bool_]) -> None:
         """Take the next samples, as long as there is room."""
         if self._kept < LOOKED_AT:
-            self.parts.append(part.where(np.arange(len(part)) < LOOKED_AT - self._kept))
+            keep = np.arange(len(part)) < LOOKED_AT - self._kept
+            self.parts.append(part.where(keep))
+            self.felt.append(felt[keep])
             self._kept += len(part)
 
 
@@ -230,8 +239,8 @@ class _Run:
         }
         self._windows = EventWindows(columns, self.period)
 
-    def add(self, part: Samples) -> None:
-        """Take the next samples."""
+    def add(self, part: Samples) -> NDArray[np.bool_]:
+        """Take the next samples; returns (N,) whether something was felt at each."""
         time = part.time
         estimate, detection = self.pipeline.run(time, part.q, part.qd, part.tau, part.wrench)
         self.statistics.add(time, estimate, detection, self.pipeline.watch)
@@ -245,6 +254,7 @@ class _Run:
         self._outputs.events(events)
         self._outputs.postures(time, part.q)
         self._poses.add(time, part.q, events)
+        return np.any(detection.levels, axis=1, keepdims=True)[:, 0]
 
     def finish(
         self,

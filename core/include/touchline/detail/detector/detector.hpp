@@ -229,6 +229,7 @@ class Detector {
   // What the noise figures let expect in each row, in this posture.
   void tell_noise() {
     told_.evaluate_variances(posture_);
+    noisy_ = false;
     for (std::size_t i = 0; i < rows_.size(); ++i) {
       const std::size_t at = i * (rows_.size() + 1);
       const double K = bandwidth(rows_[i]), kept = std::min(1.0, 0.5 * K * settings_.noise.period);
@@ -237,12 +238,13 @@ class Detector {
       first_looks_[i].tell(readings, velocities, K, settings_.noise.period);
       trend_meters_[i].tell((readings + kept * velocities) / (1.0 + kTrend), 0.0);
       excess_[i] = meters_[i].excess();
+      if (!meters_[i].contradicts() || excess_[i] == 1.0) continue;  // it does not matter
+      noisy_ = true;
       if (excess_[i] > standing_[i].ratio) {
         standing_[i].ratio = excess_[i];
         standing_[i].seen = meters_[i].sigma();
       }
     }
-    noisy_ = std::any_of(excess_.begin(), excess_.end(), [](double x) { return x > 1.0; });
   }
 
   // The residuals and innovations of a segment's rows.
