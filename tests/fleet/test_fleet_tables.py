@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 import pytest
+from accessible import SCHEMES, WIDTHS, look, need_axe, serious
 from free_motion import free_motion, pushed
 
 import touchline as tl
@@ -118,6 +119,15 @@ def test_the_page_leads_to_each_recording(out):
     for heading in ("Robots", "Contacts by link", "Contacts by hour", "Calibration drift"):
         assert f"<h2>{heading}</h2>" in page
     assert "http" not in page.replace("http-equiv", "") and "<script" not in page
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("width", WIDTHS)
+def test_axe_finds_nothing_serious_on_the_page(browser, out, width, scheme):
+    need_axe()
+    look(browser, width, scheme)
+    browser.open((out / "fleet.html").as_uri())
+    assert serious(browser) == []
 
 
 def test_tables_are_no_recordings(out):

@@ -1,19 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The report can be read by all: axe-core finds nothing serious, and x, y, z have their colours."""
 
-import json
-import os
-from pathlib import Path
-
 import pytest
+from accessible import SCHEMES, WIDTHS, look, need_axe, serious
 from browser import until
 
 from touchline.report.plots import axis_class
-
-AXE = Path(__file__).parents[2] / ".venv/npm/node_modules/axe-core/axe.min.js"
-RUN = """axe.run().then((r) => JSON.stringify(r.violations
-  .filter((v) => ["serious", "critical"].includes(v.impact))
-  .map((v) => [v.id, v.nodes.length, v.nodes[0].html])))"""
 
 # Those that the script has drawn, as the page's events come near the window only by scrolling.
 PLOTS = """[...document.querySelectorAll(".plot")]
@@ -26,25 +18,14 @@ DRAWN = (
 )
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [390, 1360])
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("width", WIDTHS)
 def test_axe_finds_nothing_serious(browser, analysis, width, scheme):
-    if not AXE.is_file():
-        assert not os.environ.get("CI"), f"{AXE}: no such file; scripts/setup.sh installs it"
-        pytest.skip("axe-core is not installed: scripts/setup.sh does, where there is npm")
-    browser.resize(width, 900)
-    feature = {"name": "prefers-color-scheme", "value": scheme}
-    browser.call("Emulation.setEmulatedMedia", features=[feature])
-    try:
-        browser.open((analysis.out / "report.html").as_uri())
-        assert browser.run("document.documentElement.scrollWidth <= innerWidth")
-        assert browser.run(f"matchMedia('(prefers-color-scheme: {scheme})').matches")
-        browser.call("Runtime.evaluate", expression=AXE.read_text())
-        told = {"awaitPromise": True, "returnByValue": True}
-        found = browser.call("Runtime.evaluate", expression=RUN, **told)["result"]["value"]
-        assert json.loads(found) == []
-    finally:
-        browser.call("Emulation.setEmulatedMedia", features=[])
+    need_axe()
+    look(browser, width, scheme)
+    browser.open((analysis.out / "report.html").as_uri())
+    assert browser.run(f"matchMedia('(prefers-color-scheme: {scheme})').matches")
+    assert serious(browser) == []
 
 
 def test_a_curve_has_the_colour_of_its_key(browser, analysis):

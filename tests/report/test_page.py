@@ -100,5 +100,5 @@ def test_a_page_without_room_says_what_was_left_out(analysis, monkeypatch):
 def test_plots_are_there_without_the_script(analysis, page):
     static = re.sub(r"<script.*?</script>", "", page, flags=re.S)
     drawn = re.findall(r'<path class="curve s\d[^"]*" d="M[^"]+"', static)
-    panels = analysis.curves.panels + analysis.curves.event_panels("base")
+    panels = analysis.curves.on_page() + analysis.curves.event_panels("base")
     assert len(drawn) == sum(len(panel.curves) for panel in panels)

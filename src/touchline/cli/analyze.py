@@ -20,6 +20,7 @@ def analyze(
     report: Literal["full", "summary", "none"] = "full",
     friction: Annotated[float | None, arg(metavar="MU")] = None,
     reach: Annotated[float | None, arg(metavar="M")] = None,
+    beside: Annotated[Path | None, arg(metavar="RESULTS")] = None,
     rerun: Annotated[Path | None, arg(metavar="FILE")] = None,
     foxglove: Annotated[Path | None, arg(metavar="FILE")] = None,
     dry_run: bool = False,
@@ -63,6 +64,8 @@ def analyze(
         report: full; summary: without pictures and curves of each event; none: no report.html.
         friction: Coefficient of friction of what touches. Default: as described (`pushes`).
         reach: Free space that a push needs: length of a finger or tool [m]. Default: as described.
+        beside: Results of another run or method: the report shows their curves, dashed, and events
+            on the same time line. Of one recording.
         rerun: Also a file for Rerun (.rrd): arm, contacts, curves, events. Of one recording.
         foxglove: The same for Foxglove (.mcap).
         dry_run: Print what would be done: files, hours, bytes, about how long, what is skipped.
@@ -85,7 +88,11 @@ def analyze(
     if is_single(logs):
         if robot is None:
             raise InputError(f"--robot: {logs[0]}: name the robot of this recording")
-        return _one(Path(logs[0]), robot, out, options, Viewers(rerun, foxglove))
+        return _one(
+            Path(logs[0]), robot, out, options | {"beside": beside}, Viewers(rerun, foxglove)
+        )
+    if beside is not None:
+        raise InputError("--beside: of one recording; analyze that one alone")
     if rerun is not None or foxglove is not None:
         raise InputError("--rerun, --foxglove: of one recording; analyze that one alone")
     from touchline.fleet.run import Limits

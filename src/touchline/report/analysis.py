@@ -23,6 +23,7 @@ from touchline.observer.bandwidths import bandwidth_warnings, bandwidths
 from touchline.observer.observer import METHODS
 from touchline.observer.samples import Samples
 from touchline.pipeline.pipeline import Pipeline
+from touchline.report.beside import Beside
 from touchline.report.comparison import Comparison, compare_log
 from touchline.report.curves import Curves
 from touchline.report.event_pictures import EventPoses
@@ -111,6 +112,7 @@ def analyze(
     origin: str | None = None,
     friction: float | None = None,
     reach: float | None = None,
+    beside: Path | str | None = None,
 ) -> Analysis:
     """Analyze a recording; writes estimates, contacts, events and the report into a directory.
 
@@ -125,6 +127,7 @@ def analyze(
         origin: where the recording really is, if `log` is a copy for a while.
         friction: coefficient of friction of what touches; default: the description's `pushes`.
         reach: free space that a push needs [m]; default: the description's `pushes`.
+        beside: results of another run or method, shown in the report on the same time line.
 
     Raises:
         InputError: an input cannot be used, or another process writes into the directory.
@@ -137,6 +140,7 @@ def analyze(
     log, out, source = Path(log), Path(out), robot.name if isinstance(robot, Robot) else robot
     model = with_pushes(robot if isinstance(robot, Robot) else load_robot(robot), friction, reach)
     check_inputs(out, log, Path(source))
+    other = None if beside is None else Beside(Path(beside))
     with open_log(log, model.description) as recording:
         parts = recording.chunks(CHUNK)
         first = next(parts, None)
@@ -144,7 +148,7 @@ def analyze(
             raise InputError(f"{log}: holds no samples")
         with ResultsFolder(out, NAMES) as folder:
             period = sample_period(recording, first.time)
-            run = _Run(Pipeline(model, bandwidth, method, period), folder.draft, period)
+            run = _Run(Pipeline(model, bandwidth, method, period), folder.draft, period, other)
             glanced = Glance()
             for part in _with_progress(recording, chain([first], parts)):
                 glanced.add(part, run.add(part))
@@ -226,12 +230,14 @@ def check_options(
 class _Run:
     """One recording on its way through the pipeline, a part at a time."""
 
-    def __init__(self, pipeline: Pipeline, draft: Path, period: float) -> None:
+    def __init__(
+        self, pipeline: Pipeline, draft: Path, period: float, beside: Beside | None
+    ) -> None:
         self.pipeline, self.period = pipeline, period
         robot = pipeline.robot
         self._outputs = Outputs(draft, robot, pipeline.skin)
         self.statistics = Statistics.of(len(robot.joint_names), len(robot.segment_names))
-        self._curves = Curves(pipeline, self.period)
+        self._curves = Curves(pipeline, self.period, beside)
         self._poses = EventPoses()
         columns = {
             name: [c.column for p in self._curves.event_panels(name) for c in p.curves]
@@ -244,7 +250,7 @@ class _Run:
         time = part.time
         estimate, detection = self.pipeline.run(time, part.q, part.qd, part.tau, part.wrench)
         self.statistics.add(time, estimate, detection, self.pipeline.watch)
-        values = self._curves.values(estimate, detection)
+        values = self._curves.values(part, estimate, detection)
         self._curves.traces.add(time, values)
         events = self.pipeline.events
         self._windows.add(time, values, events)
@@ -269,6 +275,7 @@ class _Run:
         """Close the files; returns what there is to tell."""
         events = self.pipeline.events
         self._outputs.finish(events)
+        self._curves.add_beside(self.statistics.clock.last)
         comparisons, robot = compare_log(events, log), self.pipeline.robot
         touched = bool(events or comparisons)
         able = {one.link: one for one in felt(robot, self.period)} if touched else {}

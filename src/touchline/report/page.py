@@ -11,6 +11,7 @@ import numpy as np
 
 from touchline import __version__
 from touchline.report.analysis import Analysis
+from touchline.report.beside import Beside
 from touchline.report.comparison import HEAD, cells, verdict
 from touchline.report.curves import Panel
 from touchline.report.event_figures import figures
@@ -26,6 +27,7 @@ MOST_EVENTS, MOST_SHADED = 1000, 5000
 MOST_BYTES = 4_850_000  # of the page
 STEPS = 32767
 DRAWN = 400  # pieces of time of a plot without the script
+BESIDE = "beside"  # the row of events of other results
 PLOT = (1030, 120)  # pixels
 HELP = (
     "Each point of a curve spans the least and the largest value of its piece of time. Drag over "
@@ -113,8 +115,13 @@ def _warnings(analysis: Analysis) -> str:
 
 def _events(analysis: Analysis, pictured: set[int]) -> str:
     events = analysis.events
+    strip = (
+        '<div class="plot screen" data-strip><svg role="img" viewBox="0 0 1030 60" '
+        'aria-label="events over time"></svg></div>'
+    )
     if not events:
-        return section("Events", "<p>None.</p>")
+        others = analysis.curves.beside is not None and analysis.curves.beside.events
+        return section("Events", strip if others else "", "<p>None.</p>")
     head = ["", "detected [s]", "lasted [s]", "level", "segment", "force [N]", "torque [Nm]"]
     rows = [_event_row(e, analysis.origin, e.id in pictured) for e in events[:MOST_EVENTS]]
     marks = [f' data-event="{i}"' for i in range(len(rows))]
@@ -122,10 +129,6 @@ def _events(analysis: Analysis, pictured: set[int]) -> str:
     words = "Peaks of force and of the torque on the named joint. A click shows the event."
     if hidden > 0:
         words += f" {hidden} more are in events.json."
-    strip = (
-        '<div class="plot screen" data-strip><svg role="img" viewBox="0 0 1030 60" '
-        'aria-label="events over time"></svg></div>'
-    )
     return section("Events", strip, table([*head, "where", "located"], rows, marks), note(words))
 
 
@@ -162,7 +165,7 @@ def _event_row(event: Event, origin: float, pictured: bool) -> list[Any]:
 
 
 def _plots(analysis: Analysis) -> str:
-    panels = list(enumerate(analysis.curves.panels))
+    panels = list(enumerate(analysis.curves.on_page()))
     panels.sort(key=lambda pair: pair[1].kind != "test")  # the tests tell most, so they come first
     tools = (
         '<div class="tools"><button id="reset">whole recording</button><span id="shown"></span>'
@@ -173,8 +176,23 @@ def _plots(analysis: Analysis) -> str:
     words = (
         f"{HELP} The band is the slow baseline with the contact threshold on either side.{since}"
     )
-    drawn = "".join(_panel_plot(analysis, panel, index) for index, panel in panels)
-    return section("The whole recording", note(words), tools, drawn, anchor="plots")
+    words += _beside_words(analysis)
+    drawn = [(p.kind, _panel_plot(analysis, p, index)) for index, p in panels]
+    logged = "".join(text for kind, text in drawn if kind == "signal")
+    felt = "".join(text for kind, text in drawn if kind != "signal")
+    parts = [note(words), tools, felt, "<h3>As logged</h3>", logged]
+    return section("The whole recording", *parts, anchor="plots")
+
+
+def _beside_words(analysis: Analysis) -> str:
+    beside = analysis.curves.beside
+    if beside is None:
+        return ""
+    name = escape(beside.name)
+    words = f" Dashed curves, and the events in the row beside, are those of {name}."
+    if beside.shift:
+        words += f" {name} is shifted by {beside.shift:.3f} s: both begin together."
+    return words
 
 
 def _panel_plot(analysis: Analysis, panel: Panel, index: int) -> str:
@@ -268,8 +286,8 @@ def _data(analysis: Analysis) -> dict[str, Any]:
         "period": analysis.period,
         "count": used,
         "curves": [_packed(traces.low[:used, i], traces.high[:used, i]) for i in columns],
-        "panels": [_panel_data(panel) for panel in analysis.curves.panels],
-        "segments": list(analysis.robot.segment_names),
+        "panels": [_panel_data(panel) for panel in analysis.curves.on_page()],
+        "segments": [*analysis.robot.segment_names, *([BESIDE] if analysis.curves.beside else [])],
         "events": [
             {
                 "id": event.id,
@@ -281,8 +299,33 @@ def _data(analysis: Analysis) -> dict[str, Any]:
                 "title": f"{event.id}: {event.level}, {event_where(event) or event.segment}",
             }
             for event, last, lane in zip(events, ends, lanes(bars), strict=True)
-        ],
+        ]
+        + _beside_events(analysis.curves.beside, start, end),
     }
+
+
+def _beside_events(beside: Beside | None, start: float, end: float) -> list[dict[str, Any]]:
+    """Events of other results, in a row of their own."""
+    if beside is None:
+        return []
+    events = beside.events[:MOST_SHADED]
+    begins = [event["detected"] + beside.shift for event in events]
+    cleared = [event["cleared"] for event in events]
+    ends = [end if at is None else at + beside.shift for at in cleared]
+    bars = [(BESIDE, begin, last) for begin, last in zip(begins, ends, strict=True)]
+    return [
+        {
+            "id": event["id"],
+            "segment": BESIDE,
+            "beside": True,
+            "level": event["level"],
+            "from": begin - start,
+            "to": last - start,
+            "lane": lane,
+            "title": f"{beside.name}, {event['id']}: {event['level']}, {event['segment']}",
+        }
+        for event, (_, begin, last), lane in zip(events, bars, lanes(bars), strict=True)
+    ]
 
 
 def _panel_data(panel: Panel) -> dict[str, Any]:

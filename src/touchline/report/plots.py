@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.report.curves import Panel
+from touchline.report.curves import Curve, Panel
 
 Array = NDArray[np.floating[Any]]
 
@@ -92,7 +92,7 @@ def plot(
     width, height = size
     inner = (width - LEFT - RIGHT, height - TOP - BOTTOM)
     pieces = max([len(low) for low, _ in curves] + [1])
-    axes = [axis_class(curve.name) for curve in panel.curves]
+    axes = [curve_class(curve) for curve in panel.curves]
     paths = "".join(
         f'<path class="curve s{i}{axis}" d="{curve_path(low, high, least, largest, join)}"/>'
         for i, ((low, high), axis) in enumerate(zip(curves, axes, strict=True))
@@ -115,6 +115,11 @@ def plot(
         f'<svg x="{LEFT}" y="{TOP}" width="{inner[0]}" height="{inner[1]}" '
         f'viewBox="-0.5 0 {pieces} {STEPS}" preserveAspectRatio="none">{paths}</svg></svg></div>'
     )
+
+
+def curve_class(curve: Curve) -> str:
+    """The classes, after spaces, of its axis and of curves of other results, which are dashed."""
+    return axis_class(curve.name.split(",")[0]) + (" beside" if curve.beside else "")
 
 
 def axis_class(name: str) -> str:

@@ -194,7 +194,7 @@
     axis(svg, frame);
     scale(svg, frame, low, high);
     for (const event of data.events)
-      if (panel.segment === null || event.segment === panel.segment)
+      if (!event.beside && (panel.segment === null || event.segment === panel.segment))
         shade(svg, frame, event, TOP, frame.height - TOP - BOTTOM, "");
     const clipped = clipTo(svg, frame);
     if (panel.band !== null)
@@ -349,7 +349,8 @@
       recording.show(Number(times[1]) - clock(0), Number(times[2]) - clock(0));
       document.getElementById("plots").scrollIntoView();
     } else if (number) {
-      const index = data.events.findIndex((event) => event.id === Number(number[1]));
+      const index = data.events.findIndex((event) =>
+        event.id === Number(number[1]) && !event.beside);
       if (index >= 0) goTo({ dataset: { event: index } });
     }
   };
