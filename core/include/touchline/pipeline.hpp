@@ -52,7 +52,8 @@ class Pipeline {
 
   // Takes N samples, whose signals stand one after the other in each array, and calls
   // `each(Result)` after each. `rows` has room for N rows of the observer. The numbers are those of
-  // `update`, to the last bit, in whatever parts the samples come.
+  // `update`, to the last bit, in whatever parts the samples come. Stops after a sample for which
+  // `each` returns false, if it returns anything.
   template <class Each>
   void run(std::size_t samples, const double* time, const Sample& first, double* rows, Each&& each) {
     const std::size_t n = robot_.joints.size(), w = 6 * robot_.sensors.size();
@@ -62,7 +63,7 @@ class Pipeline {
                     const Sample sample{time[i], first.q + i * n, first.qd + i * n,
                                         first.tau + i * n, first.wrench + i * w};
                     ++i;
-                    each(follow(sample, row));
+                    return each(follow(sample, row));
                   });
   }
 

@@ -5,7 +5,8 @@
 // words of the whole robot. One belongs to one thread at a time; `update` allocates nothing.
 //
 // Before anything is estimated, each channel is judged (detail/gates): a faulty one is held or left
-// out, told in `Result::faults`, and has no part in what is estimated.
+// out, told in `Result::faults`, and has no part in what is estimated. So is one that the others
+// contradict in what the whole robot makes of a sample, from the next sample on, for a while.
 //
 // A stand-in is warmed up from the first sample without the sensor on, and speaks as soon as it has
 // settled, 5 / K later; the whole robot speaks again 5 / K after the sensor is back. What stands on
@@ -21,6 +22,7 @@
 #include <vector>
 
 #include "touchline/detail/gates/channel_gates.hpp"
+#include "touchline/detail/gates/parity_watch.hpp"
 #include "touchline/pipeline.hpp"
 
 namespace touchline {
@@ -38,7 +40,9 @@ struct StandIn {
 class RedundantPipeline {
  public:
   explicit RedundantPipeline(Robot robot, const Tuning& tuning = {})
-      : whole_(std::move(robot), tuning), gates_(whole_.robot()) {
+      : whole_(std::move(robot), tuning),
+        gates_(whole_.robot()),
+        parity_(whole_.robot(), whole_.observer()) {
     const Robot& own = whole_.robot();
     const std::size_t n = own.joints.size(), k = own.sensors.size();
     absent_.resize(k, 0);
@@ -55,6 +59,9 @@ class RedundantPipeline {
     joints_ = n;
     sound_.resize(gates_.layout().count(), Fault::none);
     ratios_.resize(kAhead * sound_.size());
+    until_.resize(sound_.size(), -kAbsurd);
+    faults_ = sound_;
+    left_.resize(sound_.size());
   }
 
   // Allocates. Throws std::invalid_argument where it does not fit the robot.
@@ -81,7 +88,7 @@ class RedundantPipeline {
   template <class Lacking>
   Result update(const Sample& sample, Lacking&& lacking) {
     const Sample believed = gates_.judge(sample);
-    return take(believed, lacking);
+    return take(believed, gates_.faults(), gates_.ratios().data(), lacking);
   }
 
   // Takes N samples; see `Pipeline::run`. The bits are those of `update`.
@@ -113,14 +120,21 @@ class RedundantPipeline {
       if (end > i) {
         const double* ratios = ratios_.data();
         whole_.run(end - i, time + i, at(i), rows + i * width, [&](const Result& result) {
+          watch_parity(result, time[i]);
           each(with_faults(result, sound_, ratios));
           ratios += sound_.size();
+          ++i;
+          return !contradicted_;
         });
-        i = end;
+        for (; i < end; ++i, ratios += sound_.size()) {  // judged, but not taken any more
+          const Result result = take(at(i), sound_, ratios, lacking);
+          std::copy(result.estimate.row().begin(), result.estimate.row().end(), rows + i * width);
+          each(result);
+        }
         if (!judged) continue;
       }
       if (!judged) believed = gates_.judge(at(i));
-      const Result result = take(believed, lacking);
+      const Result result = take(believed, gates_.faults(), gates_.ratios().data(), lacking);
       std::copy(result.estimate.row().begin(), result.estimate.row().end(), rows + i * width);
       each(result);
       ++i;
@@ -157,9 +171,11 @@ class RedundantPipeline {
  private:
   static constexpr std::size_t kAhead = 64;  // samples that are judged before they are taken
 
-  // A sample of which `believed` is left.
+  // A sample of which the gates believe `judged`.
   template <class Lacking>
-  Result take(const Sample& believed, Lacking& lacking) {
+  Result take(const Sample& judged, const std::vector<Fault>& faults, const double* ratios,
+              Lacking& lacking) {
+    const Sample believed = contradicted_ ? without_contradicted(judged) : judged;
     find_absent(believed);
     if (any_absent_) {
       lost_.clear();
@@ -167,17 +183,60 @@ class RedundantPipeline {
         if (absent_[s] != 0) lost_.push_back(static_cast<int>(s));
       if (!stands_in(lost_)) lacking(lost_);
     }
-    const Result result = healthy() ? whole_.update(believed) : step(believed);
-    return with_faults(result, gates_.faults(), gates_.ratios().data());
+    const bool whole = healthy();
+    const Result result = whole ? whole_.update(believed) : step(believed);
+    if (whole) watch_parity(result, believed.time);
+    else parity_.forget();
+    return with_faults(result, faults, ratios);
   }
 
-  Result with_faults(Result result, const std::vector<Fault>& faults, const double* ratios) const {
+  // Is what the whole robot made of a sample contradictory? Then from the next sample on some
+  // channel counts no more.
+  void watch_parity(const Result& result, double time) {
+    parity_.step(result, time, [&](std::size_t channel) {
+      until_[channel] = time + kContradicted;
+      contradicted_ = true;
+    });
+  }
+
+  // What is left of a sample without the channels that others contradict. One whose time is over
+  // counts again: what it has been wrong by is an offset that the whole robot begins with.
+  Sample without_contradicted(const Sample& sample) {
+    const ChannelLayout& at = gates_.layout();
+    const std::size_t n = at.joints, w = 6 * at.sensors;
+    std::copy_n(sample.q, n, left_.data() + at.q());
+    std::copy_n(sample.qd, n, left_.data() + at.qd());
+    std::copy_n(sample.tau, n, left_.data() + at.tau());
+    std::copy_n(sample.wrench, w, left_.data() + at.wrench());
+    contradicted_ = false;
+    for (std::size_t c = at.tau(); c < at.count(); ++c) {
+      if (sample.time >= until_[c]) until_[c] = -kAbsurd;
+      if (!(until_[c] > -kAbsurd)) continue;
+      left_[c] = kUnknown;
+      contradicted_ = true;
+    }
+    return {sample.time, left_.data() + at.q(), left_.data() + at.qd(), left_.data() + at.tau(),
+            left_.data() + at.wrench()};
+  }
+
+  Result with_faults(Result result, const std::vector<Fault>& faults, const double* ratios) {
     const bool faulty = &faults != &sound_ && !gates_.all_sound();
     if (faulty) result.health |= kFaulty | gates_.absent();
-    result.faults = {faults.data(), faults.size()};
-    result.ratios = {ratios, faults.size()};
+    const std::vector<Fault>* told = &faults;
+    if (contradicted_) {
+      result.health |= kFaulty;
+      faults_ = faults;
+      for (std::size_t c = 0; c < faults_.size(); ++c) {
+        if (faults_[c] == Fault::none && until_[c] > -kAbsurd) faults_[c] = Fault::disagrees;
+      }
+      told = &faults_;
+    }
+    result.faults = {told->data(), told->size()};
+    result.ratios = {ratios, told->size()};
     return result;
   }
+
+  static constexpr double kContradicted = 2.0;  // [s] for which one that others contradict is out
 
   static constexpr double kContinues = 0.05;  // [s] in which the next one feels what lasts, or not
 
@@ -290,8 +349,8 @@ class RedundantPipeline {
 
   // Does the whole robot speak for itself, with all sensors and its own numbers of events?
   bool healthy() const {
-    return now_ == nullptr && warming_ == nullptr && !any_absent_ && renumbered_.empty() &&
-           waiting_.empty();
+    return now_ == nullptr && warming_ == nullptr && !any_absent_ && !contradicted_ &&
+           renumbered_.empty() && waiting_.empty();
   }
 
   // Is a six-axis sensor without a usable reading?
@@ -542,6 +601,10 @@ class RedundantPipeline {
 
   Pipeline whole_;
   ChannelGates gates_;
+  ParityWatch parity_;
+  std::vector<double> until_, left_;  // per channel: when it counts again [s]; what is left of it
+  std::vector<Fault> faults_;         // of gates and parity together
+  bool contradicted_ = false;         // does any channel count no more?
   std::vector<Fault> sound_;    // of channels that are all believed
   std::vector<double> ratios_;  // (kAhead, channels)
   std::vector<std::unique_ptr<Second>> stand_ins_;

@@ -52,5 +52,5 @@ class Fault(StrEnum):
     STEP = "step"  # a new level that a sensor inboard would have to feel too, and does not
     WILD = "wild"  # such jumps that go on
     STUCK = "stuck"  # the same value again and again while the arm moves
-    DISAGREES = "disagrees"  # position or velocity: one is not the derivative of the other
+    DISAGREES = "disagrees"  # no derivative of its position, or a load that others contradict
     ABSENT = "absent"  # position or velocity: not there, the other one stands in for it

@@ -94,8 +94,8 @@ def _reachable(robot: Robot, free: Samples, rng: np.random.Generator) -> Surface
     """A point that a finger reaches from outside in all postures of the push."""
     surface = TouchableSurface(robot)
     poses = [
-        robot.T_world_links(free.q[np.searchsorted(free.time, time)])
-        for time in np.linspace(PUSHED, RELEASED, 6)
+        robot.T_world_links(q)
+        for q in free.q[(free.time >= PUSHED) & (free.time <= RELEASED)][:: max(1, len(free) // 25)]
     ]
     for _ in range(DRAWS):
         at = surface.draw(rng, structure_links(robot)[-OUTBOARD:])

@@ -179,5 +179,8 @@ not the touched one, and is not what the healthy recording says either.
 ```
 
 What a layout cannot tell, `touchline check ROBOT` lists as its parity space. Scale, delay, bias and
-drift of one channel are not judged yet: they are told only where they make it jump or stand still.
+drift of one channel are told where they make it jump or stand still. So are those of one axis of a
+sensor that has another one inboard, which does not feel it. A force at the innermost sensor alone
+is not told: it may be a push on the link that carries it. Nor is a joint torque: a hand may pinch
+the joint.
 """

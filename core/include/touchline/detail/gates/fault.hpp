@@ -15,7 +15,9 @@ enum class Fault : std::uint8_t {
   step,      // such a jump to a level that stays, and a sensor that must feel it feels nothing
   wild,      // such jumps that go on
   stuck,     // the same value again and again while the arm moves
-  disagrees,  // position or velocity of a joint: one is not the derivative of the other
+  // Position or velocity of a joint: one is not the derivative of the other. Axis of a sensor:
+  // what it shows, another one that would have to feel it too does not.
+  disagrees,
   absent      // position or velocity of a joint: not there, the other one stands in for it
 };
 

@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -76,7 +77,8 @@ class Observer {
   }
 
   // Takes N samples, whose signals stand one after the other in each array; writes N rows and
-  // calls `each(row)` after each. The numbers are those of `step`, to the last bit.
+  // calls `each(row)` after each. The numbers are those of `step`, to the last bit. Stops after a
+  // sample for which `each` returns false, if it returns anything.
   template <class Each>
   void run(std::size_t samples, const double* time, const double* q, const double* qd,
            const double* tau, const double* wrench, double* out, Each&& each) {
@@ -87,9 +89,9 @@ class Observer {
       const std::size_t k = i % kLanes;
       if (k == 0) look_ahead(samples - i, q + i * n, qd + i * n);
       advance({time[i], q + i * n, qd + i * n, tau + i * n, wrench + i * w}, ahead_[k], last, out);
-      each(static_cast<const double*>(out));
       last = out;
       out += width;
+      if (!goes_on(each, last)) break;
     }
     if (samples > 0) std::copy_n(last, width, output_.begin());
   }
@@ -141,6 +143,15 @@ class Observer {
   Terms<double>& terms() { return terms_; }
 
  private:
+  template <class Each>
+  static bool goes_on(Each& each, const double* row) {
+    if constexpr (std::is_void_v<decltype(each(row))>) {
+      each(row);
+      return true;
+    } else {
+      return each(row);
+    }
+  }
   template <class T>
   static int count(const std::vector<T>& v) {
     return static_cast<int>(v.size());

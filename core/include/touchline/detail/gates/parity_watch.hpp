@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+// Does one finite axis of a force-torque sensor contradict the others? A contact loads everything
+// inboard of it: these relations hold whatever is wrong with the model of the links.
+//
+// A sensor and the next one inboard. What a contact puts on the outer one, the inner one feels too,
+// so that the segment between them feels nothing of it. Where that segment feels the exact opposite,
+// the inner sensor feels nothing. Two contacts that squeeze the arm between them do that as well, but
+// not along one axis of the sensor without a moment about its origin: only that counts.
+//
+// A torque at the innermost sensor without a force is no touch: no link is as far away.
+//
+// What two quantities alone tell is not judged: a force at the innermost sensor that no joint feels
+// may be a push on the link that carries it, and a torque of one joint a hand that pinches it.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include "touchline/detail/gates/fault.hpp"
+#include "touchline/detail/observer/observer.hpp"
+#include "touchline/result.hpp"
+#include "touchline/robot.hpp"
+
+namespace touchline {
+
+class ParityWatch {
+ public:
+  // Of a robot whose parts fit.
+  ParityWatch(const Robot& robot, const Observer& observer)
+      : at_{robot.joints.size(), robot.sensors.size()},
+        observer_(observer),
+        rows_(robot.rows),
+        period_(std::max(robot.noise.period, kShortest)),
+        since_(at_.count(), 0.0) {
+    const Layout& layout = observer.layout();
+    first_.assign(layout.segments.size(), -1);
+    for (std::size_t i = 0; i + 6 <= rows_.size(); ++i) {
+      const int g = rows_[i].segment;
+      if (rows_[i].component == 0 && layout.segments[g].sensor >= 0) first_[g] = static_cast<int>(i);
+    }
+    for (std::size_t g = 0; g < layout.segments.size(); ++g) {
+      const int inner = layout.segments[g].sensor;
+      if (inner < 0 || first_[g] < 0) continue;
+      innermost_.push_back(static_cast<int>(g));
+      for (const int t : layout.segments[g].successors) {
+        const int own = layout.segment_of_sensor[t];
+        if (first_[own] >= 0) pairs_.push_back({static_cast<int>(g), own});
+      }
+    }
+    for (const Pair& pair : pairs_)
+      innermost_.erase(std::remove(innermost_.begin(), innermost_.end(), pair.outer),
+                       innermost_.end());
+  }
+
+  // Takes what the whole robot says of a sample at `time` [s]. Calls `contradicted(channel)` for each
+  // that the others contradict.
+  template <class Contradicted>
+  void step(const Result& result, double time, Contradicted&& contradicted) {
+    const double dt = time - time_;
+    time_ = time;
+    const bool goes_on = dt > 0.0 && dt < kGapPeriods * period_;
+    if (!goes_on || (result.health & kSettling) != 0) return begin_anew();
+    for (const Pair& pair : pairs_) compare(pair, result, dt, contradicted);
+    for (const int g : innermost_) compare_couple(g, result, dt, contradicted);
+  }
+
+  // What was suspected counts no more: samples are missing.
+  void forget() {
+    begin_anew();
+    time_ = std::numeric_limits<double>::quiet_NaN();
+  }
+
+ private:
+  static constexpr double kShortest = 1e-6;   // [s] of a period
+  static constexpr double kGapPeriods = 5.0;  // a longer step in time begins anew
+  static constexpr double kDwell = 0.003;     // [s] for which a relation is broken,
+  static constexpr double kLeastDwell = 3.0;  // and so many samples
+  static constexpr double kClear = 1.2;       // thresholds of a contact: so much must be wrong,
+  static constexpr double kLeft = 0.3;       // of which the other one leaves so much at most,
+  static constexpr double kNoise = 0.4;       // and so many thresholds of its own
+  static constexpr double kAlone = 0.2;       // of a sensor's load: what another axis may have
+  static constexpr double kReach = 2.0;       // [m] farther from a sensor no link is
+
+  struct Pair {
+    int inner, outer;  // segments
+  };
+
+  void begin_anew() { std::fill(since_.begin(), since_.end(), 0.0); }
+
+  // Has a relation been broken for long enough?
+  bool broken(std::size_t channel, bool now, double dt) {
+    since_[channel] = now ? since_[channel] + dt : 0.0;
+    if (since_[channel] < std::max(kDwell, (kLeastDwell - 0.5) * period_)) return false;
+    since_[channel] = 0.0;
+    return true;
+  }
+
+  // The load of a segment since its baseline, in its sensor's frame [N, Nm].
+  Spatial load_of(int segment, const Result& result) const {
+    double w[6];
+    for (int i = 0; i < 6; ++i) {
+      const int row = first_[segment] + i;
+      w[i] = result.normalized[row] * rows_[row].contact;
+    }
+    return load(w);
+  }
+
+  template <class Contradicted>
+  void compare(const Pair& pair, const Result& result, double dt, Contradicted&& contradicted) {
+    const Layout& layout = observer_.layout();
+    const int inner = layout.segments[pair.inner].sensor, outer = layout.segments[pair.outer].sensor;
+    const std::size_t first = at_.wrench() + 6 * static_cast<std::size_t>(outer);
+    const double* own = result.normalized.data() + first_[pair.outer];
+    const double* between = result.normalized.data() + first_[pair.inner];
+    double most = 0.0, felt = 0.0;
+    for (int i = 0; i < 6; ++i) {
+      most = std::max(most, std::fabs(own[i]));
+      felt = std::max(felt, std::fabs(between[i]));
+    }
+    bool now = most > 1.0 && felt > kNoise && result.estimate.segment_settled(pair.inner) &&
+               result.estimate.segment_settled(pair.outer);
+    if (now) {
+      double seen[6];
+      store(wrench_to_child(observer_.sensor_pose(inner),
+                            wrench_to_parent(observer_.sensor_pose(outer),
+                                             load_of(pair.outer, result))),
+            seen);
+      double size2 = 0.0, left2 = 0.0;
+      for (int i = 0; i < 6; ++i) {
+        const double x = seen[i] / rows_[first_[pair.inner] + i].contact, left = x + between[i];
+        size2 += x * x;
+        left2 += left * left;
+      }
+      now = size2 > kClear * kClear &&
+            left2 < std::max(kLeft * kLeft * size2, kNoise * kNoise);
+    }
+    const int axis = now ? only_axis(outer, own) : -1;
+    if (broken(first, axis >= 0, dt)) contradicted(first + axis);
+  }
+
+  // The only axis along which a sensor shows anything; -1: there are several. `shown`: in thresholds.
+  int only_axis(int sensor, const double* shown) const {
+    if (observer_.sensors()[sensor].turned) return -1;
+    int most = 0;
+    for (int i = 1; i < 6; ++i)
+      if (std::fabs(shown[i]) > std::fabs(shown[most])) most = i;
+    const double little = std::max(kNoise, kAlone * std::fabs(shown[most]));
+    for (int i = 0; i < 6; ++i)
+      if (i != most && std::fabs(shown[i]) > little) return -1;
+    return most;
+  }
+
+  // A torque at the innermost sensor with a force so small that it would act beyond reach.
+  template <class Contradicted>
+  void compare_couple(int g, const Result& result, double dt, Contradicted&& contradicted) {
+    const double* x = result.normalized.data() + first_[g];
+    bool now = result.estimate.segment_settled(g) &&
+               std::max({std::fabs(x[3]), std::fabs(x[4]), std::fabs(x[5])}) > kClear;
+    if (now) {
+      const Spatial w = load_of(g, result);
+      double unsure = 0.0;  // of its force [N]
+      for (int i = 0; i < 3; ++i) unsure = std::max(unsure, kNoise * rows_[first_[g] + i].contact);
+      now = norm(w.angular) > kReach * (norm(w.linear) + unsure);
+    }
+    const int sensor = observer_.layout().segments[g].sensor;
+    const std::size_t first = at_.wrench() + 6 * static_cast<std::size_t>(sensor);
+    const int axis = now ? only_axis(sensor, x) : -1;
+    if (broken(first, axis >= 0, dt)) contradicted(first + axis);
+  }
+
+  ChannelLayout at_;
+  const Observer& observer_;
+  std::vector<DetectionRow> rows_;
+  double period_;
+  std::vector<int> first_;  // per segment: its first row of six of a wrench; -1: none
+  std::vector<Pair> pairs_;
+  std::vector<int> innermost_;  // segments whose sensor has none inboard
+  std::vector<double> since_;  // per channel: for how long its relation has been broken [s]
+  double time_ = std::numeric_limits<double>::quiet_NaN();
+};
+
+}  // namespace touchline

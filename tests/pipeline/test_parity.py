@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One finite wrong signal that the others contradict is named and left out; touches are not."""
+
+import numpy as np
+import pytest
+
+import touchline as tl
+from touchline.bench.reliability.faults import channels_of
+from touchline.bench.reliability.recordings import record
+from touchline.result.kinds import Fault
+from touchline.simulation.contacts import Profile, ScriptedContact
+from touchline.simulation.noise import SensorNoise
+from touchline.simulation.scenario import scripted
+from touchline.simulation.scene import Run
+
+BEGIN = 0.6  # s
+RAMP = 40.0  # N/s: no step that a gate would see
+
+
+@pytest.fixture(scope="module")
+def arm():
+    robot = tl.load_robot("sara-full")
+    return robot, tl.Pipeline(robot), record(robot, 1, pushed=False, seconds=1.2).samples
+
+
+def drifting(robot, samples, name):
+    """A copy whose channel drifts from BEGIN on."""
+    channel = next(c for c in channels_of(robot) if c.name == name)
+    values = {k: getattr(samples, k).copy() for k in ("time", "q", "qd", "tau", "wrench")}
+    copy = type(samples)(**values, row=0)
+    channel.of(copy)[:] += RAMP * np.maximum(samples.time - BEGIN, 0.0)
+    return copy
+
+
+def heard(pipeline, s):
+    pipeline.reset()
+    before = len(pipeline.events)
+    estimate, _ = pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+    told = [f for f in pipeline.faults if f.fault != Fault.NONE]
+    return estimate, told, pipeline.events[before:]
+
+
+@pytest.mark.parametrize("name", ["wrist.fx", "wrist.fy", "handle.fz"])
+def test_a_channel_that_wanders_is_named_and_never_a_collision(arm, name):
+    robot, pipeline, samples = arm
+    wrong = drifting(robot, samples, name)
+    _, told, events = heard(pipeline, wrong)
+    assert [f.channel for f in told][:1] == [name]
+    assert told[0].fault == Fault.DISAGREES
+    assert wrong.time[told[0].sample] - BEGIN < 0.2
+    assert not [e for e in events if e.level == "collision"]
+
+
+@pytest.mark.parametrize("link", ["link3", "link5", "tool", "handle"])
+def test_a_push_contradicts_nothing(arm, link):
+    robot, pipeline, _ = arm
+    profile = Profile(BEGIN, 0.3, 0.02, 0.02)
+    push = ScriptedContact(
+        link, np.array([0.03, 0.02, 0.05]), np.array([9.0, -20.0, 12.0]), profile
+    )
+    settings = Run(seed=3, noise=SensorNoise(), model_error=0.02, physics=2000.0)
+    _, told, events = heard(pipeline, scripted(robot, [push], 1.2, 0.5, settings).samples)
+    assert told == [] and len(events) >= 1
+
+
+def test_many_samples_at_a_time_say_the_same_as_one_by_one(arm):
+    robot, _, samples = arm
+    s = drifting(robot, samples, "wrist.fx")
+    whole, one = tl.Pipeline(robot), tl.Pipeline(robot)
+    estimate, _ = whole.run(s.time, s.q, s.qd, s.tau, s.wrench)
+    health, first = [], {}
+    for i in range(len(s.time)):
+        result = one.update(s.time[i], s.q[i], s.qd[i], s.tau[i], s.wrench[i])
+        health.append(int(result.health))
+        for fault in result.faults:
+            first.setdefault(fault.channel, i)
+    assert first == {f.channel: f.sample for f in whole.faults if f.fault != Fault.NONE} != {}
+    np.testing.assert_array_equal(estimate.health, health)
+    assert repr(one.events) == repr(whole.events)
