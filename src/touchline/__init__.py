@@ -23,6 +23,7 @@ from touchline.result.contact import Candidate, Contact
 from touchline.result.event import Event, EventChange
 from touchline.result.fault import ChannelFault, FaultChange
 from touchline.result.kinds import ContactLevel, Fault, Happened, Status, Watch, Zone
+from touchline.result.standing import Standing
 
 if TYPE_CHECKING:
     from touchline import live as live
@@ -57,6 +58,7 @@ __all__ = [
     "Pipeline",
     "Result",
     "Robot",
+    "Standing",
     "Status",
     "Watch",
     "Zone",
