@@ -17,6 +17,7 @@ from touchline.report.traces import Traces
 Array = NDArray[np.float64]
 
 LOGGED = (("positions", "rad"), ("velocities", "rad/s"), ("torques", "in logged units"))
+ABSURD = 1e6  # rad, rad/s, N, Nm: no reading, as in the core
 POINTS = 240_000  # pieces of time times curves: bounds the report's size, 5.3 bytes each
 MOST_BUCKETS = 1 << 14
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -209,5 +210,7 @@ class Curves:
 
 
 def _signals(samples: Samples) -> list[Array]:
+    """As logged; what the core takes for infinite is left out."""
     sensors = [samples.wrench[:, k] for k in range(samples.wrench.shape[1])]
-    return [samples.q, samples.qd, samples.tau, *sensors]
+    signals = [samples.q, samples.qd, samples.tau, *sensors]
+    return [np.where(np.abs(values) < ABSURD, values, np.nan) for values in signals]
