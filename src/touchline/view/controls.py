@@ -16,7 +16,7 @@ ADVICE = (
 )
 LEGEND = """\
 <div style="font-size:12px;padding:0 0.75em">
-<span style="color:#d55e00">&#9679; felt</span>, with line of action and uncertainty (2 sigma);
+<span style="color:#d55e00">&#9679;</span> felt, with line of action and uncertainty (2 sigma);
 <span style="color:#6a3d9a">&#9675; true</span></div>"""
 MOTIONS = {"stands": False, "moves": True}
 

@@ -23,6 +23,36 @@ from touchline.view.guard import LOCAL_NAMES, Guard, is_local
 HOST, PORT = "127.0.0.1", 8080
 PORTS = 100  # that are tried from the wanted one on
 
+# viser's grey and blue are too light to be read with ease on white, and white on them.
+CONTRAST = """
+:root { --mantine-color-dimmed: #5c636a !important; }
+.mantine-Button-root { --button-bg: #1864ab !important; --button-hover: #144f87 !important; }
+.mantine-Button-root { --button-color: #fff !important; }
+"""
+# viser leaves sliders, their fields and buttons with a symbol alone without a name, which those
+# who do not see the page need. The label of a row names what is in it.
+NAMES = """
+(() => {
+  const unnamed = "[role=slider], input:not([type=hidden]), textarea";
+  const give = () => {
+    for (const label of document.querySelectorAll("label[for]")) {
+      const row = document.getElementById(label.htmlFor)?.closest(".mantine-Flex-root");
+      const around = row?.contains(label) ? row : label.closest(".mantine-Flex-root");
+      for (const field of around?.querySelectorAll(unnamed) ?? [])
+        if (!field.getAttribute("aria-label")) field.setAttribute("aria-label", label.textContent);
+    }
+    for (const button of document.querySelectorAll("button:not([aria-label])"))
+      if (!button.textContent.trim()) {
+        const closes = button.className.includes("CloseButton");
+        button.setAttribute("aria-label", closes ? "Close" : "Settings of the view");
+      }
+  };
+  let due = 0;
+  const soon = () => { due ||= setTimeout(() => { due = 0; give(); }, 200); };  // ms
+  new MutationObserver(soon).observe(document, { childList: true, subtree: true });
+})();
+"""
+
 
 class PageServer:
     """A viser server that answers nobody but its own page and programs on this machine.
@@ -134,7 +164,7 @@ def _answering(guard: Guard, answer: Any) -> Any:
 
 
 def _put_title(response: Response) -> None:
-    """Gives the page a title of its own; viser has no option for it."""
+    """Gives the page a title and names of its own; viser has no option for them."""
     if response.headers.get("Content-Type", "").startswith("text/html"):
         packed = response.headers.get("Content-Encoding") == "gzip"
         response.body = _titled(bytes(response.body or b""), packed)
@@ -145,7 +175,8 @@ def _put_title(response: Response) -> None:
 @lru_cache(maxsize=2)  # with and without compression
 def _titled(page: bytes, packed: bool) -> bytes:
     html = gzip.decompress(page) if packed else page
-    html = html.replace(b"<title>Viser</title>", b"<title>Touchline</title>", 1)
+    head = f"<title>Touchline</title>\n<style>{CONTRAST}</style><script>{NAMES}</script>".encode()
+    html = html.replace(b"<title>Viser</title>", head, 1)
     return gzip.compress(html) if packed else html
 
 

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""All that can be used on pages of arms has a name and can be read: axe-core finds nothing serious.
+
+Nothing moves on these pages, so that the browser has time for axe-core.
+"""
+
+import pytest
+from accessible import WIDTHS, look, need_axe, serious
+from browser import until
+
+import touchline as tl
+from touchline.live.connection import Connection
+from touchline.live.page import RobotPage
+from touchline.live.session import Session
+from touchline.live.sources import make_source
+from touchline.view.interface import InterfacePage
+from touchline.view.live import LivePage
+from touchline.view.replay import Replay
+from touchline.view.replay_page import ReplayPage
+from touchline.view.server import PageServer
+
+
+def check(browser, server, words):
+    """The page as it opens; its colours are light whatever the system's."""
+    need_axe()
+    for width in WIDTHS:
+        look(browser, width, "light")
+        browser.open(server.url)
+        browser.wait_for(words)
+        until(lambda: serious(browser) == [], pause=browser.rest, what="no finding of axe-core")
+
+
+@pytest.mark.parametrize("kind", [InterfacePage, LivePage])
+def test_pages_of_the_demo(browser, kind):
+    with PageServer("test", port=0) as server:
+        kind(server)
+        check(browser, server, "Random push")
+
+
+def test_the_page_of_a_replay(browser, touched):
+    with PageServer("test", port=0) as server:
+        ReplayPage(Replay(touched.out), server)
+        check(browser, server, "Play")
+
+
+def test_the_page_of_a_running_robot(browser):
+    robot = tl.load_robot("sara")
+    with (
+        Session(robot, Connection(make_source("sim://?speed=0", robot))) as session,
+        PageServer("test", port=0) as server,
+    ):
+        RobotPage(server, session, allow_control=True)
+        check(browser, server, "Tare")
