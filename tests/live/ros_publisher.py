@@ -3,7 +3,8 @@
 
 Joint states at 500 Hz with an extra joint and in another order; wrenches of `wrist` at 500 Hz from
 another stamp. Options: push (every 4 s), nowrench (the topic is silent in every other second
-from 4 s on), gone (the joints are so), names (another joint is published).
+from 4 s on), gone (the joints are so), names (another joint is published), marks (prints when a
+silence begins and ends).
 """
 
 import sys
@@ -36,6 +37,7 @@ def main():
     state = JointState(name=[*(names[i] for i in order), "finger"])
     load = WrenchStamped()
     print("ready", flush=True)
+    was_quiet = False
     origin, begin = time.time(), time.monotonic()
     for i in range(int(seconds * RATE)):
         due = begin + i / RATE
@@ -43,6 +45,9 @@ def main():
             time.sleep(wait)
         at, row = origin + i / RATE, i % len(samples)
         quiet = i / RATE > 4.0 and (i / RATE) % 2.0 > 1.5
+        if quiet != was_quiet and "marks" in options:
+            print("silent" if quiet else "speaks", time.monotonic(), flush=True)
+        was_quiet = quiet
         if not ("gone" in options and quiet):
             state.header.stamp.sec, state.header.stamp.nanosec = int(at), int(at % 1 * 1e9)
             for name, values in zip(

@@ -235,6 +235,8 @@ def test_a_clock_that_jumps_makes_no_event(arm, samples, jump):
 
         seen = watch(arm, controller.address, duration=1.9 if jump < 0 else None, each=stop(each))
     assert [e for e in seen.events if e["detected"] < 1.9] == []
+    if jump < 0:
+        assert any("the clock was set back by" in notice.text for notice in seen.notices)
 
 
 def stop(each):

@@ -153,11 +153,13 @@ class Connection:
     def _accept(self, sample: Sample) -> bool:
         """Whether a sample goes on; what comes twice or too late does not."""
         if sample.result is not None:  # it went the same way in native code
-            return True
-        verdict = self._admission.take(sample.time)
-        if verdict == REFUSED:
-            return self._refuse()
-        if verdict == SET_BACK:
+            set_back = sample.time <= self._last
+        else:
+            verdict = self._admission.take(sample.time)
+            if verdict == REFUSED:
+                return self._refuse()
+            set_back = verdict == SET_BACK
+        if set_back:
             self._tell(
                 self.streams[0].name,
                 StreamState.OK,
