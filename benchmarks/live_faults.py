@@ -28,6 +28,7 @@ sys.path[:0] = [str(TESTS)]
 RATE = 500.0  # Hz
 SETTLE = 1.2  # s between two faults, in which the observer settles and nothing may happen
 TOLD, BACK = 0.020, 0.100  # s: the goals
+WITHHELD = 0.020  # s without a sample, after which there may be no estimate
 AWAY = 0.5  # s for which a controller is gone
 TAMPERED = 0.8  # s for which packages are tampered with
 SHARE = 0.01  # of the packages that are dropped, doubled or swapped
@@ -140,16 +141,20 @@ def _arm(folder: Path):
 
 
 def write_motion(path: Path, arm) -> None:
-    """Motion to and fro, of which the end is the begin; time runs backwards without friction."""
-    from touchline.simulation.noise import SensorNoise
-    from touchline.simulation.scenario import free_motion
-    from touchline.simulation.scene import Run
+    """A motion that repeats after a minute, with noise; nothing touches the arm."""
+    from make_long_log import loads
 
-    forth = free_motion(arm, 20.0, 0.5, Run(noise=SensorNoise(), rate=RATE)).samples
-    rows = np.r_[np.arange(len(forth)), np.arange(len(forth) - 2, 0, -1)]
-    way = np.r_[np.ones(len(forth)), -np.ones(len(forth) - 2)][:, None]
-    signals = {"q": forth.q, "tau": forth.tau, "wrench": forth.wrench}
-    np.savez(path, qd=forth.qd[rows] * way, **{k: v[rows] for k, v in signals.items()})
+    time = np.arange(60 * 1000)[:, None] * 1e-3
+    w = 2 * np.pi * np.array([5, 7, 9, 8, 11, 12]) / 60
+    q, qd = 0.4 * np.sin(w * time), 0.4 * w * np.cos(w * time)
+    signals = dict(zip(("tau", "wrench"), loads(arm, q, qd), strict=True))
+    signals |= {"q": np.roll(q, -1, axis=0), "qd": np.roll(qd, -1, axis=0)}
+    rng = np.random.default_rng(0)
+    sigmas = {"q": 0.0, "qd": 2e-4, "tau": 0.05, "wrench": [0.05, 0.05, 0.05, 0.01, 0.01, 0.01]}
+    every = round(1000.0 / RATE)
+    for name, values in signals.items():
+        signals[name] = (values + rng.normal(size=values.shape) * sigmas[name])[::every]
+    np.savez(path, **signals)
 
 
 class Peer:
@@ -233,9 +238,9 @@ class Watch:
         seen.back = after - on
         stale = [n.at for n in bad if n.state == "stale" and n.at < on]
         if stale:
-            end = next((at for at in self.arrivals if at > stale[0]), np.inf)
-            known = [at for at, is_known in self.estimates if is_known and stale[0] < at < end]
-            seen.honest = not known
+            arrivals = np.array(self.arrivals)
+            known = [at for at, is_known in self.estimates if is_known and stale[0] < at < after]
+            seen.honest = all(at - arrivals[arrivals <= at][-1] < WITHHELD for at in known)
         return seen
 
 
@@ -249,7 +254,7 @@ def run(fault: str, runs: int) -> tuple[list[Seen], int]:
         arm, motion = _arm(Path(folder)), Path(folder) / "motion.npz"
         write_motion(motion, arm)
         peer = [Peer(motion)]
-        kept.callback(lambda: peer[0].kill())
+        kept.callback(lambda peers: peers[0].kill(), peer)
         connection = Connection(make_source(f"ur://127.0.0.1:{peer[0].port}", arm))
         session = kept.enter_context(Session(arm, connection, force=True))
         session.start()

@@ -59,3 +59,9 @@ def test_delays_add_to_those_of_the_description(robot):
         if s.name == "wrist"
     ]
     assert twice.delay == pytest.approx(0.005)
+
+
+def test_torques_that_come_before_the_positions_leave_a_description_that_can_be_read(robot):
+    early = with_delays(robot, [Delay("torques", -0.001, 1e-4), Delay("wrist", -0.001, 1e-4)])
+    parts = (*early.description.joints, *early.description.sensors)
+    assert {part.delay for part in parts} == {0.0}

@@ -24,7 +24,9 @@ def summary_text(result: Calibration) -> str:
     parts = [[head], _left_out_lines(result)]
     if result.identification is not None:
         late = [
-            f"  {x.name}: {1e3 * x.value:.2f} +- {1e3 * x.error:.2g} ms later than the positions"
+            f"  {x.name}: {1e3 * abs(x.value):.2f} +- {1e3 * x.error:.2g} ms "
+            + ("later" if x.value > 0.0 else "earlier")
+            + " than the positions"
             for x in result.delays
         ]
         parts.append(identification_lines(result.identification, late))

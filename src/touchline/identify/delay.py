@@ -57,16 +57,20 @@ def find_delays(evidence: Evidence, use: NDArray[np.bool_] | None = None) -> lis
 
 
 def with_delays(robot: Robot, delays: list[Delay]) -> Robot:
-    """The robot whose description has these delays added to what it says."""
+    """The robot whose description has these delays added to what it says.
+
+    Where the positions come later, it says none: a description has delays of torques and sensors.
+    """
     late = {delay.name: delay.value for delay in delays}
+
+    def added(own: float, name: str) -> float:
+        return max(round(own + late.get(name, 0.0), 6), 0.0)
+
     joints = tuple(
-        replace(j, delay=round(j.delay + late.get("torques", 0.0), 6)) if j.measured else j
+        replace(j, delay=added(j.delay, "torques")) if j.measured else j
         for j in robot.description.joints
     )
-    sensors = tuple(
-        replace(s, delay=round(s.delay + late.get(s.name, 0.0), 6))
-        for s in robot.description.sensors
-    )
+    sensors = tuple(replace(s, delay=added(s.delay, s.name)) for s in robot.description.sensors)
     description = replace(robot.description, joints=joints, sensors=sensors)
     return Robot(description, robot.mechanism)
 

@@ -111,7 +111,8 @@ def _franky(address: Address) -> Callable[[str], Any]:
         raise InputError(
             f"{address.text}: {error.name} is not installed: pip install 'touchline[franka]'"
         ) from None
-    return franky.Robot
+    # Reading needs no real-time kernel; commands would.
+    return lambda host: franky.Robot(host, realtime_config=franky.RealtimeConfig.Ignore)
 
 
 def _judged(error: Exception, host: str) -> Exception:
