@@ -4,7 +4,8 @@
 python benchmarks/live_latency.py [SECONDS] [RATE]
 
 Three processes on this machine: an arm that publishes, the node, and this listener. All times are
-from the stamp that the arm gives a joint state when it publishes it. Needs touchline[ros2].
+from the stamp that the arm gives a joint state when it publishes it. Of the joint states that were
+published those are counted that the node's pipeline took. Needs touchline[ros2].
 """
 
 import os
@@ -35,6 +36,9 @@ node = rclpy.create_node("arm")
 out = node.create_publisher(JointState, "/joint_states", qos_profile_sensor_data)
 message = JointState(name=list(robot.joint_names))
 rows = [[x.tolist() for x in row] for row in zip(s.q, s.qd, s.tau)]
+while out.get_subscription_count() < 2:  # the node and the listener
+    time.sleep(0.01)
+time.sleep(0.5)
 begin = time.monotonic()
 for i in range(int(rate * seconds)):
     message.position, message.velocity, message.effort = rows[i % len(rows)]
@@ -43,7 +47,10 @@ for i in range(int(rate * seconds)):
     seconds_, rest = divmod(time.time_ns(), 10**9)
     message.header.stamp.sec, message.header.stamp.nanosec = seconds_, rest
     out.publish(message)
+print(int(rate * seconds), flush=True)
+sys.stdin.read()
 """
+DRAIN = 3.0  # s in which what was published last is counted
 ROBOT = """name: sara-joints
 model: {model}
 joints: [{joints}]
@@ -56,17 +63,20 @@ def main() -> None:
     rate = float(sys.argv[2]) if len(sys.argv) > 2 else 1000.0
     with tempfile.TemporaryDirectory() as folder:
         robot = _robot(Path(folder))
-        arm = [sys.executable, "-c", ARM, str(robot), str(rate), str(seconds + 15.0)]
+        arm = [sys.executable, "-c", ARM, str(robot), str(rate), str(seconds)]
         parameters = ["-p", f"robot:={robot}", "-p", "source:=ros2://"]
         node = [sys.executable, "-m", "touchline.live.node", "--ros-args", *parameters]
-        with subprocess.Popen(arm) as publishes:
-            time.sleep(4.0)
-            with subprocess.Popen(node) as feels:
+        pipe = subprocess.PIPE
+        with subprocess.Popen(arm, stdin=pipe, stdout=pipe, text=True) as publishes:
+            with subprocess.Popen(node, stderr=subprocess.DEVNULL) as feels:
                 try:
-                    delays = _listen(seconds)
+                    delays, taken = _listen(seconds)
+                    assert publishes.stdout is not None
+                    published = publishes.stdout.readline().strip()
                 finally:
                     feels.terminate()
                     publishes.terminate()
+    print(f"{published} joint states published, {taken} taken by the pipeline")
     for name, found in delays.items():
         if not found:
             print(f"{name}: nothing came")
@@ -89,8 +99,10 @@ def _robot(folder: Path) -> Path:
     return path
 
 
-def _listen(seconds: float) -> dict[str, list[float]]:
+def _listen(seconds: float) -> tuple[dict[str, list[float]], str]:
+    """Delays [ms], and how many joint states the node has received at the end."""
     import rclpy
+    from diagnostic_msgs.msg import DiagnosticArray
     from rclpy.qos import qos_profile_sensor_data
     from sensor_msgs.msg import JointState
 
@@ -108,15 +120,19 @@ def _listen(seconds: float) -> dict[str, list[float]]:
     topics = {"bare delivery": "/joint_states", "felt": "/touchline/external_joint_torques"}
     for name, topic in topics.items():
         listener.create_subscription(JointState, topic, note(name), qos_profile_sensor_data)
+    facts: dict[str, str] = {}
+
+    def diagnose(message: DiagnosticArray) -> None:
+        facts.update((pair.key, pair.value) for pair in message.status[0].values)
+
+    listener.create_subscription(DiagnosticArray, "/diagnostics", diagnose, 10)
     end = time.monotonic() + 60.0
     while not delays["felt"] and time.monotonic() < end:
         rclpy.spin_once(listener, timeout_sec=0.1)
-    for found in delays.values():
-        found.clear()
-    end = time.monotonic() + seconds
+    end = time.monotonic() + seconds + DRAIN
     while time.monotonic() < end:
         rclpy.spin_once(listener, timeout_sec=0.1)
-    return delays
+    return delays, facts.get("received", "none")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A robot that is read for a long time: memory, and what a blocked Python costs.
+
+python benchmarks/live_endurance.py [MINUTES [STALLS]]
+
+An arm of its own process moves without a touch and sends 500 samples a second over RTDE. For
+MINUTES (default 4) `touchline live` reads it with page and recorder, and so does the node with a
+recorder, where ROS 2 is there: the slope of their resident memory, after the first minute. Before
+that Python is blocked STALLS times (default 20) for 0.3 s, and collects three million objects: the
+longest time between two processed samples, beside that of an idle Python.
+"""
+
+import contextlib
+import ctypes
+import gc
+import importlib.util
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from live_faults import TESTS, Peer, write_motion
+
+STALL, RATE = 0.3, 500.0  # s, Hz
+OBJECTS = 3_000_000
+PAGE = 4096  # bytes
+WARM = 60.0  # s until memory counts
+
+
+def stalls(arm, address: str, aside: bool, count: int) -> None:
+    """Prints the longest gaps between processed samples: Python idles, is held, collects."""
+    from touchline.live.aside import ReadAside
+    from touchline.live.connection import Connection
+    from touchline.live.session import Session
+    from touchline.live.sources import make_source
+
+    hold = ctypes.PyDLL(None).usleep  # keeps the interpreter's lock
+    source = ReadAside(address, arm, ("rtde",), 1.0 / RATE) if aside else make_source(address, arm)
+    gaps = {"idle": [], "held": [], "collects": []}
+    with Session(arm, Connection(source), force=True) as session:
+        session.start()
+        news = session.run()
+        first = _follow(news, 0.5)
+        runner = source._felt.runner
+        stream, begin = session.connection.streams[0], session.samples
+        objects = [[] for _ in range(OBJECTS)]
+        for _ in range(count):
+            for kind, longest in gaps.items():
+                _follow(news, 0.2)
+                runner.longest_gap()
+                if kind == "idle":
+                    _follow(news, STALL)
+                elif kind == "held":
+                    hold(round(1e6 * STALL))
+                else:
+                    gc.collect()
+                longest.append(runner.longest_gap())
+        _follow(news, 0.5)
+        lost, found = stream.lost, session.samples - begin
+        del objects, first
+    name = "read aside, as ros2:// and franka://" if aside else "ur://, native threads"
+    print(f"{name}: {found} samples, {lost} lost, {runner.overrun} without room")
+    for kind, values in gaps.items():
+        ms = 1e3 * np.array(values)
+        print(f"  {kind:9} longest gap: median {np.median(ms):5.1f} ms, of all {ms.max():6.1f} ms")
+
+
+def _follow(news, seconds: float) -> None:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        next(news)
+
+
+def memory(folder: Path, address: str, minutes: float) -> None:
+    """Prints the slope of the resident memory of `touchline live` and of the node."""
+    robot = str(folder / "robot.yaml")
+    live = ["live", "--robot", robot, "--source", address, "--force", "--view", "--no-browser"]
+    commands = {"page and recorder": ["touchline", *live, "--record", str(folder / "log.mcap")]}
+    if importlib.util.find_spec("rclpy") is not None:
+        parameters = {"robot": robot, "source": address, "force": "true"}
+        parameters["record"] = str(folder / "node.parquet")
+        pairs = [x for k, v in parameters.items() for x in ("-p", f"{k}:={v}")]
+        commands["node and recorder"] = ["touchline.live.node", "--ros-args", *pairs]
+    with contextlib.ExitStack() as kept:
+        running = {}
+        for name, command in commands.items():
+            process = subprocess.Popen(
+                [sys.executable, "-m", *command], stdout=-3, stderr=-3, env=os.environ
+            )
+            kept.callback(process.wait)
+            kept.callback(process.terminate)
+            running[name] = process.pid
+        times, sizes = [], {name: [] for name in running}
+        end = time.monotonic() + 60.0 * minutes
+        while (now := time.monotonic()) < end:
+            times.append(now)
+            for name, pid in running.items():
+                sizes[name].append(_resident(pid))
+            time.sleep(1.0)
+    seconds = np.array(times) - times[0]
+    warm = seconds > min(WARM, 0.5 * seconds[-1])
+    hours = seconds[warm] / 3600.0
+    for name, values in sizes.items():
+        megabytes = np.array(values)[warm] / 1e6
+        A = np.column_stack([hours - hours.mean(), np.ones(len(hours))])
+        (slope, mean), *_ = np.linalg.lstsq(A, megabytes, rcond=None)
+        grown = megabytes[-1] - megabytes[0]
+        print(
+            f"{name}: {mean:.1f} MB, {slope:+.2f} MB an hour over {60 * np.ptp(hours):.1f} min, "
+            f"{grown:+.2f} MB from first to last"
+        )
+
+
+def _resident(pid: int) -> int:
+    """Bytes."""
+    return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * PAGE
+
+
+def main() -> None:
+    """Prints all of it."""
+    from live_arms import make_arm
+
+    minutes = float(sys.argv[1]) if len(sys.argv) > 1 else 4.0
+    count = int(sys.argv[2]) if len(sys.argv) > 2 else 20
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        arm = make_arm(folder, 6)
+        write_motion(folder / "motion.npz", arm)
+        peer = Peer(folder / "motion.npz")
+        try:
+            address = f"ur://127.0.0.1:{peer.port}"
+            if count > 0:
+                stalls(arm, address, False, count)
+                stalls(arm, address, True, count)
+            if minutes > 0.0:
+                memory(folder, address, minutes)
+        finally:
+            peer.kill()
+    print(f"load of this machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+
+
+if __name__ == "__main__":
+    main()
