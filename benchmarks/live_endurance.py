@@ -22,8 +22,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-
-from live_faults import TESTS, Peer, write_motion
+from live_faults import Peer, write_motion
 
 STALL, RATE = 0.3, 500.0  # s, Hz
 OBJECTS = 3_000_000
