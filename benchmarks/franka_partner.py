@@ -54,8 +54,9 @@ class Arm:
         self._pushed = pushed
         self._begun: tuple[int, int, np.ndarray] | None = None  # tick, body, force
         self.pushes: list[dict] = []
-        self.ticks = 0
+        self.ticks = 0  # since somebody listens
         self.number = 0  # of the clock, as sent
+        self.heard = False
 
     def goal(self, at: float) -> np.ndarray:
         """Where the joints shall be at a time [s]."""
@@ -68,7 +69,7 @@ class Arm:
         """The controller's torques and the push, before each step."""
         at = self.ticks * TICK
         self._robot.joint_position_control(self.goal(at))
-        self.ticks += 1
+        self.ticks += self.heard
         since = at - STANDS - EASES
         phase = since % EVERY
         if self._pushed and self._begun is None and since > 0.0 and phase < TICK:
@@ -144,7 +145,7 @@ def serve(server, simulator, arm: Arm, ended: threading.Event) -> dict:
             time.sleep(wait)
         late += wait < -TICK
         link.process_commands()
-        arm.number = getattr(link, number)
+        arm.number, arm.heard = getattr(link, number), link.udp_connected
         simulator.step()
         if link.udp_connected and chance.random() < LEFT_OUT:
             left_out.append(arm.number)

@@ -100,6 +100,12 @@ def memory(folder: Path, address: str, minutes: float) -> None:
             for name, pid in running.items():
                 sizes[name].append(_resident(pid))
             time.sleep(1.0)
+        written = {
+            "page and recorder": (folder / "log.mcap").stat().st_size,
+            "node and recorder": sum(
+                part.stat().st_size for part in folder.glob("node.*/*.parquet")
+            ),
+        }
     seconds = np.array(times) - times[0]
     warm = seconds > min(WARM, 0.5 * seconds[-1])
     hours = seconds[warm] / 3600.0
@@ -110,7 +116,7 @@ def memory(folder: Path, address: str, minutes: float) -> None:
         grown = megabytes[-1] - megabytes[0]
         print(
             f"{name}: {mean:.1f} MB, {slope:+.2f} MB an hour over {60 * np.ptp(hours):.1f} min, "
-            f"{grown:+.2f} MB from first to last"
+            f"{grown:+.2f} MB from first to last; {written[name] / 1e6:.1f} MB recorded"
         )
 
 

@@ -1,11 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which sockets a process listens at (Linux)."""
+"""Which sockets a process and its children listen at (Linux)."""
 
 import os
 from pathlib import Path
 
 LISTENS = "0A"  # state of a TCP socket
 LOOPBACK = ("0100007F", "00000000000000000000000001000000")
+
+
+def family(pid):
+    """The process and all that it has started."""
+    found = [pid]
+    for tasks in Path(f"/proc/{pid}/task").glob("*/children"):
+        for child in tasks.read_text().split():
+            found += family(int(child))
+    return found
 
 
 def listening(pid):

@@ -52,6 +52,7 @@ def test_what_is_felt_is_published_and_services_answer(tmp_path):
     assert told["names"] == [f"joint{i}" for i in range(1, 8)] and told["efforts"] == 7
     assert told["links"] and "force" in told["shapes"]
     assert told["status"][0] == "touchline: simulation" and float(told["facts"]["rate_hz"]) > 0
+    assert 0.0 < float(told["facts"]["gate_ratio"]) < 1.0
     assert set(told["touches"]) <= {*GESTURES, "press", "release", "toggle"} and told["touches"]
     assert told["collision"] in (True, False)
     assert told["answers"]["reset"] == [True, "reset: the estimate starts anew"]

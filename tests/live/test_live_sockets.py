@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 from fake_rtde import FakeController
-from live_arms import make_arm, pushed
-from sockets import LOOPBACK, listening
-from test_live_ros import environment, needs_ros
+from live_arms import make_arm, pushed, write_arm
+from sockets import LOOPBACK, family, listening
+from test_live_ros import HERE, environment, needs_ros
 
 pytestmark = pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="Linux only")
 
@@ -26,7 +26,7 @@ def opened(command, env=None, word="live;"):
                 if word in line:
                     break
             time.sleep(0.5)
-            return listening(process.pid)
+            return [entry for pid in family(process.pid) for entry in listening(pid)]
         finally:
             process.kill()
 
@@ -37,6 +37,29 @@ def test_reading_a_robot_listens_nowhere(tmp_path):
     with FakeController(pushed(arm, seconds=10.0, begin=1e3)) as controller:
         source = ["--source", controller.address, "--robot", str(tmp_path / "robot.yaml")]
         assert opened(["touchline", "live", *source]) == []
+
+
+def test_the_page_is_served_on_the_loopback():
+    pytest.importorskip("viser")
+    found = opened(
+        ["touchline", "live", "--robot", "sara", "--source", "sim://", "--view", "--no-browser"]
+    )
+    assert found and all(address in LOOPBACK for _, address, _ in found), found
+
+
+@needs_ros
+def test_topics_are_read_on_the_loopback(tmp_path):
+    robot, env = write_arm(tmp_path, 6), environment(79)
+    publisher = [sys.executable, str(HERE / "ros_publisher.py"), str(robot), "60"]
+    with subprocess.Popen(publisher, env=env, stdout=subprocess.PIPE) as arm:
+        try:
+            del env["ROS_AUTOMATIC_DISCOVERY_RANGE"]
+            source = ["--source", "ros2://", "--robot", str(robot)]
+            found = opened(["touchline", "live", *source], env)
+        finally:
+            arm.kill()
+    receiving = [entry for entry in found if entry[2] in range(7000, 32000)]
+    assert receiving and all(address in LOOPBACK for _, address, _ in receiving), found
 
 
 @needs_ros

@@ -149,19 +149,24 @@ class Messages:
         return self._point(x=x, y=y, z=z)
 
     def diagnostics(self, session: Session, stamp: Any, node: str) -> Any:
-        """Each stream's state, rate, age and losses."""
+        """Each stream's state, rate, age, losses and gate ratio."""
         message = self._array()
         message.header.stamp = stamp
         now, source = time.monotonic(), session.connection.source.name
+        streams = session.connection.streams
+        ratios = _gate_ratios(session.result, len(streams), len(self._robot.joint_names))
         message.status = [
             self._status(
                 level=self._level(stream.state(now)),
                 name=f"{node}: {stream.name}",
                 message=str(stream.state(now)),
                 hardware_id=source,
-                values=[self._pair(key=key, value=value) for key, value in _facts(stream, now)],
+                values=[
+                    self._pair(key=key, value=value)
+                    for key, value in [*_facts(stream, now), ("gate_ratio", ratio)]
+                ],
             )
-            for stream in session.connection.streams
+            for stream, ratio in zip(streams, ratios, strict=True)
         ]
         return message
 
@@ -171,6 +176,16 @@ class Messages:
         if state is StreamState.SLOW:
             return self._status.WARN
         return self._status.STALE if state is StreamState.STALE else self._status.ERROR
+
+
+def _gate_ratios(result: Result | None, streams: int, joints: int) -> list[str]:
+    """Of each stream: the largest step of a channel over what its gate believes at once."""
+    if result is None:
+        return [""] * streams
+    parts = [result.ratios]
+    if streams > 1:  # the joints', then one for each sensor
+        parts = [result.ratios[: 3 * joints], *result.ratios[3 * joints :].reshape(-1, 6)]
+    return [f"{np.nan_to_num(part).max(initial=0.0):.2f}" for part in parts]
 
 
 def _facts(stream: Stream, now: float) -> list[tuple[str, str]]:
