@@ -80,3 +80,10 @@ def test_whole_nanoseconds_survive(nanoseconds):
 @given(st.floats(0.0, 1e6))
 def test_times_of_robots_are_kept_to_half_a_nanosecond(time):
     assert abs(on_nanoseconds(time) - time) <= 0.6e-9
+
+
+def test_samples_that_come_at_once_have_the_rate_of_their_stamps():
+    stream = Stream("joints")
+    for i in range(64):
+        stream.receive(0.002 * i, 5.0)
+    assert stream.rate == pytest.approx(500.0)

@@ -101,11 +101,13 @@ class Stream:
 
     @property
     def rate(self) -> float:
-        """Samples a second, over the last ones [Hz]."""
+        """Samples a second, over the last ones [Hz]; by their stamps where all came at once."""
         if len(self._recent) < 2:
             return 0.0
         span = self._recent[-1][0] - self._recent[0][0]
-        return (len(self._recent) - 1) / span if span > 0.0 else 0.0
+        if span > 0.0:
+            return (len(self._recent) - 1) / span
+        return 1.0 / self.period if self.period else 0.0
 
     @property
     def lag(self) -> float:
