@@ -90,7 +90,7 @@ class TouchSampler:
         if patch.body in taken:
             return None
         point, normal = self._point(patch, q)
-        if not self._reachable(q, point, normal):
+        if not self.reachable(q, point, normal):
             return None
         way = _in_cone(-normal, self._friction, self._rng)
         return Touch(q, patch, point, normal, force * way) if self._free(q, point, -way) else None
@@ -114,7 +114,8 @@ class TouchSampler:
         local = a + u * (b - a) + v * (c - a)
         return T[:3, :3] @ local + T[:3, 3], T[:3, :3] @ surface.normals[face]
 
-    def _reachable(self, q: Array, point: Array, normal: Array) -> bool:
+    def reachable(self, q: Array, point: Array, normal: Array) -> bool:
+        """Does a finger get to a point (3,) [m] of the surface from outside, in this posture (n,)?"""
         if point[2] < self._floor or self.skin.links_around(q, point + 1e-6 * normal):
             return False
         return self._free(q, point, normal)

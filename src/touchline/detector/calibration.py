@@ -246,7 +246,9 @@ def watching(robot: Robot, period: float, rows: dict[str, RowCalibration]) -> Th
     for row in thresholds.rows:
         known = rows.get(row_name(robot, row))
         typical = known.typical if known else row.contact
-        watched.append(replace(row, contact=typical, collision=1e9, baseline_limit=limit * typical))
+        watched.append(
+            replace(row, contact=typical, collision=1e9, baseline_limit=limit * typical, seen=0.0)
+        )
     return replace(thresholds, rows=tuple(watched))
 
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.detector.limits import sum_limits, theoretical, threshold
+from touchline.detector.chi_square import normal_limit
+from touchline.detector.limits import alarm_probability, sum_limits, theoretical, threshold
 from touchline.detector.model_drift import guess_drift
 from touchline.detector.residual_noise import residual_noise
 from touchline.model.description import (
@@ -36,7 +37,7 @@ class RowThreshold:
     the segment's own sensor. A joint row has component -1, a wrench row has joint -1. `slow` and
     `quick` are sigmas of the model's errors, see `RowCalibration`; `drift` those that the localizer
     reckons with: the calibrated `slow` ones, otherwise see `expect_drift`. `contact` is kept `seen`
-    standard deviations of the noise that the detector sees above it; 0: it is given and stays.
+    sigmas of the noise, as told in each posture and as seen, above it; 0: it is given and stays.
     """
 
     segment: int
@@ -100,7 +101,8 @@ def make_thresholds(robot: Robot, period: float = 1e-3) -> Thresholds:
         limits[method] = np.array([threshold(t, share) if t else np.inf for t in tails])
         if method == "rows":
             rows_limit, limits[method] = limits[method], np.ones(len(counts))
-    rows = [_calibrated_row(robot, row, calibration, rows_limit) for row in rows]
+    sigmas = normal_limit(0.5 * alarm_probability(share, period) / np.maximum(counts, 1))
+    rows = [_calibrated_row(robot, row, calibration, rows_limit, sigmas) for row in rows]
     return Thresholds(tuple(rows), np.full(len(counts), np.inf), limits, calibrated=True)
 
 
@@ -148,7 +150,11 @@ def row_name(robot: Robot, row: RowThreshold) -> str:
 
 
 def _calibrated_row(
-    robot: Robot, row: RowThreshold, calibration: CalibrationDescription, limits: Array
+    robot: Robot,
+    row: RowThreshold,
+    calibration: CalibrationDescription,
+    limits: Array,
+    sigmas: Array,
 ) -> RowThreshold:
     """The row with what calibration says of it; thresholds that the user gave stay."""
     known = calibration.rows.get(row_name(robot, row))
@@ -156,9 +162,11 @@ def _calibrated_row(
         return row
     detection = robot.description.detection
     kind, key = _kind(robot, row)
-    contact, collision = row.contact, row.collision
+    contact, collision, seen = row.contact, row.collision, 0.0
     if _given(detection.contact, kind, key) is None and np.isfinite(limits[row.segment]):
         contact = known.typical * limits[row.segment]
+        # The recording has shown some postures; in others noise is larger, and is told.
+        seen = float(sigmas[row.segment])
     if _given(detection.collision, kind, key) is None:
         collision = max(COLLISION_RATIO * contact, _least_collision(robot, row))
     limit = detection.baseline.limit * contact
@@ -170,7 +178,7 @@ def _calibrated_row(
         slow=known.slow,
         quick=known.quick,
         drift=known.slow,
-        seen=0.0,
+        seen=seen,
     )
 
 

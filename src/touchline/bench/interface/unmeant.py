@@ -13,6 +13,7 @@ from touchline.bench.interface.arms import LINKS, PERIOD, Arm, arm
 from touchline.bench.interface.hand import rising
 from touchline.bench.interface.pressing import RADIUS
 from touchline.bench.tables import Row
+from touchline.bench.touches import TouchSampler
 from touchline.detector.tail import poisson_interval
 from touchline.localizer.skin import Patch
 from touchline.model.description import WidgetDescription
@@ -27,6 +28,7 @@ SECONDS = 60.0  # of a recording
 FIRST, PAUSE = 2.0, (1.0, 6.0)  # s until the first push, and between two
 LENGTH = 0.1, 2.0  # s, of a push
 FORCE = 3.0, 40.0  # N
+POSTURES = 5  # of a push in which a finger has to reach its place
 CLEAR = 0.03  # m, at least, from a push to the rim of a button
 
 
@@ -94,8 +96,8 @@ def _pushed(
     n, pushes, begin = q.shape[1], [], FIRST
     while begin < SECONDS - LENGTH[1]:
         end = begin + rng.uniform(*LENGTH)
-        patch, (point, normal) = _beside(patches, buttons, rng)
         rows = np.flatnonzero((maker.time >= begin) & (maker.time <= end))
+        patch, (point, normal) = _beside(touched, q[rows], patches, buttons, rng)
         size = rng.uniform(*FORCE) * rising(maker.time[rows], begin, end)
         place = touched.real.places[patch.link]
         T = np.array([touched.real.poses(x)[place.node] @ place.T_node_link for x in q[rows]])
@@ -111,12 +113,19 @@ def _pushed(
     return maker.sensed(q, qd, loads, rng), pushes
 
 
-def _beside(patches, buttons, rng) -> tuple[Patch, tuple[Array, Array]]:
-    """A place on a link that is on no button."""
+def _beside(touched: Arm, q: Array, patches, buttons, rng) -> tuple[Patch, tuple[Array, Array]]:
+    """A place on a link that is on no button, and that a finger reaches in postures `q` (N, n)."""
+    sampler = TouchSampler(touched.skin, rng, floor=-np.inf)
     while True:
         patch = patches[rng.integers(len(patches))]
         point, normal = _somewhere(patch, rng)
-        if np.linalg.norm(point - np.array(buttons[patch.link].at)) > RADIUS + CLEAR:
+        if np.linalg.norm(point - np.array(buttons[patch.link].at)) <= RADIUS + CLEAR:
+            continue
+        for x in q[:: max(1, len(q) // POSTURES)]:
+            T = touched.robot.poses(x)[patch.node] @ patch.T_node_link
+            if not sampler.reachable(x, T[:3, :3] @ point + T[:3, 3], T[:3, :3] @ normal):
+                break
+        else:
             return patch, (point, normal)
 
 

@@ -6,6 +6,7 @@ or without `--no-identify`: on minutes of random motion within its joint limits,
 and the noise of the benchmark.
 """
 
+from collections.abc import Callable, Iterable
 from functools import lru_cache
 
 from touchline.bench.detection.free_motion import (
@@ -20,6 +21,7 @@ from touchline.identify.described import identified_robot
 from touchline.identify.evidence import gather
 from touchline.identify.identification import identify
 from touchline.model.robot import Robot
+from touchline.observer.samples import Samples
 
 RUNS = 25  # that share an arm
 MINUTES = 6  # of motion, in recordings of one minute
@@ -53,9 +55,14 @@ def wrong_model(
 
     if identified:
         robot = identified_robot(identify(gather(robot, recordings())))
+    return with_thresholds(robot, recordings), real
+
+
+def with_thresholds(robot: Robot, recordings: Callable[[], Iterable[Iterable[Samples]]]) -> Robot:
+    """The robot with thresholds from motion without contact; `recordings` are made twice."""
     period, methods = 1.0 / RATE, robot.description.detection.method
     rows = cal.fit_rows(robot, period, cal.collect_residuals(robot, period, recordings()))
     robot = cal.with_methods(robot, *methods, min_duration=0.0)
     found = cal.collect_statistics(robot, period, rows, recordings(), methods)
     tails = cal.fit_tails(robot, found, methods)
-    return cal.with_calibration(robot, cal.describe(found.hours, period, rows, tails)), real
+    return cal.with_calibration(robot, cal.describe(found.hours, period, rows, tails))

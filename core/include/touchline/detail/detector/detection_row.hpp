@@ -22,9 +22,12 @@ struct ModelError {
   double speed = 0.0;         // per rad2/s2 of squared speed
   double acceleration = 0.0;  // per rad/s2
 
-  double variance(const Activity& a) const {
+  double variance(const Activity& a) const { return constant * constant + moving_variance(a); }
+
+  // Without the part that an arm at rest has, too.
+  double moving_variance(const Activity& a) const {
     const double v = speed * a.speed2, b = acceleration * a.acceleration;
-    return constant * constant + v * v + b * b;
+    return v * v + b * b;
   }
 };
 
@@ -38,7 +41,7 @@ struct DetectionRow {
   double baseline_limit;      // how far the baseline may go from where it began [N or Nm]
   ModelError slow, quick;     // against the baseline and against the reference of `kReference`
   ModelError drift;           // against the baseline, while a contact lasts
-  double seen = 0.0;          // standard deviations of the noise seen that `contact` is kept above
+  double seen = 0.0;          // sigmas of the noise, told and seen, that `contact` is kept above
 };
 
 struct DetectionTimes {

@@ -207,6 +207,7 @@ class Detector {
   static constexpr double kHand = 2.0;    // a push on an arm in motion rarely lasts longer [s]
   static constexpr double kAlone = 4.0;  // thresholds: a sample that no noise makes needs no other
   static constexpr double kUnseen = 10.0;  // thresholds: noise that has yet to be seen is below it
+  static constexpr double kErrors = 3.0;  // sigmas, as is usual where a scatter is not normal
   static constexpr double kMost = 1.5;  // thresholds that a sum can grow to while all is felt
 
   void follow_motion(const double* q, const double* qd, double dt) {
@@ -337,11 +338,16 @@ class Detector {
     return std::min(std::fabs(now), std::fabs(mean)) / limit;
   }
 
-  // What a row's load must exceed now [N or Nm]: the larger of what noise as told and as seen would.
+  // What a row's load must exceed now [N or Nm]: the larger of its threshold and of what noise, as told
+  // in this posture and as seen, and errors of the model that a calibration has found bring. It has met
+  // some postures and speeds; in others both are larger.
   double largest_noise(std::size_t i) const {
     const DetectionRow& row = rows_[i];
     double most = row.contact;
-    if (row.seen > 0.0) most = std::max(most, meters_[i].limit(row.seen, first_looks_[i].ratio()));
+    if (row.seen > 0.0) {
+      const double noise = meters_[i].limit(row.seen, first_looks_[i].ratio());
+      most = std::max(most, std::hypot(noise, kErrors * std::sqrt(row.slow.moving_variance(activity()))));
+    }
     if (learns(i)) most = std::max(most, spreads_[i].limit());
     const double gap = samples_[i].gap_std;
     return gap > 0.0 ? std::hypot(most, kGapSigmas * gap) : most;
