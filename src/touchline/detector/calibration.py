@@ -247,7 +247,7 @@ def watching(robot: Robot, period: float, rows: dict[str, RowCalibration]) -> Th
         known = rows.get(row_name(robot, row))
         typical = known.typical if known else row.contact
         watched.append(
-            replace(row, contact=typical, collision=1e9, baseline_limit=limit * typical, seen=0.0)
+            replace(row, contact=typical, collision=1e9, baseline_limit=limit * typical, seen=1.0)
         )
     return replace(thresholds, rows=tuple(watched))
 

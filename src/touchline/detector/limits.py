@@ -40,18 +40,13 @@ def siegmund(run_length: float, shift: float) -> float:
     return max(least - 1.166, 0.0)
 
 
-def alarm_probability(rate: float, period: float) -> float:
-    """Of one sample, for so many false alarms an hour, at most 0.1."""
-    return min(rate * period / 3600.0, 0.1)
-
-
 def theoretical(
     method: str, counts: NDArray[np.int64], rate: float, period: float, d: DetectionDescription
 ) -> Array:
     """Limits (m,) if noise were all: every sample is taken for a test of its own."""
     if method == "rows":
         return np.ones(len(counts))
-    alarm = alarm_probability(rate, period)
+    alarm = min(rate * period / 3600.0, 0.1)
     rows = np.maximum(counts, 1)
     if method == "scaled":
         return normal_limit(0.5 * alarm / rows)

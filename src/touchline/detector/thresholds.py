@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.detector.chi_square import normal_limit
-from touchline.detector.limits import alarm_probability, sum_limits, theoretical, threshold
+from touchline.detector.limits import sum_limits, theoretical, threshold
 from touchline.detector.model_drift import guess_drift
 from touchline.detector.residual_noise import residual_noise
 from touchline.model.description import (
@@ -101,8 +100,7 @@ def make_thresholds(robot: Robot, period: float = 1e-3) -> Thresholds:
         limits[method] = np.array([threshold(t, share) if t else np.inf for t in tails])
         if method == "rows":
             rows_limit, limits[method] = limits[method], np.ones(len(counts))
-    sigmas = normal_limit(0.5 * alarm_probability(share, period) / np.maximum(counts, 1))
-    rows = [_calibrated_row(robot, row, calibration, rows_limit, sigmas) for row in rows]
+    rows = [_calibrated_row(robot, row, calibration, rows_limit) for row in rows]
     return Thresholds(tuple(rows), np.full(len(counts), np.inf), limits, calibrated=True)
 
 
@@ -150,11 +148,7 @@ def row_name(robot: Robot, row: RowThreshold) -> str:
 
 
 def _calibrated_row(
-    robot: Robot,
-    row: RowThreshold,
-    calibration: CalibrationDescription,
-    limits: Array,
-    sigmas: Array,
+    robot: Robot, row: RowThreshold, calibration: CalibrationDescription, limits: Array
 ) -> RowThreshold:
     """The row with what calibration says of it; thresholds that the user gave stay."""
     known = calibration.rows.get(row_name(robot, row))
@@ -165,8 +159,8 @@ def _calibrated_row(
     contact, collision, seen = row.contact, row.collision, 0.0
     if _given(detection.contact, kind, key) is None and np.isfinite(limits[row.segment]):
         contact = known.typical * limits[row.segment]
-        # The recording has shown some postures; in others noise is larger, and is told.
-        seen = float(sigmas[row.segment])
+        if "rows" in detection.method:
+            seen = float(limits[row.segment])  # as the statistic that the tail was fitted to
     if _given(detection.collision, kind, key) is None:
         collision = max(COLLISION_RATIO * contact, _least_collision(robot, row))
     limit = detection.baseline.limit * contact

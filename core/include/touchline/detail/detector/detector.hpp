@@ -49,7 +49,10 @@ class Detector {
         first_looks_(rows_.size()),
         levels_(segments_.size(), 0),
         quiet_(segments_.size(), 0.0),
-        statistics_(segments_.size() * settings_.tests.size(), 0.0) {
+        statistics_(segments_.size() * settings_.tests.size(), 0.0),
+        fires_(segments_.size(), 0) {
+    for (const TestSetting& setting : settings_.tests)
+      for (std::size_t g = 0; g < segments_.size(); ++g) fires_[g] |= std::isfinite(setting.limits[g]);
     for (std::size_t g = 0; g < segments_.size(); ++g) {
       std::vector<DetectionRow> own;
       for (const DetectionRow& row : rows_) {
@@ -207,7 +210,6 @@ class Detector {
   static constexpr double kHand = 2.0;    // a push on an arm in motion rarely lasts longer [s]
   static constexpr double kAlone = 4.0;  // thresholds: a sample that no noise makes needs no other
   static constexpr double kUnseen = 10.0;  // thresholds: noise that has yet to be seen is below it
-  static constexpr double kErrors = 3.0;  // sigmas, as is usual where a scatter is not normal
   static constexpr double kMost = 1.5;  // thresholds that a sum can grow to while all is felt
 
   void follow_motion(const double* q, const double* qd, double dt) {
@@ -269,7 +271,7 @@ class Detector {
         s.gap_std = row_[layout.segment_gap_std() + 2 * g + (row.component < 3 ? 0 : 1)];
       }
       s.known = s.known && std::isfinite(s.residual);
-      segments_[g].off |= states_[i].shown > row.contact || meters_[i].contradicts();
+      segments_[g].off |= fires_[g] && (states_[i].shown > row.contact || meters_[i].contradicts());
       if (!std::isfinite(s.innovation)) s.innovation = s.residual;  // samples were lost
     }
   }
@@ -331,7 +333,7 @@ class Detector {
   double slow_share(std::size_t i) const {
     const DetectionRow& row = rows_[i];
     const RowState& s = states_[i];
-    if (row.seen <= 0.0 || still_ < kPause || samples_[i].gap_std > 0.0) return 0.0;
+    if (row.seen <= 0.0 || !fires_[row.segment] || still_ < kPause || samples_[i].gap_std > 0.0) return 0.0;
     const double now = samples_[i].residual - s.baseline, mean = s.trend - s.baseline;
     if (now * mean <= 0.0) return 0.0;
     const double limit = std::max(row.contact, trend_meters_[i].limit(row.seen, first_looks_[i].ratio()));
@@ -346,7 +348,8 @@ class Detector {
     double most = row.contact;
     if (row.seen > 0.0) {
       const double noise = meters_[i].limit(row.seen, first_looks_[i].ratio());
-      most = std::max(most, std::hypot(noise, kErrors * std::sqrt(row.slow.moving_variance(activity()))));
+      const double error = row.seen * std::sqrt(row.slow.moving_variance(activity()));
+      most = std::max(most, std::hypot(noise, error));
     }
     if (learns(i)) most = std::max(most, spreads_[i].limit());
     const double gap = samples_[i].gap_std;
@@ -638,6 +641,7 @@ class Detector {
   std::vector<FirstLook> first_looks_;  // per row
   std::vector<int> levels_;
   std::vector<double> quiet_, statistics_;
+  std::vector<char> fires_;  // per segment: can a test fire, or are statistics all that is asked for?
   double time_ = 0.0, since_ = 0.0;
   double still_ = kPause;  // for how long the arm has stood [s]
   bool timed_ = false, placed_ = false, gap_ = false, joint_tests_ = false, sound_ = false;
