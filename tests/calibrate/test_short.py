@@ -45,4 +45,5 @@ def test_single_outliers_do_not_raise_thresholds(robot, samples):
 def test_a_row_that_was_worse_on_other_data_has_a_higher_threshold(robot, samples):
     plain = contacts(robot, samples)
     grown = contacts(robot, samples, {robot.joint_names[2]: 2.0})
-    assert grown[2] == pytest.approx(2.0 * plain[2]) and grown[1] == pytest.approx(plain[1])
+    assert grown[2] == pytest.approx(2.0 * plain[2], rel=1e-3)  # written with four digits
+    assert grown[1] == pytest.approx(plain[1])

@@ -3,7 +3,8 @@
 
 import pytest
 
-from touchline.bench.identify.run import ARMS, judge, tool_masses
+from touchline.bench.identify.arms import ARMS
+from touchline.bench.identify.run import judge, tool_masses
 
 
 @pytest.mark.parametrize("arm", ARMS, ids=[arm.name for arm in ARMS])

@@ -20,6 +20,7 @@ from touchline.bench.localization.wrong_model import RATE, with_thresholds
 from touchline.bench.tables import Row, aligned
 from touchline.bench.touches import TouchSampler
 from touchline.calibrate.noise import measure_noise
+from touchline.calibrate.run import growth
 from touchline.detector.thresholds import make_thresholds
 from touchline.identify.described import identified_robot
 from touchline.identify.evidence import gather
@@ -91,10 +92,11 @@ class Arm:
 
     def calibrated(self) -> Robot:
         """As by `touchline calibrate`."""
-        robot = identified_robot(identify(gather(self.robot, self._recordings())))
+        found = identify(gather(self.robot, self._recordings()))
+        robot = identified_robot(found)
         noise = measure_noise(robot, self._recordings())
         robot = Robot(replace(robot.description, noise=noise), robot.mechanism)
-        return with_thresholds(robot, self._recordings)
+        return with_thresholds(robot, self._recordings, growth(found))
 
     def _recordings(self) -> Iterable[list[Samples]]:
         maker = self._maker(60.0)
@@ -157,7 +159,9 @@ def main(arms: Sequence[str], runs: int, seed: int) -> None:
         seed: of all that is random.
     """
     lines: list[Row] = [HEAD]
-    progress = tqdm(total=len(arms) * len(WRONGS) * runs, file=sys.stderr, leave=False, disable=None)
+    progress = tqdm(
+        total=len(arms) * len(WRONGS) * runs, file=sys.stderr, leave=False, disable=None
+    )
     for name in arms:
         robot, unbiased = load_arm(name, NOISE), []
         for wrong in WRONGS:
@@ -176,7 +180,9 @@ def main(arms: Sequence[str], runs: int, seed: int) -> None:
                 ratio = f"{max(ratios):.2f} times" if wrong.bias and kind == "calibrated" else "-"
                 lines.append((name, wrong.name, kind, *_sums(of), ratio))
     progress.close()
-    print(f"Arms calibrated on {MINUTES} min of motion, {runs} of each kind; events without contact")
+    print(
+        f"Arms calibrated on {MINUTES} min of motion, {runs} of each kind; events without contact"
+    )
     print("by thresholds from the noise figures, and by calibrated ones:")
     print(aligned(lines))
 

@@ -21,6 +21,7 @@ from touchline.detector.calibration import (
     describe,
     fit_rows,
     fit_tails,
+    grown,
     with_methods,
 )
 from touchline.detector.tail import Tail
@@ -162,7 +163,10 @@ def calibrate(
     quiet = Robot(replace(model.description, noise=noise), model.mechanism)
     thresholds, lacking = None, ""
     try:
-        thresholds, more = _find_thresholds(quiet, recordings, logs, chosen, rate, trust)
+        more_elsewhere = {} if found is None else growth(found)
+        thresholds, more = _find_thresholds(
+            quiet, recordings, logs, chosen, rate, trust, more_elsewhere
+        )
         left_out += more
     except NoThresholds as error:
         if found is None or not found.problem.columns + found.problem.bodies:
@@ -174,7 +178,7 @@ def calibrate(
                 recordings.period,
                 recordings.seconds,
                 recordings.all("residuals"),
-                _growth(found),
+                growth(found),
             )
             if short is not None:
                 lacking += f"\n{SHORT}"
@@ -201,7 +205,7 @@ def calibrate(
     )
 
 
-def _growth(found: Identification) -> dict[str, float]:
+def growth(found: Identification) -> dict[str, float]:
     """By row, how much larger residuals are on data that played no part in the fit, at least 1."""
     whole = rms(found.left()[~found.touched])
     ratios = np.maximum(found.after / np.maximum(whole, 1e-9), 1.0)
@@ -220,6 +224,7 @@ def _find_thresholds(
     chosen: tuple[str, ...],
     rate: float,
     trust: bool,
+    more_elsewhere: dict[str, float],
 ) -> tuple[Thresholds, list[tuple[int, float, float]]]:
     """Thresholds, and what was left out for them because it seems to be touched."""
     left_out: list[tuple[int, float, float]] = []
@@ -238,6 +243,7 @@ def _find_thresholds(
             held_out = judge(robot, train, test, rate)
             tails = fit_tails(robot, found)
             _check_tails(robot, tails, chosen, found.hours)
+            rows = grown(rows, more_elsewhere)
             description = describe(found.hours, recordings.period, rows, tails)
             return Thresholds(description, tails, held_out, train, test, parted), left_out
         new = [(s.recording, s.start, s.end) for s in suspicions]

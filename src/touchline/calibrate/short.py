@@ -7,11 +7,10 @@ late sample makes, do not raise it.
 """
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
 
-from touchline.detector.calibration import collect_residuals, fit_rows
+from touchline.detector.calibration import collect_residuals, fit_rows, grown
 from touchline.detector.thresholds import make_thresholds, row_name
 from touchline.model.description import CalibrationDescription, TailDescription
 from touchline.model.robot import Robot
@@ -50,10 +49,7 @@ def short_thresholds(
             levels[segment] = max(levels.get(segment, 1.0), level)
     if not levels:
         return None
-    rows = {
-        name: replace(row, typical=row.typical * growth.get(name, 1.0))
-        for name, row in rows.items()
-    }
+    rows = grown(rows, growth)
     often = SHARE * 3600.0 / CORRELATED
     tails = {
         segment: {METHOD: TailDescription(level, often, 1.0 / level)}

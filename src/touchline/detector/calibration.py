@@ -130,6 +130,26 @@ def fit_rows(robot: Robot, period: float, found: Residuals) -> dict[str, RowCali
     return rows
 
 
+def grown(rows: dict[str, RowCalibration], growth: dict[str, float]) -> dict[str, RowCalibration]:
+    """What the errors leave on motion that played no part in the identification of the model.
+
+    Args:
+        rows: as fitted to the motion that the model was fitted to.
+        growth: by row, how much larger residuals are elsewhere, at least 1.
+    """
+    return {name: _times(row, growth.get(name, 1.0)) for name, row in rows.items()}
+
+
+def _times(row: RowCalibration, factor: float) -> RowCalibration:
+    slow, quick = ((c * factor, v * factor, a * factor) for c, v, a in (row.slow, row.quick))
+    return RowCalibration(_digits(row.typical * factor), _rounded(slow), _rounded(quick))
+
+
+def _rounded(values: Iterable[float]) -> tuple[float, float, float]:
+    constant, speed, acceleration = (_digits(value) for value in values)
+    return constant, speed, acceleration
+
+
 def fit_growth(residual: Array, noise: Array, activity: Array) -> tuple[float, float, float]:
     """Sigmas of a model error: constant, per squared speed, per acceleration.
 
@@ -152,8 +172,7 @@ def fit_growth(residual: Array, noise: Array, activity: Array) -> tuple[float, f
         found = nnls(L.T, np.linalg.solve(L, b))[0] / scale
         weight = 1.0 / np.maximum(terms @ found + noise, least)
     found[0] = max(found[0], least)
-    constant, speed, acceleration = (_digits(float(x)) for x in np.sqrt(found))
-    return constant, speed, acceleration
+    return _rounded(float(x) for x in np.sqrt(found))
 
 
 def collect_statistics(

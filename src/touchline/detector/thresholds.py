@@ -100,7 +100,9 @@ def make_thresholds(robot: Robot, period: float = 1e-3) -> Thresholds:
         limits[method] = np.array([threshold(t, share) if t else np.inf for t in tails])
         if method == "rows":
             rows_limit, limits[method] = limits[method], np.ones(len(counts))
-    rows = [_calibrated_row(robot, row, calibration, rows_limit) for row in rows]
+    beyond = share * calibration.hours < 1.0  # of what the recording can show: noise alone tells
+    noise = theoretical("scaled", counts, share, period, detection) if beyond else rows_limit
+    rows = [_calibrated_row(robot, row, calibration, rows_limit, noise) for row in rows]
     return Thresholds(tuple(rows), np.full(len(counts), np.inf), limits, calibrated=True)
 
 
@@ -148,7 +150,11 @@ def row_name(robot: Robot, row: RowThreshold) -> str:
 
 
 def _calibrated_row(
-    robot: Robot, row: RowThreshold, calibration: CalibrationDescription, limits: Array
+    robot: Robot,
+    row: RowThreshold,
+    calibration: CalibrationDescription,
+    limits: Array,
+    noise: Array,
 ) -> RowThreshold:
     """The row with what calibration says of it; thresholds that the user gave stay."""
     known = calibration.rows.get(row_name(robot, row))
@@ -160,7 +166,8 @@ def _calibrated_row(
     if _given(detection.contact, kind, key) is None and np.isfinite(limits[row.segment]):
         contact = known.typical * limits[row.segment]
         if "rows" in detection.method:
-            seen = float(limits[row.segment])  # as the statistic that the tail was fitted to
+            # As the statistic that the tail was fitted to, and no rarer noise than it has met.
+            seen = float(max(limits[row.segment], noise[row.segment]))
     if _given(detection.collision, kind, key) is None:
         collision = max(COLLISION_RATIO * contact, _least_collision(robot, row))
     limit = detection.baseline.limit * contact

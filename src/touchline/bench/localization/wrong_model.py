@@ -16,6 +16,7 @@ from touchline.bench.detection.free_motion import (
     random_trajectory,
 )
 from touchline.bench.localization.arm import load_arm
+from touchline.calibrate.run import growth
 from touchline.detector import calibration as cal
 from touchline.identify.described import identified_robot
 from touchline.identify.evidence import gather
@@ -53,16 +54,26 @@ def wrong_model(
             rng = generator(number, minute)
             yield [maker.samples(random_trajectory(robot, rng), rng)]
 
-    if identified:
-        robot = identified_robot(identify(gather(robot, recordings())))
-    return with_thresholds(robot, recordings), real
+    if not identified:
+        return with_thresholds(robot, recordings, {}), real
+    found = identify(gather(robot, recordings()))
+    return with_thresholds(identified_robot(found), recordings, growth(found)), real
 
 
-def with_thresholds(robot: Robot, recordings: Callable[[], Iterable[Iterable[Samples]]]) -> Robot:
-    """The robot with thresholds from motion without contact; `recordings` are made twice."""
+def with_thresholds(
+    robot: Robot, recordings: Callable[[], Iterable[Iterable[Samples]]], elsewhere: dict[str, float]
+) -> Robot:
+    """The robot with thresholds from motion without contact.
+
+    Args:
+        robot: as identified.
+        recordings: makes them, twice.
+        elsewhere: by row, how much larger residuals are on motion that played no part.
+    """
     period, methods = 1.0 / RATE, robot.description.detection.method
     rows = cal.fit_rows(robot, period, cal.collect_residuals(robot, period, recordings()))
     robot = cal.with_methods(robot, *methods, min_duration=0.0)
     found = cal.collect_statistics(robot, period, rows, recordings(), methods)
     tails = cal.fit_tails(robot, found, methods)
+    rows = cal.grown(rows, elsewhere)
     return cal.with_calibration(robot, cal.describe(found.hours, period, rows, tails))
