@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arms calibrated on two minutes of motion: what they take for contacts elsewhere, and find at rest."""
+"""Arms calibrated on two minutes of motion: phantoms elsewhere, and pushes found at rest."""
 
 import sys
 from collections.abc import Iterable, Sequence
@@ -39,9 +39,14 @@ MINUTES = 2  # of motion for the calibration
 POSES, MOTIONS, SECONDS = 20, 10, 30.0  # s each, without contact
 PUSHES, FORCE, PUSHED, RELEASED, RISE, LASTS = 20, 2.0, 2.0, 3.0, 0.05, 4.0  # N, s; at rest
 HEAD = (
-    "arm", "what is wrong", "thresholds", "phantoms: 10 min standing", "5 min moving", "2 N at rest",
+    "arm",
+    "what is wrong",
+    "thresholds",
+    "phantoms: 10 min standing",
+    "5 min moving",
+    "2 N at rest",
     "thresholds without the bias",
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True)
