@@ -115,7 +115,7 @@ class TouchSampler:
         return T[:3, :3] @ local + T[:3, 3], T[:3, :3] @ surface.normals[face]
 
     def reachable(self, q: Array, point: Array, normal: Array) -> bool:
-        """Does a finger get to a point (3,) [m] of the surface from outside, in posture `q` (n,)?"""
+        """Does a finger get to a point (3,) [m] of the surface from outside, in posture `q`?"""
         if point[2] < self._floor or self.skin.links_around(q, point + 1e-6 * normal):
             return False
         return self._free(q, point, normal)
