@@ -18,11 +18,20 @@ from touchline.model.description import AXES, RobotDescription
 class SamplesLike(Protocol):
     """Arrays as in `Samples`; a NaN is written as an empty cell or null."""
 
-    time: np.ndarray
-    q: np.ndarray
-    qd: np.ndarray
-    tau: np.ndarray
-    wrench: np.ndarray
+    @property
+    def time(self) -> np.ndarray: ...
+
+    @property
+    def q(self) -> np.ndarray: ...
+
+    @property
+    def qd(self) -> np.ndarray: ...
+
+    @property
+    def tau(self) -> np.ndarray: ...
+
+    @property
+    def wrench(self) -> np.ndarray: ...
 
 
 def table_columns(samples: Any, description: RobotDescription) -> dict[str, np.ndarray]:

@@ -65,9 +65,14 @@ def _samples(robot: Robot, logs: list[Path]) -> tuple[Samples, Samples]:
     for log in logs:
         with open_log(log, robot.description) as recording:
             chunks = list(recording.chunks(1 << 15))
-        names = ("time", "q", "qd", "tau", "wrench")
         recordings.append(
-            Samples(*(np.concatenate([getattr(c, name) for c in chunks]) for name in names))
+            Samples(
+                np.concatenate([c.time for c in chunks]),
+                np.concatenate([c.q for c in chunks]),
+                np.concatenate([c.qd for c in chunks]),
+                np.concatenate([c.tau for c in chunks]),
+                np.concatenate([c.wrench for c in chunks]),
+            )
         )
     if len(recordings) > 1:
         return recordings[0], recordings[1]
