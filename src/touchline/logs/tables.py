@@ -19,19 +19,29 @@ class SamplesLike(Protocol):
     """Arrays as in `Samples`; a NaN is written as an empty cell or null."""
 
     @property
-    def time(self) -> np.ndarray: ...
+    def time(self) -> np.ndarray:
+        """(N,) [s]."""
+        ...
 
     @property
-    def q(self) -> np.ndarray: ...
+    def q(self) -> np.ndarray:
+        """(N, n) [rad] or [m]."""
+        ...
 
     @property
-    def qd(self) -> np.ndarray: ...
+    def qd(self) -> np.ndarray:
+        """(N, n) [rad/s] or [m/s]."""
+        ...
 
     @property
-    def tau(self) -> np.ndarray: ...
+    def tau(self) -> np.ndarray:
+        """(N, n) in logged units."""
+        ...
 
     @property
-    def wrench(self) -> np.ndarray: ...
+    def wrench(self) -> np.ndarray:
+        """(N, k, 6) [N, Nm]."""
+        ...
 
 
 def table_columns(samples: Any, description: RobotDescription) -> dict[str, np.ndarray]:
