@@ -76,7 +76,8 @@ def link_count(link):
 
 def test_old_states_behind_a_pause_are_left_out(arm):
     panda = source(arm, lambda host: Panda())
-    panda.open()
+    (note,) = panda.open()
+    assert "sets the arm's collision thresholds" in note
 
     def fresh(tick, now):
         sample = from_franka(arm, make_state(tick))

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 # pyright: reportMissingImports=false
-"""`franka://HOST`: a Franka arm, read at 1 kHz with franky-control; nothing is commanded."""
+"""`franka://HOST`: a Franka arm, read at 1 kHz with franky-control; nothing moves.
+
+franky sets the arm's collision thresholds whenever it connects, which no option of it prevents.
+"""
 
 import time
 from collections.abc import Callable
@@ -18,6 +21,10 @@ JOINTS = 7
 PAUSE = 0.05  # s; behind a longer one the first states are old
 QUEUED = 1.0 / 3.0  # of its clock's step: a state that comes sooner waited in a queue
 ENOUGH = 2  # states in a row that did not
+REFLEXES = (
+    "franky sets the arm's collision thresholds to 20 Nm and 30 N as it connects: set your own "
+    "again, or read the arm with ros2://"
+)
 MOST = 20  # states that are looked at in one read
 
 
@@ -62,7 +69,7 @@ class FrankaArm:
         except Exception as error:  # the library raises many kinds
             raise _judged(error, self._host) from None
         self._last, self._heard, self._in_time = -1.0, 0.0, 0
-        return []
+        return [REFLEXES]
 
     def read(self, timeout: float) -> list[Sample]:
         """The states that have come; old ones behind a pause are left out."""
