@@ -36,7 +36,8 @@ PLAIN = [
 ]
 PLAIN += sorted((REPOSITORY / "docs" / "howto").glob("*.md"))
 SITE = [*PLAIN, *sorted((REPOSITORY / "docs" / "reference").glob("*.md"))]
-MORE = "architecture calibration interface live reliability"
+MORE = "architecture calibration interface live localization reliability"
+SITE += [REPOSITORY / "CHANGELOG.md"]
 SITE += [REPOSITORY / "docs" / f"{name}.md" for name in MORE.split()]
 NUMBER = re.compile(r"[-+]?\d+\.\d+")
 
