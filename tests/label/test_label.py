@@ -217,6 +217,22 @@ def test_plain_parquet(robot, episodes, tmp_path):
     assert f"touch.tau_ext.{robot.joint_names[0]}" in after.column_names
 
 
+def test_a_column_that_is_damaged_and_no_signal_is_told(robot, episodes, tmp_path, capsys):
+    path = tmp_path / "log.parquet"
+    write_table(path, episodes[TOUCHED], robot.description)
+    table = pq.read_table(path)
+    table = table.append_column("note", [[f"note {i}" * 3 for i in range(len(table))]])
+    pq.write_table(table, path, use_dictionary=False)
+    chunk = pq.ParquetFile(path).metadata.row_group(0).column(table.num_columns - 1)
+    raw = bytearray(path.read_bytes())
+    middle = chunk.data_page_offset + chunk.total_compressed_size // 2
+    raw[middle : middle + 64] = bytes(64)
+    path.write_bytes(raw)
+    assert main(["label", str(path), "--robot", "sara"]) == 2
+    assert "log.parquet: damaged" in capsys.readouterr().err
+    assert path.read_bytes() == bytes(raw)
+
+
 @pytest.mark.parametrize("layout", ["droid", "robomimic"])
 def test_hdf5(robot, episodes, tmp_path, layout):
     h5py = pytest.importorskip("h5py", reason="h5py is not installed: touchline[hdf5]")

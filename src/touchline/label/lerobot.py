@@ -14,6 +14,7 @@ from touchline.folder import replaced_file
 from touchline.label.channel import BEFORE, LEVELS, Channel, Feeler, episode_samples, parts
 from touchline.label.labelled import Labelled
 from touchline.label.naming import Given, choose
+from touchline.logs.parquet import damages, first_line
 from touchline.model.robot import Robot
 
 INFO, STATS, ABOUT = "meta/info.json", "meta/stats.json", "meta/touchline.json"
@@ -69,7 +70,6 @@ def label_lerobot(path: Path, robot: Robot, given: Given) -> Labelled:
 def _label_file(
     file: Path, feeler: Feeler, names: dict[str, str], done: Labelled, spread: "_Spread"
 ) -> None:
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
@@ -77,8 +77,8 @@ def _label_file(
             table, metadata = opened.read(), opened.metadata
             groups = [metadata.row_group(g).num_rows for g in range(metadata.num_row_groups)]
             codec = metadata.row_group(0).column(0).compression if groups else "SNAPPY"
-    except (pa.ArrowException, OSError) as error:
-        raise InputError(f"{file}: not a readable Parquet file: {error}") from error
+    except damages() as error:
+        raise InputError(f"{file}: not a readable Parquet file: {first_line(error)}") from error
     for column in ("episode_index", "timestamp", *names.values()):
         if column not in table.column_names:
             raise InputError(f"{file}: column {column!r} is missing")

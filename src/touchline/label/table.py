@@ -11,6 +11,7 @@ from touchline.label.channel import LEVELS, Feeler, parts
 from touchline.label.labelled import Labelled
 from touchline.label.naming import Given
 from touchline.logs.log import read_log
+from touchline.logs.parquet import damages, first_line
 from touchline.logs.period import typical_period
 from touchline.model.robot import Robot
 
@@ -32,7 +33,10 @@ def label_table(path: Path, robot: Robot, given: Given) -> Labelled:
     channel = feeler.feel(samples)
     done = Labelled(1.0 / period)
     done.add(channel, len(samples) * period)
-    table = pq.read_table(path)
+    try:
+        table = pq.read_table(path)
+    except damages() as error:  # in a column that is no signal of the robot
+        raise InputError(f"{path}: damaged: {first_line(error)}") from error
     if table.num_rows != len(samples):
         raise InputError(f"{path}: {table.num_rows} rows, but {len(samples)} samples were read")
     table = table.drop_columns([n for n in table.column_names if n.startswith(PREFIX)])
