@@ -83,10 +83,16 @@ def test_the_description_is_in_the_page(page):
 def test_moments_ignore_what_is_not_known():
     moments = Moments(2)
     values = np.array([[1.0, np.nan], [-3.0, 2.0], [9.0, 4.0]])
-    moments.add(values, np.array([[True], [True], [False]]))
+    where = np.repeat([[True], [True], [False]], 2, axis=1)
+    moments += Moments.of(values[:1], where[:1])
+    moments += Moments.of(values[1:], where[1:])
     np.testing.assert_allclose(moments.rms, [np.sqrt(5.0), 2.0])
     np.testing.assert_allclose(moments.mean, [-1.0, 2.0])
     np.testing.assert_allclose(moments.largest, [3.0, 2.0])
+    nothing = Moments.of(values, np.zeros((3, 2), bool))
+    assert np.isnan([nothing.rms, nothing.mean, nothing.largest]).all()
+    whole = Moments.of(values[:, :1], where[:, :1] | True)
+    np.testing.assert_allclose([whole.mean[0], whole.largest[0]], [7.0 / 3.0, 9.0])
 
 
 def test_a_page_without_room_says_what_was_left_out(analysis, monkeypatch):

@@ -65,8 +65,12 @@ def felt(robot: Robot, period: float = 1e-3) -> list[Felt]:
     limits = _limits(robot, rows, period)
     rng = np.random.default_rng(0)
     postures = rng.uniform(*robot.ranges, (POSTURES, len(robot.joint_names)))
-    frames = [robot.poses(q) for q in postures]
-    return [_on_link(robot, patch, rows, limits, frames, rng) for patch in Skin(robot).patches]
+    frames = np.array([robot.poses(q) for q in postures])
+    screws = np.zeros((len(frames), len(rows), 6))
+    for i, row in enumerate(rows):
+        screws[:, i] = screw_of(robot, row, frames)
+    patches = Skin(robot).patches
+    return [_on_link(robot, patch, rows, limits, frames, screws, rng) for patch in patches]
 
 
 def note_felt(robot: Robot, findings: Findings, period: float = 1e-3) -> None:
@@ -112,7 +116,8 @@ def _on_link(
     patch: Patch,
     rows: tuple[RowThreshold, ...],
     limits: Array,
-    frames: list[Array],
+    frames: Array,
+    screws: Array,
     rng: np.random.Generator,
 ) -> Felt:
     body = robot.body_of(patch.link)
@@ -121,15 +126,14 @@ def _on_link(
     own = [i for i in own if rows[i].component >= 0 or robot.joint_names[rows[i].joint] in moved]
     if not own:
         return Felt(patch.link, None, np.inf, np.inf, 0)
-    forces, rank = [], 0
-    for poses in frames:
+    forces, screws = [], screws[:, own]
+    for poses, shown in zip(frames, screws, strict=True):
         points, directions = _pushes(patch, poses[patch.node], rng)
-        screws = np.array([screw_of(robot, rows[i], poses) for i in own])
         wrenches = np.hstack([directions, np.cross(points, directions)])
-        loads = np.abs(wrenches @ screws.T)
+        loads = np.abs(wrenches @ shown.T)
         with np.errstate(divide="ignore"):
             forces.append(np.min(limits[own] / loads, axis=1))
-        rank = max(rank, int(np.linalg.matrix_rank(screws, tol=1e-6)))
+    rank = int(np.max(np.linalg.matrix_rank(screws, tol=1e-6)))
     low, high = np.quantile(np.concatenate(forces), (0.5, SHARE), method="higher")
     return Felt(patch.link, body.segment, float(high), float(low), rank)
 
@@ -151,17 +155,21 @@ def _pushes(patch: Patch, T_world_node: Array, rng: np.random.Generator) -> tupl
 
 
 def screw_of(robot: Robot, row: RowThreshold, poses: Array) -> Array:
-    """What a row shows of a wrench (6,) about the world's origin: its joint's or axis's screw."""
+    """What a row shows of a wrench about the world's origin: its joint's or axis's screw (..., 6).
+
+    Args:
+        robot: the robot.
+        row: of the detector.
+        poses: (..., nodes, 4, 4) of the nodes in world.
+    """
     if row.component < 0:
         name = robot.joint_names[row.joint]
         node = next(i for i, n in enumerate(robot.nodes) if n.joint == name)
-        axis, origin = poses[node][:3, 2], poses[node][:3, 3]
-        if robot.nodes[node].kind == "prismatic":
-            return np.r_[axis, np.zeros(3)]
-        return np.r_[np.cross(origin, axis), axis]
-    segment = robot.segment_names[row.segment]
-    node = next(i for i, n in enumerate(robot.nodes) if n.sensor == segment)
-    axis, origin = poses[node][:3, row.component % 3], poses[node][:3, 3]
-    if row.component < 3:
-        return np.r_[axis, np.zeros(3)]
-    return np.r_[np.cross(origin, axis), axis]
+        along, straight = 2, robot.nodes[node].kind == "prismatic"
+    else:
+        segment = robot.segment_names[row.segment]
+        node = next(i for i, n in enumerate(robot.nodes) if n.sensor == segment)
+        along, straight = row.component % 3, row.component < 3
+    axis, origin = poses[..., node, :3, along], poses[..., node, :3, 3]
+    parts = (axis, np.zeros_like(axis)) if straight else (np.cross(origin, axis), axis)
+    return np.concatenate(parts, axis=-1)

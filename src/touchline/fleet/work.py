@@ -16,6 +16,7 @@ from touchline.fleet.manifest import Row, file_hash, stands
 from touchline.fleet.plan import Recording
 from touchline.fleet.remote import fetched
 from touchline.logs.bagfile import first_line
+from touchline.memory import peak_megabytes
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ def done(job: Job) -> Row:
         row["reason"] = f"{type(error).__name__}: {first_line(error)}"
     row["seconds"] = round(time.monotonic() - began, 3)
     row["cpu_seconds"] = round(time.process_time() - cpu, 3)
-    row["memory_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+    row["memory_mb"] = peak_megabytes()
     return row
 
 

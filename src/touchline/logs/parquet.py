@@ -17,7 +17,7 @@ from touchline.logs.source import HEAD_ROWS
 from touchline.model.description import RobotDescription
 
 METADATA_KEY = b"touchline"
-_BATCH_ROWS = 65536
+_BATCH_ROWS = 1 << 14
 
 
 class ParquetSource:

@@ -64,10 +64,10 @@ class Analysis:
         period: median time between the first samples [s].
         thresholds: of the detection.
         statistics: of all samples.
-        curves: for plots.
+        curves: for plots; without traces where there is no page.
         events: all events.
-        poses: how the robot stood at each of them.
-        windows: the curves around them.
+        poses: how the robot stood at each of them; none where there is no page.
+        windows: the curves around them; none where there is no page.
         comparisons: of the events with the truth of a simulated log.
         standing: what stood on the arm without a touch, and its noise.
         faint: touches, true or felt, that lie below what can be felt on their link, a line each.
@@ -148,7 +148,8 @@ def analyze(
             raise InputError(f"{log}: holds no samples")
         with ResultsFolder(out, NAMES) as folder:
             period = sample_period(recording, first.time)
-            run = _Run(Pipeline(model, bandwidth, method, period), folder.draft, period, other)
+            pipeline = Pipeline(model, bandwidth, method, period)
+            run = _Run(pipeline, folder.draft, period, other, report)
             glanced = Glance()
             for part in _with_progress(recording, chain([first], parts)):
                 glanced.add(part, run.add(part))
@@ -159,7 +160,7 @@ def analyze(
             warnings += watch_warnings(model, run.statistics)
             warnings += standing_lines(run.pipeline.standing)
             warnings += [f"check: {line}" for line in found]
-            analysis = run.finish(log, out, method, bandwidth, report, warnings, recording.losses)
+            analysis = run.finish(log, out, method, bandwidth, warnings, recording.losses)
             where = origin or str(log.resolve())
             facts = _origin(analysis) | {"findings": found}
             facts |= {"standing": [s.to_dict() for s in unlike_told(analysis.standing)]}
@@ -231,9 +232,15 @@ class _Run:
     """One recording on its way through the pipeline, a part at a time."""
 
     def __init__(
-        self, pipeline: Pipeline, draft: Path, period: float, beside: Beside | None
+        self,
+        pipeline: Pipeline,
+        draft: Path,
+        period: float,
+        beside: Beside | None,
+        report: Report,
     ) -> None:
         self.pipeline, self.period = pipeline, period
+        self._report: Report = report
         robot = pipeline.robot
         self._outputs = Outputs(draft, robot, pipeline.skin)
         self.statistics = Statistics.of(len(robot.joint_names), len(robot.segment_names))
@@ -250,16 +257,17 @@ class _Run:
         time = part.time
         estimate, detection = self.pipeline.run(time, part.q, part.qd, part.tau, part.wrench)
         self.statistics.add(time, estimate, detection, self.pipeline.watch)
-        values = self._curves.values(part, estimate, detection)
-        self._curves.traces.add(time, values)
         events = self.pipeline.events
-        self._windows.add(time, values, events)
+        if self._report != "none":
+            values = self._curves.values(part, estimate, detection)
+            self._curves.traces.add(time, values)
+            self._windows.add(time, values, events)
+            self._poses.add(time, part.q, events)
         self._outputs.estimates(time, estimate)
         self._outputs.contacts(time, estimate, self.pipeline.contacts)
         self._outputs.pressed(time, part.q, estimate)
         self._outputs.events(events)
         self._outputs.postures(time, part.q)
-        self._poses.add(time, part.q, events)
         return np.any(detection.levels, axis=1, keepdims=True)[:, 0]
 
     def finish(
@@ -268,7 +276,6 @@ class _Run:
         out: Path,
         method: str,
         bandwidth: float | None,
-        report: Report,
         warnings: list[str],
         losses: list[str],
     ) -> Analysis:
@@ -295,7 +302,7 @@ class _Run:
             comparisons=comparisons,
             standing=self.pipeline.standing,
             faint=faint_lines(events, comparisons, able),
-            report=report,
+            report=self._report,
             warnings=warnings,
             losses=losses,
         )

@@ -22,15 +22,31 @@ class Moments:
         self._sum, self._squares = np.zeros(columns), np.zeros(columns)
         self._largest = np.zeros(columns)
 
-    def add(self, values: Array, where: NDArray[np.bool_]) -> None:
-        """Take rows (N, c) where (N, c) is true."""
-        used = where & np.isfinite(values)
-        clean = np.where(used, values, 0.0)
-        self.count += used.sum(axis=0)
-        self._sum += clean.sum(axis=0)
-        self._squares += np.einsum("ij,ij->j", clean, clean)
-        if len(values):
-            self._largest = np.maximum(self._largest, np.maximum(clean.max(0), -clean.min(0)))
+    @classmethod
+    def of(cls, values: Array, where: NDArray[np.bool_]) -> "Moments":
+        """Those of rows (N, c) where (N, c) is true."""
+        moments = cls(values.shape[1])
+        known = where.any(axis=0)
+        if not known.any():
+            return moments
+        # Column by column, in memory too: a segment without a sensor has no wrench at all.
+        columns, used = np.ascontiguousarray(values.T[known]), where.T[known]
+        moments.count[known] = len(values)
+        if not (used.all() and np.isfinite(columns).all()):
+            used = used & np.isfinite(columns)
+            columns = np.where(used, columns, 0.0)
+            moments.count[known] = used.sum(axis=1)
+        moments._sum[known] = columns.sum(axis=1)
+        moments._squares[known] = np.einsum("ij,ij->i", columns, columns)
+        moments._largest[known] = np.maximum(columns.max(axis=1), -columns.min(axis=1))
+        return moments
+
+    def __iadd__(self, other: "Moments") -> "Moments":
+        self.count += other.count
+        self._sum += other._sum
+        self._squares += other._squares
+        self._largest = np.maximum(self._largest, other._largest)
+        return self
 
     def _per_sample(self, total: Array) -> Array:
         return np.divide(total, self.count, out=np.full(len(total), np.nan), where=self.count > 0)
@@ -119,19 +135,26 @@ class Statistics:
         self, time: Array, estimate: Estimate, detection: Detection, watch: NDArray[np.int8]
     ) -> None:
         """Take N samples; `watch` (N, m): numbers of `Watch`."""
-        settled = (estimate.health & Health.SETTLING) == 0
-        for state in range(len(Watch)):
-            self.watch[:, state] += np.count_nonzero(watch[settled] == state, axis=0)
-        self.clock.add(time)
         health = estimate.health
+        settled = (health & Health.SETTLING) == 0
+        seen = watch if settled.all() else watch[settled]
+        for state in range(len(Watch)):
+            self.watch[:, state] += np.count_nonzero(seen == state, axis=0)
+        self.clock.add(time)
         self.healthy += int((health == 0).sum())
+        any_of = int(np.bitwise_or.reduce(health, initial=0))
         for bit in Health:
-            self.health[bit] += int(np.count_nonzero(health & bit))
+            if bit & any_of:
+                self.health[bit] += int(np.count_nonzero(health & bit))
         quiet = np.all(detection.levels == 0, axis=1, keepdims=True)
-        settled = estimate.joint_settled
-        self.torque.add(estimate.tau_ext, settled)
-        self.quiet_torque.add(estimate.tau_ext, settled & quiet)
         wrench = estimate.segment_wrench.reshape(len(time), -1)
-        settled = np.repeat(estimate.segment_settled, 6, axis=1)
-        self.wrench.add(wrench, settled)
-        self.quiet_wrench.add(wrench, settled & quiet)
+        of_wrenches = np.repeat(estimate.segment_settled, 6, axis=1)
+        for values, settled, all_of, without_touch in (
+            (estimate.tau_ext, estimate.joint_settled, self.torque, self.quiet_torque),
+            (wrench, of_wrenches, self.wrench, self.quiet_wrench),
+        ):
+            moments = Moments.of(values, settled)
+            all_of += moments
+            if not quiet.all():
+                moments = Moments.of(values, settled & quiet)
+            without_touch += moments

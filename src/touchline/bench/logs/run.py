@@ -3,7 +3,6 @@
 
 import json
 import multiprocessing
-import resource
 import tempfile
 import time
 from collections.abc import Callable
@@ -19,6 +18,7 @@ from touchline.bench.tables import Row, aligned
 from touchline.bench.touches import TouchSampler, touch_loads
 from touchline.localizer.skin import Skin
 from touchline.logs import open_log, write_table
+from touchline.memory import peak_megabytes
 from touchline.model.robot import Robot, load_robot
 from touchline.observer.observer import Observer
 from touchline.observer.samples import Samples
@@ -209,5 +209,4 @@ def _analyzed(log: str, out: str, report: Any) -> str:
     began = time.process_time()
     analysis = analyze(log, ROBOT, out, report=report)
     seconds = time.process_time() - began
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
-    return json.dumps([len(analysis.events), seconds, memory])
+    return json.dumps([len(analysis.events), seconds, peak_megabytes()])
