@@ -348,8 +348,9 @@ class Detector {
     double most = row.contact;
     if (row.seen > 0.0) {
       const double noise = meters_[i].limit(row.seen, first_looks_[i].ratio());
-      const double error = row.seen * std::sqrt(row.slow.moving_variance(activity()));
-      most = std::max(most, std::hypot(noise, error));
+      const double variance = row.slow.moving_variance(activity());
+      const double error = variance > 0.0 ? row.seen * std::sqrt(variance) : 0.0;
+      most = std::max(most, error > 0.0 ? std::hypot(noise, error) : noise);
     }
     if (learns(i)) most = std::max(most, spreads_[i].limit());
     const double gap = samples_[i].gap_std;

@@ -74,6 +74,7 @@ class NoiseMeter {
   static constexpr double kNoisier = 1.5;  // times told: noise figures are no better than this
 
   bool exceeds(double told) const {
+    if (!(variance_ > told * told)) return false;  // as nearly always: the root is dear
     return count_ > kFew && variance_ > told * told * (1.0 + kSure * std::sqrt(2.0 / count_));
   }
 

@@ -98,13 +98,12 @@ class RowCovariance {
     const int node = observer_.sensors()[s].node;
     for (std::size_t c = 0; c < joints_; ++c)
       velocity[c] += sign * dot(twist, posture.momentum(node, c));
-    for (int a = 0; a < 6; ++a) {
-      double unit[6] = {0, 0, 0, 0, 0, 0};
-      unit[a] = 1.0;
-      reading[joints_ + 6 * s + a] +=
-          sign * dot(twist, wrench_to_parent(posture.pose(node),
-                                             {{unit[0], unit[1], unit[2]},
-                                              {unit[3], unit[4], unit[5]}}));
+    const Pose& X = posture.pose(node);
+    const Vec3 axes[3] = {X.R.x, X.R.y, X.R.z};  // unit forces and moments of the sensor, in world
+    double* of_sensor = reading + joints_ + 6 * s;
+    for (int a = 0; a < 3; ++a) {
+      of_sensor[a] += sign * dot(twist, Spatial{axes[a], cross(X.p, axes[a])});
+      of_sensor[3 + a] += sign * dot(twist.angular, axes[a]);
     }
   }
 

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "touchline/detail/model/lanes.hpp"
 #include "touchline/detail/model/spatial.hpp"
 
 namespace touchline {
@@ -67,7 +68,7 @@ class Mesh {
   template <class Visit>
   void crossings(const ForceLine& line, Visit&& visit) const {
     const Vec3 inverse = invert(line.direction);
-    visit_triangles([&](const Box& box) { return crosses(box, line.origin, inverse); },
+    visit_triangles([&](const Box& box, int) { return crosses(box, line.origin, inverse); },
                     [&](const Triangle& tri) {
                       double t;
                       if (crosses(tri, line, t)) visit(Crossing{t, tri.face, tri.normal});
@@ -90,18 +91,25 @@ class Mesh {
   }
 
   // Calls `visit(SurfacePoint)` for the point nearest to the line of each triangle that is nearer
-  // to it than `limit` and whose normal is `wanted(normal)`.
-  template <class Wanted, class Visit>
-  void around(const ForceLine& line, double limit, Wanted&& wanted, Visit&& visit) const {
+  // to it than `limit` and stands against it: at a cosine above `steep`.
+  template <class Visit>
+  void around(const ForceLine& line, double limit, double steep, Visit&& visit) const {
     const Vec3 inverse = invert(line.direction);
-    visit_triangles([&](const Box& box) { return crosses(box, line.origin, inverse, limit); },
-                    [&](const Triangle& tri) {
-                      if (!wanted(tri.normal)) return;
-                      SurfacePoint p;
-                      p.distance = limit;
-                      nearer_to_line(tri, line, p);
-                      if (p.face >= 0) visit(p);
-                    });
+    const Triangle* some[kLanes];
+    int count = 0;
+    visit_triangles(
+        [&](const Box& box, int index) {
+          return faces_[index].may_stand_against(line.direction, steep) &&
+                 crosses(box, line.origin, inverse, limit);
+        },
+        [&](const Triangle& tri) {
+          if (!(-dot(tri.normal, line.direction) > steep)) return;
+          some[count++] = &tri;
+          if (count < kLanes) return;
+          nearer_to_line(some, count, line, limit, visit);
+          count = 0;
+        });
+    if (count > 0) nearer_to_line(some, count, line, limit, visit);
   }
 
   // The point of the surface nearest to `p`, if nearer than `limit`.
@@ -135,9 +143,49 @@ class Mesh {
     int count;  // triangles of a leaf; 0: an inner box
   };
 
+  // The directions of all normals in a box: within an angle of a cosine about an axis.
+  struct Facing {
+    BasicVec3<float> axis;
+    float cosine = -1.0f, sine = 0.0f;  // -1: in all directions
+
+    // May one of them be `n` with -n . direction > steep? If in doubt, yes.
+    bool may_stand_against(const Vec3& direction, double steep) const {
+      if (cosine <= 0.0f) return true;
+      const double x = -(axis.x * direction.x + axis.y * direction.y + axis.z * direction.z);
+      if (x >= cosine) return true;
+      // The nearest of them to -direction is the angle of the cone away from the axis towards it.
+      const double most = x * cosine + std::sqrt(std::max(0.0, 1.0 - x * x)) * sine;
+      return most > steep - kRounded;
+    }
+    static constexpr double kRounded = 1e-5;  // of the cosines, which are floats
+  };
+
   void order() {
     boxes_.reserve(triangles_.size() + 1);
     if (!triangles_.empty()) build(0, static_cast<int>(triangles_.size()));
+    faces_.resize(boxes_.size());
+    for (std::size_t i = boxes_.size(); i-- > 0;) {
+      int end = static_cast<int>(i);  // the last leaf of this box
+      while (boxes_[end].count == 0) end = boxes_[end].next;
+      int begin = static_cast<int>(i);
+      while (boxes_[begin].count == 0) ++begin;
+      faces_[i] = facing(boxes_[begin].next, boxes_[end].next + boxes_[end].count);
+    }
+  }
+
+  Facing facing(int begin, int end) const {
+    Vec3 sum;
+    for (int i = begin; i < end; ++i) sum += triangles_[i].normal;
+    const double size = norm(sum);
+    if (!(size > 0.0)) return {};
+    const Vec3 axis = (1.0 / size) * sum;
+    double cosine = 1.0;
+    for (int i = begin; i < end; ++i) cosine = std::min(cosine, dot(axis, triangles_[i].normal));
+    Facing out;
+    out.axis = {static_cast<float>(axis.x), static_cast<float>(axis.y), static_cast<float>(axis.z)};
+    out.cosine = static_cast<float>(cosine);
+    out.sine = static_cast<float>(std::sqrt(std::max(0.0, 1.0 - cosine * cosine)));
+    return out;
   }
 
   int build(int begin, int end) {
@@ -156,7 +204,7 @@ class Mesh {
     return index;
   }
 
-  // Calls `visit(Triangle)` for all in boxes that are `reached(Box)`, in no order.
+  // Calls `visit(Triangle)` for all in boxes that are `reached(Box, its number)`, in no order.
   template <class Reached, class Visit>
   void visit_triangles(Reached&& reached, Visit&& visit) const {
     if (empty()) return;
@@ -165,7 +213,7 @@ class Mesh {
     while (size > 0) {
       const int index = stack[--size];
       const Box& box = boxes_[index];
-      if (!reached(box)) continue;
+      if (!reached(box, index)) continue;
       if (box.count == 0) {
         stack[size++] = index + 1;
         stack[size++] = box.next;
@@ -279,8 +327,58 @@ class Mesh {
     if (distance < best.distance) best = {distance, tri.face, point, tri.normal};
   }
 
+  // How far `v` is outside of a range; without a branch, which would be taken at random.
   static double outside(double v, double low, double high) {
-    return v < low ? low - v : v > high ? v - high : 0.0;
+    return std::max(0.0, std::max(low - v, v - high));
+  }
+
+  // The same for several triangles side by side, each of which is offered as far as `limit`.
+  template <class Visit>
+  static void nearer_to_line(const Triangle* const* some, int count, const ForceLine& line,
+                             double limit, Visit&& visit) {
+    using Many = BasicVec3<Lanes>;
+    const auto gather = [&](Vec3 Triangle::*member) {
+      Many v;
+      for (int k = 0; k < kLanes; ++k) {
+        const Vec3& x = some[std::min(k, count - 1)]->*member;
+        set_lane(v.x, k, x.x);
+        set_lane(v.y, k, x.y);
+        set_lane(v.z, k, x.z);
+      }
+      return v;
+    };
+    const Many a = gather(&Triangle::a), ab = gather(&Triangle::ab), ac = gather(&Triangle::ac);
+    const Many corners[3] = {a, a + ab, a + ac};
+    Lanes distance = all_lanes(limit);
+    Many point{};
+    for (int i = 0; i < 3; ++i) {
+      const Many edge = corners[(i + 1) % 3] - corners[i];
+      const Many e = edge - dot(edge, line.direction) * many(line.direction);
+      const Many from = corners[i] - many(line.origin);
+      const Many beside = from - dot(from, line.direction) * many(line.direction);
+      const Lanes length = dot(e, e), zero = all_lanes(0.0), one = all_lanes(1.0);
+      Lanes s = -dot(beside, e) / length;
+      s = s < zero ? zero : one < s ? one : s;
+      s = length > zero ? s : zero;
+      const Many off = beside + s * e, at = corners[i] + s * edge;
+      const Lanes way = root(dot(off, off));
+      const auto nearer = way < distance;
+      distance = nearer ? way : distance;
+      point = {nearer ? at.x : point.x, nearer ? at.y : point.y, nearer ? at.z : point.z};
+    }
+    for (int k = 0; k < count; ++k) {
+      const Triangle& tri = *some[k];
+      double t;
+      if (crosses(tri, line, t)) {
+        if (limit > 0.0) visit(SurfacePoint{0.0, tri.face, line.at(t), tri.normal});
+      } else if (lane(distance, k) < limit) {
+        visit(SurfacePoint{lane(distance, k), tri.face,
+                           {lane(point.x, k), lane(point.y, k), lane(point.z, k)}, tri.normal});
+      }
+    }
+  }
+  static BasicVec3<Lanes> many(const Vec3& v) {
+    return {all_lanes(v.x), all_lanes(v.y), all_lanes(v.z)};
   }
 
   // Beside the line, the nearest point of a triangle lies on an edge.
@@ -328,6 +426,7 @@ class Mesh {
 
   std::vector<Triangle> triangles_;
   std::vector<Box> boxes_;
+  std::vector<Facing> faces_;  // per box
 };
 
 }  // namespace touchline

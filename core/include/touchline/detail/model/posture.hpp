@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "touchline/detail/model/lanes.hpp"
 #include "touchline/detail/model/tree.hpp"
 
 namespace touchline {
@@ -20,7 +21,10 @@ class Posture {
   Posture(const Tree& tree, std::size_t joints)
       : tree_(tree),
         state_(tree.make_state<double>()),
+        states_(tree.make_state<Lanes>()),
         unit_(joints, 0.0),
+        angles_(joints, all_lanes(0.0)),
+        units_(angles_),
         poses_(tree.nodes().size()),
         subspaces_(tree.nodes().size()),
         twists_(tree.nodes().size()),
@@ -65,16 +69,23 @@ class Posture {
     return false;
   }
 
+  // Several joints side by side.
   void find_momenta(const double* q) {
     const std::size_t joints = unit_.size();
-    for (std::size_t j = 0; j < joints; ++j) {
-      unit_[j] = 1.0;
-      tree_.sweep(q, unit_.data(), state_);
-      unit_[j] = 0.0;
+    for (std::size_t j = 0; j < joints; ++j) angles_[j] = all_lanes(q[j]);
+    for (std::size_t first = 0; first < joints; first += kLanes) {
+      const std::size_t count = std::min<std::size_t>(kLanes, joints - first);
+      for (std::size_t k = 0; k < count; ++k) set_lane(units_[first + k], static_cast<int>(k), 1.0);
+      tree_.sweep(angles_.data(), units_.data(), states_);
+      for (std::size_t k = 0; k < count; ++k) units_[first + k] = all_lanes(0.0);
       for (std::size_t i = 0; i < poses_.size(); ++i) {
-        const NodeState<double>& s = state_.node(static_cast<int>(i));
-        momenta_[i * joints + j] = {s.linear_momentum,
-                                    s.angular_momentum + cross(s.p, s.linear_momentum)};
+        const NodeState<Lanes>& s = states_.node(static_cast<int>(i));
+        const BasicVec3<Lanes> &l = s.linear_momentum, k = s.angular_momentum + cross(s.p, l);
+        for (std::size_t j = 0; j < count; ++j) {
+          const int at = static_cast<int>(j);
+          momenta_[i * joints + first + j] = {{lane(l.x, at), lane(l.y, at), lane(l.z, at)},
+                                              {lane(k.x, at), lane(k.y, at), lane(k.z, at)}};
+        }
       }
     }
     std::copy(q, q + joints, momenta_at_.begin());
@@ -92,7 +103,9 @@ class Posture {
 
   const Tree& tree_;
   TreeState<double> state_;
-  std::vector<double> unit_;
+  TreeState<Lanes> states_;
+  std::vector<double> unit_;  // zeros: of an arm at rest
+  std::vector<Lanes> angles_, units_;
   std::vector<Pose> poses_;                  // per node
   std::vector<Spatial> subspaces_, twists_;  // per node
   std::vector<Spatial> momenta_;             // per node and joint

@@ -80,9 +80,7 @@ class LinkSurfaces {
   template <class Visit>
   void around(int surface, const ForceLine& line, double limit, double steep, Visit&& visit) const {
     const int node = surfaces_[surface].node;
-    const ForceLine local = to_node(line, node);
-    const auto against = [&](const Vec3& normal) { return -dot(normal, local.direction) > steep; };
-    surfaces_[surface].mesh.around(local, limit, against,
+    surfaces_[surface].mesh.around(to_node(line, node), limit, steep,
                                    [&](const SurfacePoint& p) { visit(in_world(p, node)); });
   }
 
