@@ -84,8 +84,8 @@ inline nb::tuple detect_run(Observer& shared, tl::Detector& d, nb::handle time, 
                         quiet.release());
 }
 
-// N samples, for those who set thresholds: levels (N, m), statistics (N, m, tests), and of every
-// `every`-th sample the residuals (r) less baseline, the same low-passed once more, less reference
+// N samples, for those who set thresholds: levels (N, m), statistics (N, m, tests). Of every
+// `every`-th sample also the residuals (r) less baseline, the same low-passed once more, less reference
 // and low-passed, the variance (r) of the latter by noise, and the activity (2).
 inline nb::tuple detect_details(Observer& shared, tl::Detector& d, nb::handle time, nb::handle q,
                          nb::handle qd, nb::handle tau, nb::handle wrench, std::size_t every) {

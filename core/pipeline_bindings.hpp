@@ -46,8 +46,8 @@ struct Pipeline {
 };
 
 // Where the parts of a snapshot stand: the observer's row with the health of the pipeline, what the
-// detector says, the faults of channels, the sample's time and joint positions, how many contacts and changes of events
-// follow.
+// detector says, and the faults of channels. Then the sample's time and joint positions, and how many
+// contacts and changes of events follow.
 struct Snapshot {
   explicit Snapshot(const tl::RedundantPipeline& p)
       : width(p.row_layout().width()),

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from prose import REPOSITORY, code, long_sentences
+from prose_of_code import CPP, PYTHON, passages
 
 from touchline.cli import main
 from touchline.cli.bench import BENCHMARKS
@@ -53,6 +54,33 @@ def test_the_readme_is_short():
 @pytest.mark.parametrize("page", SITE, ids=ids)
 def test_no_sentence_is_longer_than_thirty_five_words(page):
     assert long_sentences(page.read_text()) == []
+
+
+@pytest.mark.parametrize("files", [PYTHON, CPP], ids=["python", "cpp"])
+def test_no_sentence_of_the_code_is_longer_than_thirty_five_words(files):
+    assert files
+    found = [
+        f"{ids(path)}:{line}: {sentence}"
+        for path in files
+        for line, text in passages(path)
+        for sentence in long_sentences(text)
+    ]
+    assert found == []
+
+
+def test_prose_of_code_is_found_where_it_stands(tmp_path):
+    path = tmp_path / "noun.py"
+    path.write_text('# One.\n# Two.\nx = 1  # m\ny = f"three {x}" "four"  # s\n# five\n')
+    assert passages(path) == [
+        (4, "three Xfour"),
+        (1, "One.\nTwo."),
+        (3, "m"),
+        (4, "s"),
+        (5, "five"),
+    ]
+    path = tmp_path / "noun.hpp"
+    path.write_text("// SPDX-License-Identifier: X\n// One.\n// Two.\nint x;  // [m]\n// three\n")
+    assert passages(path) == [(2, "One.\nTwo."), (4, "[m]"), (5, "three")]
 
 
 @pytest.mark.parametrize("page", PLAIN, ids=ids)

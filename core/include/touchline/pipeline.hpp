@@ -86,7 +86,7 @@ class Pipeline {
   void number_events_from(int next) { recorder_.number_events_from(next); }
 
   // What stands on a row of the detector while nothing touches [N, Nm], and over how long it has
-  // been averaged [s]; and takes what another pipeline of this arm has learned of its row `of`.
+  // been averaged [s]. `go_on_from` takes what another pipeline has learned of its row `of`.
   double baseline(int row) const { return detector_.baseline(row); }
   double known_for(int row) const { return detector_.known_for(row); }
   // How far a row of the detector has shown that the arm is not as told.

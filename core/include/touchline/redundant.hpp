@@ -9,7 +9,7 @@
 // contradict in what the whole robot makes of a sample, from the next sample on, for a while.
 //
 // A stand-in is warmed up from the first sample without the sensor on, and speaks as soon as it has
-// settled, 5 / K later; the whole robot speaks again 5 / K after the sensor is back. What stands on
+// settled, 5 / K later. The whole robot speaks again 5 / K after the sensor is back. What stands on
 // the arm while nothing touches it, the one tells the other. An event that both feel is one event.
 #pragma once
 

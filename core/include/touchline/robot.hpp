@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// All that the pipeline has to know of a robot: the tree of its bodies, what its channels report
-// and how noisy they are, when a residual counts, its surfaces, and which part is meant to be touched.
+// All that the pipeline has to know of a robot. That is the tree of its bodies, what its channels
+// report and how noisy they are, when a residual counts, and its surfaces. Part of them may be meant
+// to be touched.
 #pragma once
 
 #include <cmath>

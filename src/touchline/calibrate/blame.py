@@ -90,8 +90,8 @@ def often_off(robot: Robot, period: float, found: Residuals) -> list[str]:
     """Rows that are far off again and again, as those of a robot that is touched throughout.
 
     Errors of a model scatter about nothing; contacts make a second population. On recordings of a
-    Panda that was touched half of the time 9 to 38 % of the residuals of some joint lie so far out;
-    of a UR10 with friction in its torques 4.5 %.
+    Panda that was touched half of the time 9 to 38 % of the residuals of some joint lie so far out.
+    Of a UR10 with friction in its torques it is 4.5 %.
     """
     told = []
     for i, row in enumerate(make_thresholds(with_methods(robot, "rows"), period).rows):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What hides everything else in a recording, found and mended one after the other.
 
-Units of time and of positions come first, then velocities, which the positions tell; then units,
-order and signs of the torques and the sense of the positions, whichever leaves least; then the
-axes and units of force-torque sensors.
+Units of time and of positions come first, then velocities, which the positions tell. Then come
+units, order and signs of the torques and the sense of the positions, whichever leaves least. The
+axes and units of force-torque sensors are last.
 """
 
 from collections.abc import Iterator

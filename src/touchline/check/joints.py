@@ -245,7 +245,7 @@ def _judge(name: str, fit: TorqueFit, size: float, limit: float, findings: Findi
         findings.find(
             f"torque of {name} follows the sign and the size of its speed: friction of about "
             f"{max(fit.coulomb, 0.0):.2f} Nm and {max(fit.viscous, 0.0):.2f} Nm s/rad that the "
-            "description does not know, as a motor's current shows it: touchline calibrate finds "
+            "description does not know, as a motor's current shows it. Touchline calibrate finds "
             "friction (and torque: motor the rotor's inertia)"
         )
 

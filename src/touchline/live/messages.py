@@ -2,9 +2,9 @@
 # pyright: reportMissingImports=false
 """What is felt as ROS 2 messages.
 
-Contacts travel as JSON in a `std_msgs/String`, with the keys of `contacts.parquet`: no standard
-message holds a link, its probability, a point with covariance and a force together, and a message
-of our own would have to be built on every machine that listens. Markers and wrenches are standard.
+Contacts travel as JSON in a `std_msgs/String`, with the keys of `contacts.parquet`. No standard
+message holds a link, its probability, a point with covariance and a force together. A message of
+our own would have to be built on every machine that listens. Markers and wrenches are standard.
 """
 
 import json

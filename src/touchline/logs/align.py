@@ -2,8 +2,8 @@
 """Interpolates a signal at the instants of another, on time stamps as they come.
 
 Stamps may jitter, repeat, go back or be plainly wrong for a moment. Each row looks for its
-neighbours only near the place where it was logged, so that one bad stamp harms only the rows
-beside it and a long log can be read in pieces without a trace in the numbers.
+neighbours only near the place where it was logged. So one bad stamp harms only the rows beside
+it, and a long log can be read in pieces without a trace in the numbers.
 """
 
 from dataclasses import dataclass

@@ -154,7 +154,7 @@ class DetectionDescription:
     """When residuals count as contacts.
 
     The tests of `method` fire, with thresholds for `false_alarms` per hour of the whole robot as
-    far as it is calibrated, after `min_duration` [s]; an event ends when all have been below
+    far as it is calibrated, after `min_duration` [s]. An event ends when all have been below
     `release` times their thresholds for `hold` [s]. `windows` [s] are those of `glrt`.
     """
 

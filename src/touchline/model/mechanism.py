@@ -34,9 +34,10 @@ class Inertia:
 class Geometry:
     """One shape of a link's surface, at `T_link_shape` (4, 4) in the link frame.
 
-    `kind` is "mesh" (`path`, `scale`), "box" (`size` = full edges), "cylinder" (`size` = radius,
-    length; axis z), "sphere" (`size` = radius), "capsule" (`size` = radius, length of the straight
-    part; axis z), "ellipsoid" (`size` = half axes) or "triangles" (`vertices`, `faces`).
+    `kind` is "mesh" (`path`, `scale`) or "triangles" (`vertices`, `faces`), or one of these. "box":
+    `size` = full edges. "cylinder": `size` = radius, length; axis z. "sphere": `size` = radius.
+    "capsule": `size` = radius, length of the straight part; axis z. "ellipsoid": `size` = half
+    axes.
     `problem` says why a mesh cannot be used; its `path` is None if it was not found.
     """
 

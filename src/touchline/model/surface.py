@@ -11,7 +11,7 @@ from touchline.model.mechanism import Array, Geometry, Link, Mechanism
 from touchline.model.mesh_file import MeshError, Triangles, read_mesh
 from touchline.model.tessellation import tessellate
 
-# A mesh in millimetres that is read in metres is 1000 times too large; no link is longer than this
+# A mesh in millimetres that is read in metres is 1000 times too large. No link is longer than this
 # many times the whole robot, or than so many metres where the robot has no length of its own.
 LARGEST_SHARE, LARGEST = 10.0, 5.0
 SMALLEST_SHARE = 0.005  # of the robot's length, of the largest link

@@ -36,7 +36,7 @@ def limited(torque: Array, state: State, positions: bool = True) -> tuple[Array,
     """A torque (n,) that breaks no limit, and what had to be cut.
 
     All torques are cut to their limits. A joint that would come nearer to a limit of its range
-    than its velocity permits is braked, whatever the others do; none is driven beyond its limit of
+    than its velocity permits is braked, whatever the others do. None is driven beyond its limit of
     velocity, but what pushes it there is not held against. Where the torques of these joints are
     not enough for that, all joints are braked.
 

@@ -160,9 +160,9 @@ def run(seed: int, tick: Tick) -> Experiment:
 
 
 CAPTION = (
-    "Errors while the arm is touched: force [N] and moment about the tool's tip [Nm] against the "
-    "truth low-passed as the observer does it (so without the lag 1/K), point [m] against the "
-    "truth while the force is over 10 N; largest and root mean square. `eq5` is the joint torques' "
+    "Errors while the arm is touched, largest and root mean square. Force [N] and moment about the "
+    "tool's tip [Nm]: against the truth low-passed as the observer does it, so without the lag "
+    "1/K. Point [m]: against the truth while the force is over 10 N. `eq5` is the joint torques' "
     "wrench, told that the tool is what is touched."
 )
 
@@ -273,7 +273,7 @@ def _words(parts: list[Application], table: list[Row]) -> tuple[str, str, str]:
     )
     says = (
         "Section III: with sensors at base, user interface and end effector, several contacts are "
-        "identified at the same time and independently, so that an assembly task with contact at "
+        "identified at the same time and independently. So an assembly task with contact at "
         "the end effector and a person who touches the structure or leads the arm by a handle are "
         "told apart. No numbers are given."
     )

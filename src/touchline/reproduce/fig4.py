@@ -239,7 +239,7 @@ def _words(way: Passage, shown: Outcome, table: list[Row]) -> tuple[str, str, st
     )
     shows = (
         f"A sine of {AMPLITUDE:g} Nm acts in joint 5 as a torque that the joint's sensor does not "
-        "measure, while the arm follows a joint trajectory through its best conditioned "
+        "measure. The arm follows a joint trajectory through its best conditioned "
         f"configuration (condition number {best:.2f}, at {BEST:g} s) and across a singularity of "
         f"the end effector's Jacobian (at {SINGULAR:g} s), both found numerically. The "
         "disturbance is a couple inside the arm, so the true external wrench at every "

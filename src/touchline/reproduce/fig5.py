@@ -95,7 +95,7 @@ def run(seed: int, tick: Tick) -> Experiment:
         {
             "table": Table(
                 "Noisy sensors. Force errors [N] against the truth low-passed as the observer does "
-                f"it, and point errors [m], while the true force is over {STRONG:g} N; delay from "
+                f"it, and point errors [m], while the true force is over {STRONG:g} N. Delay from "
                 "the first touch to detection [s] and the force then [N].",
                 table,
             ),
@@ -186,7 +186,7 @@ def _words(after: list[Recoil], table: list[Row]) -> tuple[str, str, str]:
     )
     says = (
         "Section IV: the external force follows from the interaction, high velocities occur after "
-        "the release, and full decoupling is achieved in these phases; contacts on the structure "
+        "the release, and full decoupling is achieved in these phases. Contacts on the structure "
         "and at the end effector are estimated independently; below a threshold no location is "
         "assumed. The figure gives curves and pictures, no errors."
     )
@@ -197,10 +197,10 @@ def _words(after: list[Recoil], table: list[Row]) -> tuple[str, str, str]:
         f"Both contacts are found within {delays} (structure and end effector), located with a "
         f"median error of {points}, and their forces are right to {forces} RMS beyond the filter's "
         f"lag. False detections: {sum(int(r['false_detections'] or 0) for r in table)}. The "
-        "decoupling is full in the segment form only: while the arm springs back at up to "
+        "decoupling is full in the segment form only. While the arm springs back at up to "
         f"{first.speed:.1f} rad/s and {first.force:.0f} N still act at the end effector, the "
-        f"printed form (18) leaves {first.ghosts['paper']:.2f} N on the untouched structure, "
-        "because both residuals are filtered in frames that turn against each other; the segment "
+        f"printed form (18) leaves {first.ghosts['paper']:.2f} N on the untouched structure. "
+        "Its two residuals are filtered in frames that turn against each other. The segment "
         f"form leaves {first.ghosts['segment']:.4f} N. After the second release "
         f"({second.speed:.1f} rad/s, nothing touches any more) the end effector still shows "
         f"{second.ghosts['paper']:.2f} N in the printed form, whose filter empties in a turning "

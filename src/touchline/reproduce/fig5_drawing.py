@@ -78,11 +78,11 @@ def drawings(pushes: Pushes, after: list[Recoil]) -> dict[str, Drawing]:
 
 CAPTION = (
     "Above: the arm at six instants, numbered below; grey arrows: true forces, rings: true points, "
-    "dots: points located from the sensors. Below: norms of the forces (grey: true); their errors "
-    "beyond the filter's lag, and those of the located points, while the true force is over 10 N; "
-    "joint velocities; what is false in the forces with ideal sensors: in the printed form a ghost "
-    "of the other contact, and of the segment's own in a turning frame. Shaded: the arm springs "
-    "back."
+    "dots: points located from the sensors. Below: norms of the forces (grey: true). Then their "
+    "errors beyond the filter's lag, and those of the located points, while the true force is over "
+    "10 N. Then joint velocities. Last what is false in the forces with ideal sensors: in the "
+    "printed form a ghost of the other contact, and of the segment's own in a turning frame. "
+    "Shaded: the arm springs back."
 )
 
 

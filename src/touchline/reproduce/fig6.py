@@ -237,7 +237,7 @@ def _words(cases: list[Case], table: list[Row]) -> tuple[str, str, str]:
     inner, outer = LINKS[:6], LINKS[6:]
     shows = (
         "Contacts on link 0, on link 1, along the stretched arm (the direction in which it cannot "
-        "move), and on structure, handle and end effector at the same time; then "
+        "move), and on structure, handle and end effector at the same time. Then "
         f"{PUSHES} random pushes of {STRENGTH:g} N on each link at random poses of the resting "
         "arm, within a friction cone, with sensor noise. For each push it is judged 20 ms before "
         "it ends whether the force is right "

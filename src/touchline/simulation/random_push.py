@@ -57,7 +57,7 @@ def random_push_runs(
 ) -> Iterator[Simulated]:
     """Single pushes, each a log of its own that begins at time 0.
 
-    Poses are uniform over the joints' ranges, points uniform over the area of the links; a pair
+    Poses are uniform over the joints' ranges, points uniform over the area of the links. A pair
     is drawn again unless the point can be reached from outside: outside all other links, 3 cm
     free along its outward normal, above the floor.
 

@@ -2,7 +2,7 @@
 """Runs a plant with its controller and contacts, and records ideal readings and the truth.
 
 Inputs are held over each physics step, so readings jump where a step begins. A recorded reading is
-the mean of its values just before and just after that jump: then the trapezoid rule over the
+the mean of its values just before and just after that jump. Then the trapezoid rule over the
 samples is right to second order, and nothing is late by half a step.
 """
 

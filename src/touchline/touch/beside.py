@@ -2,7 +2,7 @@
 """What a finger does while others touch the arm, too.
 
 A finger at a known place has three unknowns, its force; on a known path a fourth, the way along it.
-So what changed since before it landed tells them although a hand elsewhere wavers or lets go: the
+So what changed since before it landed tells them although a hand elsewhere wavers or lets go. The
 way is that for which one force on the path, and changes of the other forces at their places,
 explain the change best.
 """

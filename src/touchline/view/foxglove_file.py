@@ -43,10 +43,11 @@ _ALONG_X = quaternion_to(np.array([1.0, 0.0, 0.0]))
 def write_foxglove(replay: Replay, path: Path) -> None:
     """Write the arm, its contacts, external torques, wrenches and events.
 
-    Topics: `/tf` and `/robot` (frames and shapes of the links), `/contacts` (an arrow for each
-    force, a dot for each candidate), `/tau_ext` (joint efforts [Nm]), `/wrench/NAME.seg` of
-    segments (world frame and origin) and `/wrench/NAME.ext` of sensors (their frames) [N, Nm],
-    `/events` (as in `events.json`) and `/log`. Poses come 30 times a second, curves 100 times.
+    Topics are `/tf` and `/robot` (frames and shapes of the links) and `/contacts` (an arrow for
+    each force, a dot for each candidate). `/tau_ext` has joint efforts [Nm]. Wrenches [N, Nm] are
+    `/wrench/NAME.seg` of segments (world frame and origin) and `/wrench/NAME.ext` of sensors
+    (their frames). `/events` (as in `events.json`) and `/log` tell the rest. Poses come 30 times a
+    second, curves 100 times.
 
     Args:
         replay: the results.

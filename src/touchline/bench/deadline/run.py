@@ -2,9 +2,8 @@
 """`touchline bench deadline`: how long single updates take, by number of contacts.
 
 Every update of random touches is timed by the CPU time of its thread, from the first sample on.
-The same input goes three times through a new pipeline, and of each update the least time counts:
-what the machine does to one of them it rarely does to all, while what the update itself needs
-comes back.
+The same input goes three times through a new pipeline, and of each update the least time counts.
+What the machine does to one of them it rarely does to all; what the update needs comes back.
 """
 
 from collections.abc import Iterator

@@ -20,9 +20,9 @@ HEAD: Row = (
     "surely wrong: runs", "samples",
 )  # fmt: skip
 LEGEND = (
-    "too many: more contacts than there are, or `not_separable`; surely wrong: a place that is\n"
-    f"`located` more than 22.5 mm from every touch; from {SHOWN:g} s after the last onset on, in\n"
-    "any sample of a run, and in parts of all samples"
+    "Too many: more contacts than there are, or `not_separable`. Surely wrong: a place that is\n"
+    f"`located` more than 22.5 mm from every touch. Both from {SHOWN:g} s after the last onset\n"
+    "on, in any sample of a run, and in parts of all samples."
 )
 
 

@@ -3,8 +3,8 @@
 
 Particles are points of the links' surfaces. The likelihood of one follows from a quadratic program:
 the least misfit of the measured residual over forces in the friction cone, here a pyramid of four
-edges. Particles are moved at random along the surface, weighed and resampled; a further set of
-particles begins where those there are leave the residual unexplained, and each set is weighed with
+edges. Particles are moved at random along the surface, weighed and resampled. A further set of
+particles begins where those there are leave the residual unexplained. Each set is weighed with
 the others at their best places. Theirs has joint torques alone; this one has all rows of the robot,
 its force-torque sensors included, with the same noise figures as our estimator.
 """

@@ -37,10 +37,10 @@ def rank_table(trials: Iterable[Trial]) -> str:
 
 
 LEGEND = """\
-rank: independent equations of a pair on one segment; two contacts need 10, and `free` is what is
-left; surface named: share of the segment's surface in the parts that the answer names; surface
+Rank: independent equations of a pair on one segment. Two contacts need 10, and `free` is what is
+left. Surface named: share of the segment's surface in the parts that the answer names. Surface
 allowed: share that two contacts may touch, by exact readings (where one equation is missing:
-within 5 mm of a curve)"""
+within 5 mm of a curve)."""
 
 
 def _share(values: list[float]) -> str:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """`touchline bench localization`: how well contacts are located, by the protocol of Han and Kim.
 
-Random poses, reachable points uniform over the area of the links (outside all other links, 3 cm
-free along the outward normal and along the way of the push, above the floor), 20 N in the friction
-cone, sensors at 1 kHz with white noise; all of it through the real pipeline.
+Poses are random. Points are reachable, uniform over the area of the links: outside all other links,
+3 cm free along the outward normal and along the way of the push, above the floor. Pushes are of
+20 N in the friction cone, sensors at 1 kHz with white noise. The real pipeline feels them.
 """
 
 import os

@@ -36,15 +36,15 @@ PUBLISHED = (
     ("2", "", "12.4", "", "", "same"),
 )
 LEGEND = (
-    "found: every touch within 22.5 mm at the last sample, nothing else named; as event: the same\n"
-    "of the events' positions; in the set: every touch near a returned explanation or in\n"
-    "the part of a link that one stands for;\n"
-    "surely wrong: as many places as touches, all `located`, but not found; body: the right\n"
-    "rigid body named; lengths in mm, force RMS in N; RMS over all that was located, RMS found\n"
-    "without what is farther off than 22.5 mm; lag: the distance in parts of |v|/K, the way a\n"
-    "point at the speed |v| across its force is behind without compensation, median and 99th\n"
-    "percentile of those faster than 0.2 m/s; 90 % holds: share of truths in the 90 % region;\n"
-    "unsure: not answered by `located`; us: median time of Pipeline.update while touched,\n"
+    "Found: every touch within 22.5 mm at the last sample, nothing else named. As event: the same\n"
+    "of the events' positions. In the set: every touch near a returned explanation or in\n"
+    "the part of a link that one stands for.\n"
+    "Surely wrong: as many places as touches, all `located`, but not found. Body: the right\n"
+    "rigid body named. Lengths in mm, force RMS in N. RMS over all that was located, RMS found\n"
+    "without what is farther off than 22.5 mm. Lag: the distance in parts of |v|/K, the way a\n"
+    "point at the speed |v| across its force is behind without compensation. Median and 99th\n"
+    "percentile of those faster than 0.2 m/s. 90 % holds: share of truths in the 90 % region.\n"
+    "Unsure: not answered by `located`. us: median time of Pipeline.update while touched,\n"
     "with position, force, level and clamping of each contact read."
 )
 

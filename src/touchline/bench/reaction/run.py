@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """`touchline bench reaction`: what a collision does, by the robot's reaction.
 
-The arm runs into a compliant body, or the body into the arm, at 0.25 to 1.5 m/s; in the loop are
-sensors with noise, the pipeline, the reaction and a controller at 1 kHz with torque limits; the
+The arm runs into a compliant body, or the body into the arm, at 0.25 to 1.5 m/s. In the loop are
+sensors with noise, the pipeline, the reaction and a controller at 1 kHz with torque limits. The
 plant's inertias are 2 % off. Every encounter is repeated with every reaction. Beside that, the arm
 is led by its handle for an hour.
 """

@@ -26,8 +26,8 @@ moments about each segment's sensor. Sensors have the noise of the description. 
 the bandwidth, out of one list, with which the RMS of its force is least (impacts: the error of
 the peak). Where nothing touches the longest filter always looks best, so none is longer than
 with {DEFAULT:g} rad/s there, and the 99.9 % level of the force decides.
-shipped: ours with {DEFAULT:g} rad/s throughout. best: the lowest of what a robot can run, and those
-within {100 * (TIE - 1):.0f} % of it. verdict: segment against the best real peer.
+Shipped: ours with {DEFAULT:g} rad/s throughout. Best: the lowest of what a robot can run, and those
+within {100 * (TIE - 1):.0f} % of it. Verdict: segment against the best real peer.
 An impact is detected when the force exceeds {MARGIN:g} times the largest
 that the method reported before, while nothing touched."""
 

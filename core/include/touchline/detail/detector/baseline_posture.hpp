@@ -36,9 +36,9 @@ class BaselinePosture {
 };
 
 // Variance of what the model's errors have added to a row since its baseline, `way2` [rad2] away.
-// The constant part is what an arm leaves on its way through ordinary motion: weight, which changes
-// with the pose, about in proportion to the way as far as `kFarthest`; and in a joint's own torque
-// friction, all of which comes with motion.
+// The constant part is what an arm leaves on its way through ordinary motion. Weight changes with the
+// pose, about in proportion to the way as far as `kFarthest`. In a joint's own torque there is
+// friction, too, all of which comes with motion.
 inline double drifted(const DetectionRow& row, const Activity& activity, double way2) {
   constexpr double kFar = 0.75, kFarthest = 2.0, kMoving = 0.1;  // [rad], [rad], [rad/s]
   double share = std::min(way2, kFarthest * kFarthest) / (kFar * kFar);

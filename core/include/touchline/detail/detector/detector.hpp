@@ -328,8 +328,8 @@ class Detector {
   }
 
   // What lasts of a row, in what the noise of its trend lets expect. Noise of velocities is nearly
-  // white in the residual and dies out in the trend, so that this finds weak loads that last, of an
-  // arm that stands: of one that moves the model's errors are larger than noise.
+  // white in the residual and dies out in the trend, so that this finds weak loads that last. That
+  // holds for an arm that stands: of one that moves the model's errors are larger than noise.
   double slow_share(std::size_t i) const {
     const DetectionRow& row = rows_[i];
     const RowState& s = states_[i];
@@ -340,9 +340,9 @@ class Detector {
     return std::min(std::fabs(now), std::fabs(mean)) / limit;
   }
 
-  // What a row's load must exceed now [N or Nm]: the larger of its threshold and of what noise, as told
-  // in this posture and as seen, and errors of the model that a calibration has found bring. It has met
-  // some postures and speeds; in others both are larger.
+  // What a row's load must exceed now [N or Nm]: the larger of its threshold and of what noise and
+  // the model's errors bring. Noise is as told in this posture and as seen, errors as a calibration
+  // has found them. It has met some postures and speeds; in others both are larger.
   double largest_noise(std::size_t i) const {
     const DetectionRow& row = rows_[i];
     double most = row.contact;
@@ -485,7 +485,7 @@ class Detector {
 
   // May what the last moments have of a contact be friction or an error of the model? Only if it is
   // little of the contact's peak, and the arm stands and has shown that it is not as told, or moves
-  // and hardly anything is left: two contacts against each other leave more.
+  // and hardly anything is left. Two contacts against each other leave more.
   bool may_rest(std::size_t g) const {
     const Segment& s = segments_[g];
     const bool little = s.origin == Origin::start || lately(g) < kLittle * s.top;
@@ -593,8 +593,8 @@ class Detector {
     trend_meters_[i].add(s.trend, dt, counts);
   }
 
-  // What stood there at the first sample may be a rest of settling, or of an arm that is set going:
-  // it shows that the arm is not as told only if it still stands there a while later.
+  // What stood there at the first sample may be a rest of settling, or of an arm that is set going.
+  // It shows that the arm is not as told only if it still stands there a while later.
   void confirm_start(std::size_t i, double dt) {
     RowState& s = states_[i];
     const double end = kConfirm / bandwidth(rows_[i]), before = s.seconds;

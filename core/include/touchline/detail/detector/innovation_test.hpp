@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // CUSUM on the innovations of a Kalman filter. Its state is the momentum that the known loads do
-// not explain, P' = P + w dt + (noise of the readings), and the load w, a random walk that takes up
-// the model's errors; measured is P with the noise of the velocities. In coordinates in which both
+// not explain, P' = P + w dt + (noise of the readings), and the load w. That is a random walk that takes
+// up the model's errors. Measured is P with the noise of the velocities. In coordinates in which both
 // noises are diagonal every row is a filter of its own, with gains in closed form: those of the
 // second-order moving average that its second differences are. The innovations are white with unit
 // variance; a two-sided CUSUM watches each. No allocation in `weigh`, `add` and `statistic`.
@@ -19,13 +19,13 @@
 namespace touchline {
 
 // Gains of the steady filter of P and w dt, and the standard deviation of its innovations, for
-// variances r of the measurement and q of the increments of w dt; those of P have variance 1.
+// variances r of the measurement and q of the increments of w dt. Those of P have variance 1.
 struct SteadyGains {
   double level, slope, sigma;
 };
 
 inline SteadyGains steady_gains(double r, double q) {
-  // gamma0 = q + 2 + 6 r, gamma1 = -1 - 4 r, gamma2 = r; with x = z + 1/z the spectrum is
+  // gamma0 = q + 2 + 6 r, gamma1 = -1 - 4 r, gamma2 = r. With x = z + 1/z the spectrum is
   // r x^2 + gamma1 x + gamma0 - 2 r, and of each root's z and 1/z the one inside counts.
   const std::complex<double> root = std::sqrt(std::complex<double>(1.0 - 4.0 * r * q));
   const std::complex<double> x[2] = {2.0 + (1.0 + root) / (2.0 * r), 2.0 + 2.0 * q / (1.0 + root)};

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A generalized likelihood ratio on the loads of the last N samples, not filtered. With e the mean
-// external load over an interval, S_N = sum e dt = p_k - p_k-N - sum u dt: velocity noise enters at
-// both ends only, so that its covariance is 2 A + N dt^2 B + T^2 C for the covariances A of the
-// momentum, B of the readings and C of the model's errors; of several N the largest ratio counts.
+// external load over an interval, S_N = sum e dt = p_k - p_k-N - sum u dt. Velocity noise enters at
+// both ends only. So its covariance is 2 A + N dt^2 B + T^2 C for the covariances A of the
+// momentum, B of the readings and C of the model's errors. Of several N the largest ratio counts.
 // Over lost samples S_N spans more than N periods: its covariance is taken to grow with the square
 // of the time, as that of C does. No allocation in `add` and `statistic`.
 #pragma once

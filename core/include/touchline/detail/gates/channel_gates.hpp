@@ -4,17 +4,17 @@
 //
 // A jump of one channel: no contact moves one channel alone. What a force does to one axis of a
 // sensor, it does to others too, to the sensors and joints inboard, or to the speed. So a jump
-// counts as a fault only where nothing else in the sample bears it out; if the new level then
+// counts as a fault only where nothing else in the sample bears it out. If the new level then
 // stays and lives (its last digits move), it is taken after all, a few samples late, unless there
 // is a sensor inboard that would have had to feel it too.
 //
 // A stuck channel: how often it changes from sample to sample while the arm moves is learned, and
-// so is for how long it keeps a value; logs that repeat samples repeat all of them, which counts
+// so is for how long it keeps a value. Logs that repeat samples repeat all of them, which counts
 // for nothing.
 //
 // A velocity is the derivative of its position: what positions and velocities differ by, over some
 // samples, is compared with what they have differed by so far. Where one of the two is not believed
-// the other stands in for it: a position is the way that its joint has come by its speed, for a
+// the other stands in for it. A position is the way that its joint has come by its speed, for a
 // while; a speed is what positions show, low-passed.
 //
 // Limits follow from what this arm has shown, and from physics where it has shown nothing yet.

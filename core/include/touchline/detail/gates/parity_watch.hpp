@@ -9,7 +9,7 @@
 //
 // A torque at the innermost sensor without a force is no touch: no link is as far away.
 //
-// What two quantities alone tell is not judged: a force at the innermost sensor that no joint feels
+// What two quantities alone tell is not judged. A force at the innermost sensor that no joint feels
 // may be a push on the link that carries it, and a torque of one joint a hand that pinches it.
 #pragma once
 

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Several contacts whose places are known explain one measurement: their forces, and small shifts
-// of their places, from a linear Gaussian model,
+// Several contacts whose places are known explain one measurement. Their forces, and small shifts
+// of their places, follow from a linear Gaussian model:
+//
 //   rows = sum of H_c (p_c) (f_c + df_c) + G_c dp_c + noise,   (df, dp) ~ (0, P),
-// P being the joint covariance of the estimate at hand. No allocation after construction.
+//
+// P is the joint covariance of the estimate at hand. No allocation after construction.
 #pragma once
 
 #include <algorithm>

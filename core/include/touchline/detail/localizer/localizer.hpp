@@ -71,9 +71,10 @@ class Localizer {
       throw std::invalid_argument("an array has a size that does not belong to this robot");
   }
 
-  // The configuration of the sample; what the model's errors may have added to each row of the
-  // detector since its baseline; for how long the baseline of each segment has been averaged; and how
-  // many times as large as told the noise of each row is. All but `q` may be null.
+  // Of the sample: its configuration `q`, `qd`. `drift`: what the model's errors may have added to
+  // each row of the detector since its baseline. `quiet`: for how long the baseline of each segment
+  // has been averaged. `excess`: how many times as large as told the noise of each row is. All but
+  // `q` may be null.
   void set_state(const double* q, const double* qd, const double* drift, const double* quiet,
                  const double* excess = nullptr) {
     measurement_.set_state(q, qd, drift, quiet, excess);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What one measurement says of contacts on any two bodies of a segment, to be worked on for longer
-// than the instant: where the bodies were, and what unit wrenches on each do to all rows. No
-// allocation.
+// than the instant. It keeps where the bodies were, and what unit wrenches on each do to all rows.
+// No allocation.
 #pragma once
 
 #include <algorithm>

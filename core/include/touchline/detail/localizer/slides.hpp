@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One of the contacts on a segment slides while the others are held: it is located anew in every
+// One of the contacts on a segment slides while the others are held. It is located anew in every
 // sample, with what is known of the others taken out, from where all of them were known before it
 // began to. No allocation per sample.
 #pragma once

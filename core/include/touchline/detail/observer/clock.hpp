@@ -56,8 +56,8 @@ class Clock {
   }
   double limit() const { return tuning_.gap_periods * period_; }
 
-  // A stamp that does not go forward: a repetition or some disorder, unless it is far back or goes
-  // on for so long, each stamp after the other, that the clock must have been set back.
+  // A stamp that does not go forward: a repetition or some disorder. If it is far back, or goes
+  // on for so long, each stamp after the other, the clock must have been set back.
   Verdict look_back(double time, Health& health) {
     health |= kBadTime;
     refusals_ = refusals_ > 0 && time >= refused_ + tuning_.shortest_step ? refusals_ + 1 : 1;

@@ -3,9 +3,9 @@
 // may vary. Rows and groups are as for the balances.
 //
 // Over a gap the momentum is known at both ends, the load u only there: its mean, taken for the
-// mean of the ends, is in doubt. By how much is not measured, but two things tell its size: half of
-// the load's change, which is the most that a load can be off that went from one end to the other
-// without turning, and e - r, which is what the gap would change in the estimate. Each is followed
+// mean of the ends, is in doubt. By how much is not measured, but two things tell its size. Half of
+// the load's change is the most that a load can be off that went from one end to the other
+// without turning. The other, e - r, is what the gap would change in the estimate. Each is followed
 // as a load of its own, which the filter forgets as it forgets the error.
 #pragma once
 

@@ -48,7 +48,7 @@ class Layout {
   std::vector<int> lines;                            // nodes that move, joint by joint
   // Per joint: the nearest six-axis sensor inboard, if any (and if no other joint mimics this
   // one), and after it the next ones outboard of that sensor on branches which the joint does not
-  // carry; the next ones outboard of the joint; those that the joint is read from.
+  // carry. Then the next ones outboard of the joint, and those that the joint is read from.
   std::vector<std::vector<Projection>> inboard_sensors, outboard_sensors, source_sensors;
 
  private:

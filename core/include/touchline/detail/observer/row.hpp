@@ -102,7 +102,7 @@ class RowWriter {
   }
 
   // One sigma of what gaps may have left in the torques of each joint (the largest of all three),
-  // and in the force and the moment about its own sensor's origin of each segment: there no lever
+  // and in the force and the moment about its own sensor's origin of each segment. There no lever
   // arm is in it.
   void doubt(const Filters& filters, const double* terms) {
     const int first = row_.joint_settled();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Several samples of a recording at once, as long as all of them are as usual: every number stands
-// with those of the next samples side by side, but for the filters, which run through time with
-// several rows side by side. Every operation is that of a single step, lane by lane, so the numbers
+// Several samples of a recording at once, as long as all of them are as usual. Every number stands
+// with those of the next samples side by side; filters run through time, with several rows side
+// by side. Every operation is that of a single step, lane by lane, so the numbers
 // are the same to the last bit. No allocation but in the constructor.
 #pragma once
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The explanations of one contact on a segment: all entries of the line of force action into all
-// its links, the nearest surface where the line misses, and sampled points, improved on the mesh,
-// where there is no line. No allocation per sample.
+// its links, or the nearest surface where the line misses. Where there is no line they are sampled
+// points, improved on the mesh. No allocation per sample.
 #pragma once
 
 #include <algorithm>

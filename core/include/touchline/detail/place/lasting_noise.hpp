@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Errors that stay while a contact lasts, other than white noise, which any mean takes away: of the
-// model, as far as the arm has moved on since the baseline, and of gains, which grow with the load.
+// Errors that stay while a contact lasts, unlike white noise, which any mean takes away. They are of
+// the model, as far as the arm has moved on since the baseline, and of gains, which grow with the load.
 // No allocation per sample.
 #pragma once
 

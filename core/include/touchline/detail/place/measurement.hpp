@@ -41,9 +41,10 @@ class Measurement {
     column_.resize(size * 2);
   }
 
-  // The configuration of the sample; `qd` may be null. What the model's errors may have added to each
-  // row of the detector since its baseline, for how long the baseline of each segment has been
-  // averaged [s], and how many times as large as told the noise of each row is; or null.
+  // Of the sample: its configuration; `qd` may be null. `drift`: what the model's errors may have
+  // added to each row of the detector since its baseline, or null. `quiet`: for how long the baseline
+  // of each segment has been averaged [s], or null. `excess`: how many times as large as told the
+  // noise of each row is, or null.
   void set_state(const double* q, const double* qd, const double* drift, const double* quiet,
                  const double* excess) {
     excess_ = excess;
@@ -265,7 +266,7 @@ class Measurement {
     return d;
   }
 
-  // Takes the offsets out if there are any: what noise alone explains is none, and would only add
+  // Takes the offsets out if there are any. What noise alone explains is none, and would only add
   // its own noise, unless a model has errors and the baseline, a mean over `quiet` [s], is sure.
   bool take_out_offsets() {
     const double rest = offsets_.variance(segment_, quiet_ != nullptr ? quiet_[segment_] : 0.0);

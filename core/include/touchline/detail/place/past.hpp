@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where the bodies were when they felt what a filtered wrench speaks of. Of a force f at a point c
 // of a moving body (R, p) the filter keeps the moment
-//   int K exp(-K a) (R c + p)(t - a) x f(t - a) da,
-// which is that of the filtered force at the mean place, weighed by the force that was felt then,
-// and a rest, where the force has turned meanwhile. No allocation per sample.
+//   int K exp(-K a) (R c + p)(t - a) x f(t - a) da.
+// That is the moment of the filtered force at the mean place, weighed by the force that was felt
+// then, and a rest, where the force has turned meanwhile. No allocation per sample.
 #pragma once
 
 #include <cmath>

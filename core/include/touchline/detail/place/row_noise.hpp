@@ -63,7 +63,7 @@ class RowNoise {
 
   // The lower triangle of the covariance (size, size) of the first rows, of which `forces` are
   // forces. The floors cover what the trapezoid leaves of motion: on arms of 20 kg 1e-5 N where every
-  // joint turns at 1 rad/s, 7e-4 N at 3 rad/s; more than they (4e-3 N and Nm) where all swing at 2 Hz.
+  // joint turns at 1 rad/s, 7e-4 N at 3 rad/s. Where all swing at 2 Hz it is more (4e-3 N and Nm).
   void covariance(int size, int forces, double* out) const {
     for (int a = 0; a < size; ++a) {
       for (int b = 0; b <= a; ++b) {
