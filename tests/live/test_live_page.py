@@ -2,6 +2,7 @@
 """The page of a running robot, without a browser."""
 
 import os
+from dataclasses import replace
 
 import pytest
 from sockets import LOOPBACK, listening
@@ -31,6 +32,11 @@ def test_the_page_shows_streams_contacts_and_resets(sara, monkeypatch):
             texts.append(page._readout.content)
         assert "simulation: " in texts[-1]
         assert "<b>tool</b>" in texts[-1] and "located" in texts[-1]
+        assert "lies below what can be felt there" not in texts[-1]
+        page._can_be_felt["tool"] = replace(page._can_be_felt["tool"], force=1000.0)
+        page._written = page._drawn = 0.0
+        page.update()
+        assert "on tool lies below what can be felt there" in page._readout.content
         page._asked.append(session.reset)
         page._written = page._drawn = 0.0
         page.update()

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import touchline as tl
+from touchline.check.felt import Felt
 from touchline.health import Health
 from touchline.localizer.skin import Skin
 from touchline.simulation.control import Setpoint, sinusoids
@@ -12,7 +13,7 @@ from touchline.simulation.hands import Hand
 from touchline.view.arm import Conditions, LiveArm
 from touchline.view.faults import FAULTS
 from touchline.view.history import ROWS_PER_SECOND, SECONDS, History
-from touchline.view.judge import Judge
+from touchline.view.judge import Judge, Touched, Verdict
 from touchline.view.methods import METHODS
 from touchline.view.motion import EASE, Switched
 from touchline.view.readout import Speed, readout
@@ -126,13 +127,23 @@ def test_every_method_feels_a_push_and_says_when_it_does_not_know(robots, method
     room.arm.press(*room.surface("link4")[:2], 25.0)
     verdict = next(iter(room.go(1.0).values()))
     assert verdict.level > 0 and verdict.delay is not None
-    text = readout([verdict], room.felt.health, Speed(1e-4, 1.0))
+    text = readout([verdict], room.felt.health, Speed(1e-4, 1.0), {})
     assert "collision" in text or "contact" in text
     if method == "joint torques only":
         assert verdict.segment == "root" and np.isnan(room.felt.wrench).all()
         assert verdict.contact.candidates
     else:
         assert verdict.contact.link == "link4" and verdict.position_error < 0.02
+
+
+def test_what_is_weaker_than_what_can_be_felt_is_told():
+    able = {"link4": Felt("link4", "base", 5.0, 2.0, 6)}
+    weak = Touched("link4", np.zeros(3), np.array([3.0, 0.0, 0.0]))
+    strong = Touched("link4", np.zeros(3), np.array([0.0, 9.0, 0.0]))
+    for true, told in ((weak, True), (strong, False)):
+        verdict = Verdict("base", 0, None, (true,), None, None, None)
+        text = readout([verdict], 0, Speed(), able)
+        assert ("true touch: 3.0 N on link4 lies below what can be felt there" in text) == told
 
 
 @pytest.mark.parametrize("fault", FAULTS)

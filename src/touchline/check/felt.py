@@ -48,6 +48,20 @@ class Felt:
             return "a place"
         return f"candidates: {self.rank} of {POINT_RANK} unknowns are measured"
 
+    def faint(self, touch: str, force: float) -> str | None:
+        """A line on a touch of this link that is weaker than what is surely felt; else None.
+
+        Args:
+            touch: what it is called.
+            force: of it [N].
+        """
+        if not force < self.force:
+            return None
+        start = f"{touch}: {force:.1f} N on {self.link} lies below what can be felt there"
+        if not np.isfinite(self.force):
+            return f"{start}: many pushes on it load no sensor"
+        return f"{start}: {100 * SHARE:.0f} % are found from {self.force:.1f} N on"
+
 
 def felt(robot: Robot, period: float = 1e-3) -> list[Felt]:
     """What can be felt on each link that has a surface.

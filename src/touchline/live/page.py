@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from touchline.check.felt import felt
 from touchline.errors import InputError
 from touchline.health import Health
 from touchline.live.session import Session
@@ -40,6 +41,7 @@ class RobotPage:
         self._widgets: WidgetScene | None = None
         if session.touch is not None:
             self._widgets = WidgetScene(self._page.scene, session.touch, session.touch.patches)
+        self._can_be_felt = {one.link: one for one in felt(session.robot)}
         self._readout = self._page.gui.add_html("")
         self._asked: list[Callable[[], str]] = []
         self._answer = ""
@@ -93,6 +95,9 @@ class RobotPage:
             for contact in result.contacts:
                 where = contact.link or contact.likely_link or contact.segment
                 lines.append(f"<b>{html.escape(where)}</b>: {contact.size:.1f} N, {contact.status}")
+                able = self._can_be_felt.get(where)
+                if able is not None and (told := able.faint("faint", contact.size)) is not None:
+                    lines.append(html.escape(told))
         if self._answer:
             lines.append(html.escape(self._answer))
         return f'<div style="font-size:12px;padding:0 0.75em">{"<br>".join(lines)}</div>'

@@ -3,9 +3,7 @@
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
-from touchline.check.felt import SHARE, Felt
+from touchline.check.felt import Felt
 from touchline.report.comparison import Comparison
 from touchline.result.event import Event
 
@@ -40,9 +38,5 @@ def faint_lines(
 
 
 def _line(touch: str, force: float, felt: Felt | None) -> list[str]:
-    if felt is None or force >= felt.force:
-        return []
-    start = f"{touch}: {force:.1f} N on {felt.link} lies below what can be felt there"
-    if not np.isfinite(felt.force):
-        return [f"{start}: many pushes on it load no sensor"]
-    return [f"{start}: {100 * SHARE:.0f} % are found from {felt.force:.1f} N on"]
+    told = None if felt is None else felt.faint(touch, force)
+    return [] if told is None else [told]

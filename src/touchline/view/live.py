@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.check.felt import felt as felt_on_links
 from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot, load_robot
 from touchline.simulation.hands import Hand
@@ -61,6 +62,7 @@ class LivePage:
         self._own = load_robot(robot)
         self._full = load_robot("sara-full") if robot == "sara" else fully_measured(self._own)
         self._skin = Skin(self._own)
+        self._can_be_felt = {one.link: one for one in felt_on_links(self._own)}
         self._seed, self.restarts = seed, 0
         self.arm = self._new_arm(seed)
         self._todo: queue.SimpleQueue[Callable[[], object]] = queue.SimpleQueue()
@@ -213,7 +215,9 @@ class LivePage:
             self._contacts.show(felt, [(t.point, t.force) for t in true], q)
             self._contacts.show_pulls(self.arm.springs())
         if self._is_due(READOUT) and self.felt is not None:
-            self._controls.readout.content = readout(self.verdicts, self.felt.health, self._speed)
+            self._controls.readout.content = readout(
+                self.verdicts, self.felt.health, self._speed, self._can_be_felt
+            )
         if self._is_due(PLOTS):
             self._plots.refresh()
 

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The numbers of the live page as a table."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 
+import numpy as np
+
+from touchline.check.felt import Felt
 from touchline.health import Health
 from touchline.view.judge import Verdict
 
@@ -30,8 +33,17 @@ class Speed:
     real_time: float = 0.0
 
 
-def readout(verdicts: Sequence[Verdict], health: int, speed: Speed) -> str:
-    """HTML: one row for each segment, then delays, speed and health."""
+def readout(
+    verdicts: Sequence[Verdict], health: int, speed: Speed, felt: Mapping[str, Felt]
+) -> str:
+    """HTML: one row for each segment, then delays, faint touches, speed and health.
+
+    Args:
+        verdicts: one for each segment.
+        health: bits.
+        speed: of the estimator and of the simulation.
+        felt: what can be felt on each link, of `touchline.check.felt`.
+    """
     rows = "".join(_row(verdict) for verdict in verdicts)
     delays = [v.delay for v in verdicts if v.delay is not None]
     delay = f"{1e3 * max(delays):.0f} ms" if delays else "-"
@@ -43,6 +55,7 @@ def readout(verdicts: Sequence[Verdict], health: int, speed: Speed) -> str:
 {rows}</table>
 <div style="margin-top:0.4em">detected after {delay} &middot; estimator
 {1e6 * speed.step:.0f} &micro;s per sample &middot; real-time factor {speed.real_time:.2f}</div>
+{_faint(verdicts, felt)}
 <div style="color:#b00020;min-height:1.5em">{escape(health_words(health))}</div></div>"""
 
 
@@ -60,6 +73,19 @@ def _row(verdict: Verdict) -> str:
         "-" if verdict.force_error is None else f"{verdict.force_error:.2f} N",
     ]
     return "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+
+
+def _faint(verdicts: Sequence[Verdict], felt: Mapping[str, Felt]) -> str:
+    """True and felt touches that are weaker than what is surely felt where they are."""
+    lines = []
+    for verdict in verdicts:
+        for true in verdict.true:
+            if true.link in felt:
+                lines.append(felt[true.link].faint("true touch", float(np.linalg.norm(true.force))))
+        contact = verdict.contact
+        if not verdict.true and contact is not None and contact.link in felt:
+            lines.append(felt[contact.link].faint("felt", contact.size))
+    return "".join(f"<div>{escape(line)}</div>" for line in lines if line is not None)
 
 
 def _chip(level: int) -> str:
