@@ -14,6 +14,9 @@ Array = NDArray[np.float64]
 
 COLUMN, PAGE = 3.45, 7.1  # widths [inch]
 INK, FAINT = "#22262b", "#8d949c"
+# Of contacts, in pictures and on pages. Vermilion and violet are told apart with any colour vision,
+# and are no colours of the axes x, y, z.
+FELT, TRUE, CANDIDATE = "#d55e00", "#6a3d9a", "#e69f00"
 COLORS = {
     "classical": "#c8602c",
     "closed form": INK,

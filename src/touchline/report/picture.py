@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline import _render
+from touchline.figure import CANDIDATE, FELT, TRUE
 from touchline.model.robot import Robot
 from touchline.report.render import solids
 from touchline.report.render.camera import Camera, Size
@@ -22,8 +23,7 @@ Array = NDArray[np.floating[Any]]
 SIGMAS = 2.0  # of the drawn ellipsoid
 FORCE_SCALE, SHORTEST, LONGEST = 0.010, 0.09, 0.42  # m/N, m, m, for an arm of 1.5 m
 
-# Vermilion and violet: told apart with any colour vision, and no colours of the axes x, y, z.
-COLOURS = {"truth": "#6a3d9a", "estimate": "#d55e00", "candidate": "#e69f00"}
+COLOURS = {"truth": TRUE, "estimate": FELT, "candidate": CANDIDATE}
 SHELL, TRIM, TINT = "#f1f2f4", "#5d646d", "#ffd39e"
 SMALL = 420  # pixels; a picture up to this wide is small
 MAP, SMALL_MAP = 512, 256  # pixels across the shadow map, and across that of a small picture

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from touchline.figure import FELT
+
 Array = NDArray[np.float64]
 
 SMOOTHING = 0.02  # s, 1 sigma; what a hand writes in 2 s has nothing quicker than some 0.1 s
@@ -80,7 +82,7 @@ class Stroke:
         return (
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.2f} {height:.2f}" '
             f'width="{width:.2f}mm" height="{height:.2f}mm"><polyline points="{line}" fill="none" '
-            'stroke="#d95f02" stroke-width="1.5" stroke-linecap="round" '
+            f'stroke="{FELT}" stroke-width="1.5" stroke-linecap="round" '
             'stroke-linejoin="round"/></svg>\n'
         )
 

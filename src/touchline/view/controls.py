@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 
 import viser
 
+from touchline.figure import FELT, TRUE
 from touchline.reaction.reaction import REACTIONS
 from touchline.view.arm import Conditions
 from touchline.view.faults import FAULTS
@@ -14,10 +15,10 @@ ADVICE = (
     "**Drag on the arm** to pull it, **click** on it to push it; "
     "drag beside it to look from elsewhere."
 )
-LEGEND = """\
+LEGEND = f"""\
 <div style="font-size:12px;padding:0 0.75em">
-<span style="color:#d55e00">&#9679;</span> felt, with line of action and uncertainty (2 sigma);
-<span style="color:#6a3d9a">&#9675; true</span></div>"""
+<span style="color:{FELT}">&#9679;</span> felt, with line of action and uncertainty (2 sigma);
+<span style="color:{TRUE}">&#9675; true</span></div>"""
 MOTIONS = {"stands": False, "moves": True}
 
 

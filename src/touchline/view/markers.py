@@ -8,6 +8,7 @@ import trimesh
 import viser
 from numpy.typing import NDArray
 
+from touchline.figure import CANDIDATE, FELT, TRUE
 from touchline.view.moments import METRES_PER_NEWTON
 from touchline.view.pose import quaternion_to, quaternions
 
@@ -15,9 +16,8 @@ Array = NDArray[np.float64]
 Colour = tuple[int, int, int]
 
 COLOURS: dict[str, Colour] = {
-    "estimate": (213, 94, 0),
-    "truth": (106, 61, 154),
-    "candidate": (230, 159, 0),
+    kind: (int(code[1:3], 16), int(code[3:5], 16), int(code[5:7], 16))
+    for kind, code in (("estimate", FELT), ("truth", TRUE), ("candidate", CANDIDATE))
 }
 WEAK = 0.5  # N; a smaller force has no arrow
 POINT_RADIUS, ARROW_RADIUS, HEAD_RADIUS, HEAD_LENGTH = 0.011, 0.008, 0.019, 0.045  # m

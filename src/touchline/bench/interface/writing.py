@@ -16,6 +16,7 @@ from touchline.bench.interface.hand import find_pad, sliding
 from touchline.bench.localization.arm import TIERS
 from touchline.bench.tables import Row
 from touchline.errors import InputError
+from touchline.figure import FELT, TRUE
 from touchline.touch.recognizer import Recognizer
 from touchline.touch.stroke import Stroke, resampled
 
@@ -141,7 +142,7 @@ def draw(written: Written) -> str:
     for column, label in enumerate(sorted(written.samples)):
         pen, stroke = written.samples[label]
         felt = resampled(stroke.points[:, 1:], DRAWN)
-        for row, (way, colour) in enumerate(((pen, "#0072b2"), (felt, "#d95f02"))):
+        for row, (way, colour) in enumerate(((pen, TRUE), (felt, FELT))):
             x, y = 1e3 * (way - 0.5 * (way.max(axis=0) + way.min(axis=0))).T
             x, y = x + size * (column + 0.5), size * (row + 0.5) - y
             points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
