@@ -6,7 +6,11 @@ import re
 import numpy as np
 import pytest
 from browser import until
+from free_motion import free_motion, pushed
 
+import touchline as tl
+from touchline.logs import write_table
+from touchline.report.analysis import analyze
 from touchline.report.page import PLOT
 
 FORCE = 'document.querySelector("[data-window] [data-plot] svg")'
@@ -201,3 +205,33 @@ def test_an_address_names_a_time_or_an_event(browser, analysis):
     assert first < event.detected < last and last - first < 3.0
     numbers = "[...document.querySelectorAll('svg text.number')].map((t) => t.textContent)"
     assert str(event.id) in browser.run(numbers)
+
+
+def test_numbers_of_simultaneous_events_stand_beside_each_other(browser, tmp_path):
+    robot, force = tl.load_robot("sara"), [12.0, 9.0, 13.0]
+    samples = free_motion(robot, seconds=4.0, rate=200.0)
+    for link, rows in (("link2", (200, 300)), ("handle", (201, 260)), ("tool", (204, 240))):
+        samples = pushed(robot, samples, link, slice(*rows), force)
+    samples = pushed(robot, samples, "link2", slice(600, 700), force)
+    write_table(tmp_path / "log.parquet", samples, robot.description)
+    analysis = analyze(tmp_path / "log.parquet", "sara", tmp_path / "out")
+    spans = [(event.id, event.segment, event.detected, event.cleared) for event in analysis.events]
+    assert [id for id, *_ in spans] == [0, 1, 2, 3], spans
+    browser.offline()
+    browser.resize(1200, 900)
+    browser.open((analysis.out / "report.html").as_uri())
+    until(lambda: browser.run(f"{WHOLE}?.tabIndex === 0"), pause=browser.rest)
+    scroll_to(browser, "[...document.querySelectorAll('[data-panel] svg')].at(-1)")
+    plots = browser.run(
+        "[...document.querySelectorAll('svg')].map((svg) =>"
+        "  [...svg.querySelectorAll('text.number')].map((text) => {"
+        "    const box = text.getBoundingClientRect();"
+        "    return [text.textContent, box.x, box.right, box.y, box.bottom]; }))"
+    )
+    assert ["0, 1, 2", "3"] in [[text for text, *_ in plot] for plot in plots]
+    for plot in plots:
+        for i, (_, left, right, top, bottom) in enumerate(plot):
+            others = plot[:i]
+            assert not any(
+                x < right and left < r and y < bottom and top < b for _, x, r, y, b in others
+            )

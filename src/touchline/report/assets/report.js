@@ -168,16 +168,29 @@
     }
   };
   const shade = (svg, frame, event, y, height, more) => {
-    if (event.to < frame.from || event.from > frame.to) return;
     const from = frame.clip(event.from), to = frame.clip(event.to);
     const size = { x: from, y, width: Math.max(to - from, 1), height };
     const rect = node("rect", { ...size, class: `event ${event.level} ${more}` }, svg);
     node("title", {}, rect).textContent = event.title;
-    const number = String(event.id);
-    if (size.width < 7 * number.length + 4) return;  // pixels: it would not fit
-    const strip = more === "strip";
-    const place = { x: from + 3, y: y + (strip ? Math.min(height - 1, 10) : 10), class: "number" };
-    if (!strip || height > 9) node("text", place, svg).textContent = number;
+  };
+  const inView = (frame, event) => event.to >= frame.from && event.from <= frame.to;
+  // The numbers of events, where they begin; those that would lie on each other stand in one line.
+  const LETTER = 7, MOST_NUMBERS = 4; // pixels; numbers in a line
+  const numbers = (svg, frame, events, y) => {
+    const lines = [];
+    for (const event of [...events].sort((a, b) => a.from - b.from)) {
+      const from = frame.clip(event.from), last = lines[lines.length - 1];
+      if (last !== undefined && from < last.from + LETTER * last.text.length + 6) {
+        last.to = Math.max(last.to, frame.clip(event.to));
+        last.left += last.ids.length < MOST_NUMBERS ? 0 : 1;
+        if (last.ids.length < MOST_NUMBERS) last.ids.push(event.id);
+        last.text = last.ids.join(", ") + (last.left ? ` +${last.left}` : "");
+      } else
+        lines.push({ from, to: frame.clip(event.to), ids: [event.id], left: 0, text: `${event.id}` });
+    }
+    for (const { from, to, text } of lines)
+      if (to - from >= LETTER * text.length + 4) // pixels: otherwise it would not fit
+        node("text", { x: from + 3, y, class: "number" }, svg).textContent = text;
   };
   let clips = 0;
   const clipTo = (svg, frame) => {
@@ -193,9 +206,10 @@
     frame.range(low, high);
     axis(svg, frame);
     scale(svg, frame, low, high);
-    for (const event of data.events)
-      if (!event.beside && (panel.segment === null || event.segment === panel.segment))
-        shade(svg, frame, event, TOP, frame.height - TOP - BOTTOM, "");
+    const events = data.events.filter((event) => !event.beside && inView(frame, event) &&
+      (panel.segment === null || event.segment === panel.segment));
+    for (const event of events) shade(svg, frame, event, TOP, frame.height - TOP - BOTTOM, "");
+    numbers(svg, frame, events, TOP + 10);
     const clipped = clipTo(svg, frame);
     if (panel.band !== null)
       node("path", { d: band(source, panel, frame), class: "band", ...clipped }, svg);
@@ -217,10 +231,11 @@
       const label = { x: LEFT - 8, y: TOP + row * each + 14, "text-anchor": "end" };
       node("text", label, plot.svg).textContent = name;
       for (const event of data.events)
-        if (event.segment === name) {
-          const [lane, lanes] = event.lane, high = (each - 8) / lanes;
-          const gap = lanes > 1 ? 1 : 0;
-          shade(plot.svg, frame, event, TOP + row * each + 4 + lane * high, high - gap, "strip");
+        if (event.segment === name && inView(frame, event)) {
+          const [lane, lanes] = event.lane, high = (each - 8) / lanes - (lanes > 1 ? 1 : 0);
+          const top = TOP + row * each + 4 + (lane * (each - 8)) / lanes;
+          shade(plot.svg, frame, event, top, high, "strip");
+          if (high > 9) numbers(plot.svg, frame, [event], top + Math.min(high - 1, 10));
         }
     });
   };
