@@ -248,6 +248,28 @@ def test_two_views_see_the_contact_from_different_sides(robot):
             assert pixels.min() > 0 and pixels.max() < 100
 
 
+@settings(max_examples=40, deadline=None)
+@given(
+    place=st.tuples(*[st.floats(0.0, 1.0)] * 3),
+    force=st.tuples(*[st.floats(-200.0, 200.0)] * 3).filter(lambda f: np.linalg.norm(f) > 0.1),
+    posture=st.integers(0, 9),
+    aspect=st.sampled_from([0.7, 4.0 / 3.0, 2.2]),
+)
+def test_no_arrow_is_cut_off(robot, place, force, posture, aspect):
+    q = np.random.default_rng(posture).uniform(-1.5, 1.5, 7)
+    scene, bare = Scene(robot, q), Scene(robot, q)
+    corners = scene.surface.corners.reshape(-1, 3)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    scene.add_contact(low + np.array(place) * (high - low), force, "truth")
+    size = (round(240 * aspect), 240)
+    for camera in views_of_contact(scene, aspect):
+        # The truth is the widest arrow, and has no line that goes on: nothing of it is at a border.
+        drawn = np.abs(scene.render(camera, size).astype(int) - bare.render(camera, size)) > 2
+        ys, xs = np.nonzero(drawn.any(axis=2))
+        assert len(xs) and xs.min() > 0 and xs.max() < size[0] - 1
+        assert ys.min() > 0 and ys.max() < size[1] - 1
+
+
 def test_lines_of_sight_end_at_the_arm(robot):
     scene = Scene(robot, Q)
     inside = robot.T_world_links(Q)["link3"][:3] @ [0, -0.03, 0.15, 1]
