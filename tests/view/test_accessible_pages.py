@@ -4,8 +4,10 @@
 Nothing moves on these pages, so that the browser has time for axe-core.
 """
 
+from itertools import product
+
 import pytest
-from accessible import WIDTHS, look, need_axe, serious
+from accessible import SCHEMES, WIDTHS, look, need_axe, serious
 from browser import until
 
 import touchline as tl
@@ -21,12 +23,14 @@ from touchline.view.server import PageServer
 
 
 def check(browser, server, words):
-    """The page as it opens; its colours are light whatever the system's."""
+    """The page as it opens, in the system's colours."""
     need_axe()
-    for width in WIDTHS:
-        look(browser, width, "light")
+    for width, scheme in product(WIDTHS, SCHEMES):
+        look(browser, width, scheme)
         browser.open(server.url)
         browser.wait_for(words)
+        scheme_is = "document.documentElement.dataset.mantineColorScheme"
+        assert browser.run(scheme_is) == scheme
         until(lambda: serious(browser) == [], pause=browser.rest, what="no finding of axe-core")
 
 

@@ -8,10 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from touchline.figure import X, Y, Z
 from touchline.view.replay import Replay
 from touchline.view.signals import (
     JOINTS,
     Box,
+    colour_of,
     force_on,
     gaps,
     nice_range,
@@ -108,3 +110,9 @@ def test_bars_are_areas_where_events_last():
 def test_bars_of_no_events():
     x, heights = areas([(0, []), (0, [])], (0.0, 9.0))
     assert x.tolist() == [0.0, 0.0, 9.0, 9.0] and (heights == -THICK).all()
+
+
+def test_curves_of_x_y_and_z_have_the_colours_of_the_axes():
+    names = ("fx", "my", "fz", "joint1", "joint2")
+    colours = [colour_of(name, number) for number, name in enumerate(names)]
+    assert colours[:3] == [X, Y, Z] and len(set(colours)) == 5

@@ -18,7 +18,7 @@ ADVICE = (
 LEGEND = f"""\
 <div style="font-size:12px;padding:0 0.75em">
 <span style="color:{FELT}">&#9679;</span> felt, with line of action and uncertainty (2 sigma);
-<span style="color:{TRUE}">&#9675; true</span></div>"""
+<span style="color:{TRUE}">&#9675;</span> true</div>"""
 MOTIONS = {"stands": False, "moves": True}
 
 

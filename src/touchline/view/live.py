@@ -233,7 +233,7 @@ def notice(error: Exception) -> str:
     """HTML that says why the arm begins anew."""
     what = escape(f"{type(error).__name__}: {error}"[:200])
     return (
-        '<div role="alert" style="font-size:12px;padding:0 0.75em;color:#b00020">'
+        '<div role="alert" style="font-size:12px;padding:0 0.75em;color:var(--alarm)">'
         f"The simulation failed and the arm was started again. {what}</div>"
     )
 

@@ -6,11 +6,12 @@ import viser
 from numpy.typing import NDArray
 from viser import uplot
 
+from touchline.figure import X, Y, Z
 from touchline.view.history import SECONDS, History
 
 Array = NDArray[np.float64]
 
-COLOURS = ("#c0392b", "#2c7a4b", "#2f6db3")  # x, y, z, as in the report
+COLOURS = (X, Y, Z)
 HEIGHT = 160  # pixels
 QUANTITIES = {"force": (0, "f", "N", 5.0), "moment": (3, "m", "Nm", 1.0)}
 

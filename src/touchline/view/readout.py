@@ -50,13 +50,13 @@ def readout(
     return f"""\
 <div style="font-size:12px;line-height:1.5;padding:0 0.75em">
 <table style="width:100%;border-collapse:collapse;text-align:left">
-<tr style="color:#666"><th>segment</th><th>feels</th><th>on</th><th>force</th>
+<tr style="color:var(--soft)"><th>segment</th><th>feels</th><th>on</th><th>force</th>
 <th>point off</th><th>force off</th></tr>
 {rows}</table>
 <div style="margin-top:0.4em">detected after {delay} &middot; estimator
 {1e6 * speed.step:.0f} &micro;s per sample &middot; real-time factor {speed.real_time:.2f}</div>
 {_faint(verdicts, felt)}
-<div style="color:#b00020;min-height:1.5em">{escape(health_words(health))}</div></div>"""
+<div style="color:var(--alarm);min-height:1.5em">{escape(health_words(health))}</div></div>"""
 
 
 def _row(verdict: Verdict) -> str:

@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 Colour = tuple[int, int, int]
 
 SHELL, TRIM = (241, 242, 244), (93, 100, 109)
+GRID = (176, 180, 185)  # is seen on white and does not glare on black
 TINT, ALARM = (255, 190, 110), (235, 90, 80)  # of links that are touched, or hit
 CREASE = np.deg2rad(35.0)  # edges sharper than this stay sharp
 GROUND = 4.0  # m
@@ -75,9 +76,7 @@ def dress(page: viser.ViserServer) -> None:
     scene.configure_environment_map(None)  # the light below is enough, and costs less
     scene.configure_default_lights(True, cast_shadow=False)
     scene.add_light_ambient("/light/ambient", intensity=1.2)
-    scene.add_grid(
-        "/ground", GROUND, GROUND, cell_color=(236, 238, 240), section_color=(228, 231, 234)
-    )
+    scene.add_grid("/ground", GROUND, GROUND, cell_color=GRID, section_color=GRID)
     page.initial_camera.position = (1.45, 1.05, 1.05)
     page.initial_camera.look_at = (0.2, 0.05, 0.5)
 

@@ -23,11 +23,23 @@ from touchline.view.guard import LOCAL_NAMES, Guard, is_local
 HOST, PORT = "127.0.0.1", 8080
 PORTS = 100  # that are tried from the wanted one on
 
-# viser's grey and blue are too light to be read with ease on white, and white on them.
+# viser's grey and blue are too light to be read with ease on white, and white on them. `--soft`
+# and `--alarm` are for texts of our own.
 CONTRAST = """
-:root { --mantine-color-dimmed: #5c636a !important; }
+:root { --soft: #5c636a; --alarm: #b00020; --mantine-color-dimmed: var(--soft) !important; }
+:root[data-mantine-color-scheme=dark] { --soft: #b4bbc3; --alarm: #ff8a80; }
 .mantine-Button-root { --button-bg: #1864ab !important; --button-hover: #144f87 !important; }
 .mantine-Button-root { --button-color: #fff !important; }
+"""
+# viser's page is dark where its address says so. This runs before viser does.
+SCHEME = """
+(() => {
+  const dark = matchMedia("(prefers-color-scheme: dark)"), address = new URL(location.href);
+  if (dark.matches) address.searchParams.set("darkMode", "");
+  else address.searchParams.delete("darkMode");
+  if (address.href !== location.href) history.replaceState(null, "", address);
+  dark.addEventListener("change", () => location.reload());
+})();
 """
 # viser leaves sliders, their fields and buttons with a symbol alone without a name, which those
 # who do not see the page need. The label of a row names what is in it.
@@ -175,8 +187,9 @@ def _put_title(response: Response) -> None:
 @lru_cache(maxsize=2)  # with and without compression
 def _titled(page: bytes, packed: bool) -> bytes:
     html = gzip.decompress(page) if packed else page
-    head = f"<title>Touchline</title>\n<style>{CONTRAST}</style><script>{NAMES}</script>".encode()
-    html = html.replace(b"<title>Viser</title>", head, 1)
+    scripts = f"<script>{SCHEME}</script><script>{NAMES}</script>"
+    head = f"<title>Touchline</title>\n<style>{CONTRAST}</style>{scripts}"
+    html = html.replace(b"<title>Viser</title>", head.encode(), 1)
     return gzip.compress(html) if packed else html
 
 

@@ -8,13 +8,15 @@ import viser
 from numpy.typing import NDArray
 from viser import uplot
 
+from touchline.figure import X, Y, Z
 from touchline.model.robot import Robot
 from touchline.view.replay import Replay
 
 Array = NDArray[np.float64]
 
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#6a51a3", "#444444", "#56b4e9", "#a6761d")
-NOW = "#22262b"
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8d7cc0", "#7f868d", "#56b4e9", "#a6761d")
+AXES = {"x": X, "y": Y, "z": Z}
+NOW = "#7f868d"
 ON_SEGMENT = "{}: wrench on the segment"
 JOINTS = "external joint torques"
 PIECES = 240  # of time in a plot
@@ -244,8 +246,15 @@ def _series(group: SignalGroup, low: float) -> tuple[uplot.Series, ...]:
     """Of the curves, of what fills gaps from the lower border `low` on, and of the time shown."""
     points = uplot.Series_Points(show=False)
     curves = [
-        uplot.Series(label=name, stroke=COLOURS[i % len(COLOURS)], width=1.5, points=points)
+        uplot.Series(label=name, stroke=colour_of(name, i), width=1.5, points=points)
         for i, name in enumerate(group.names)
     ]
     nothing = uplot.Series(label="no data", width=0, fill=NO_DATA, fillTo=low, points=points)
     return (uplot.Series(label="s"), *curves, nothing, now_series())
+
+
+def colour_of(name: str, number: int) -> str:
+    """That of the axis for fx to mz, else one by its number."""
+    if len(name) == 2 and name[0] in "fm" and name[1] in AXES:
+        return AXES[name[1]]
+    return COLOURS[number % len(COLOURS)]
