@@ -195,7 +195,7 @@ def test_an_address_names_a_time_or_an_event(browser, analysis):
     browser.offline()
     browser.resize(1200, 900)
     page = (analysis.out / "report.html").as_uri()
-    shown = "document.getElementById('shown').textContent"
+    shown = "document.getElementById('shown')?.textContent"
     browser.open(f"{page}#t=2.5,4")
     until(lambda: browser.run(shown) == "2.50 s to 4.00 s", pause=browser.rest)
     event = analysis.events[0]
