@@ -83,8 +83,9 @@ def _faint(verdicts: Sequence[Verdict], felt: Mapping[str, Felt]) -> str:
             if true.link in felt:
                 lines.append(felt[true.link].faint("true touch", float(np.linalg.norm(true.force))))
         contact = verdict.contact
-        if not verdict.true and contact is not None and contact.link in felt:
-            lines.append(felt[contact.link].faint("felt", contact.size))
+        able = None if contact is None or contact.link is None else felt.get(contact.link)
+        if not verdict.true and contact is not None and able is not None:
+            lines.append(able.faint("felt", contact.size))
     return "".join(f"<div>{escape(line)}</div>" for line in lines if line is not None)
 
 
