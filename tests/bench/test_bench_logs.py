@@ -44,3 +44,18 @@ def test_it_prints_rates(capsys):
     out = capsys.readouterr().out
     for word in ("MCAP zstd, no summary", "rosbag2 sqlite3", "pyarrow, to a table", "per hour"):
         assert word in out
+
+
+def test_labelling_is_measured(capsys):
+    assert main(["bench", "label", "--hours", "0.02", "--episode", "12"]) == 0
+    out = capsys.readouterr().out
+    assert "6 episodes, 1080 samples at 15 Hz" in out and "100 hours at this pace" in out
+
+
+def test_processes_are_compared(capsys):
+    words = ["--recordings", "3", "--minutes", "0.1", "--report", "none"]
+    assert main(["bench", "workers", *words]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "3 recordings of 0.1 minutes at 1 kHz, --report none"
+    assert all(line.endswith("the same") for line in lines[2:4]) and len(lines) == 5
+    assert main(["bench", "workers", "--minutes", "0"]) == 2

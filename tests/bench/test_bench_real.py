@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from touchline.bench.real.judged import Touched, judge_free, judge_touched
 from touchline.bench.real.matching import match
-from touchline.bench.real.recordings import Recording
+from touchline.bench.real.recordings import Recording, at_rate
 from touchline.cli import main
 from touchline.model.robot import load_robot
 from touchline.observer.samples import Samples
@@ -101,3 +101,16 @@ def test_an_arm_that_nothing_touches():
 def test_a_folder_without_recordings_is_told(tmp_path, capsys):
     assert main(["bench", "real", "--data", str(tmp_path)]) == 2
     assert "panda_touches" in capsys.readouterr().err
+
+
+def test_a_lower_rate_keeps_samples_of_even_instants():
+    robot = load_robot("sara")
+    n, k = len(robot.joint_names), len(robot.sensor_names)
+    time = 5.0 + 0.005 * np.arange(400)
+    q = np.tile(time[:, None], (1, n))
+    samples = Samples(time, q, q, q, np.zeros((400, k, 6)))
+    slow = at_rate(Recording("r", robot, samples, 0.005, spans((1, 2)), 7), 15.0)
+    assert slow.period == 1.0 / 15.0 and len(slow.samples) == 30 and slow.link == 7
+    np.testing.assert_allclose(slow.samples.time, 5.0 + np.arange(30) / 15.0, atol=0.005)
+    assert np.isin(slow.samples.time, time).all()
+    np.testing.assert_array_equal(slow.samples.q[:, 0], slow.samples.time)

@@ -14,7 +14,10 @@ from free_motion import free_motion, pushed
 
 import touchline as tl
 from touchline.cli import main
+from touchline.errors import InputError
 from touchline.label.channel import BEFORE
+from touchline.label.naming import Given
+from touchline.label.run import label
 from touchline.logs import write_table
 
 RATE = 100.0
@@ -108,6 +111,21 @@ def check_channel(contact, soon, link, force, level, position):
     expected = np.zeros(len(contact), bool)
     expected[onset - round(BEFORE * RATE) : onset] = True
     np.testing.assert_array_equal(soon[begin : begin + 500], expected[begin : begin + 500])
+
+
+def test_several_processes_label_the_same(lerobot, tmp_path, robot):
+    told = []
+    for workers in (1, 2):
+        copy = tmp_path / f"by{workers}"
+        done = label(lerobot, robot, copy, Given(), workers)
+        files = {p.relative_to(copy): p.read_bytes() for p in copy.rglob("*") if p.is_file()}
+        told.append((done, files))
+    assert told[0] == told[1] and done.touches >= 1 and done.episodes == EPISODES
+    spoilt = sorted((lerobot / "data").rglob("*.parquet"))[1]
+    spoilt.write_bytes(spoilt.read_bytes()[:-100])
+    with pytest.raises(InputError, match="file-001.parquet: not a readable Parquet file"):
+        label(lerobot, robot, tmp_path / "spoilt", Given(), 2)
+    assert not (tmp_path / "spoilt").exists()
 
 
 def test_lerobot(lerobot, robot, capsys):

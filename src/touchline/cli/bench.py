@@ -189,7 +189,7 @@ def detection(
     return 0
 
 
-def real(*, data: Directory = None) -> int:
+def real(*, data: Directory = None, rate: float | None = None) -> int:
     """What holds on recordings of real arms of which nothing but the model is told.
 
     Example: touchline bench real --data recordings
@@ -198,13 +198,17 @@ def real(*, data: Directory = None) -> int:
         data: Folder with the recordings: panda_touches, panda_touches_more, panda_ur10_rosbag2,
             kuka_lwr4, kinova_gen3; those that are missing are left out, all without a folder. The
             models of the Panda and the UR10 come with the package example-robot-data.
+        rate: Looks at the touched recordings once more as if recorded at this rate [Hz].
     """
     from touchline.bench.real.run import main
+    from touchline.numbers import check_positive
 
+    if rate is not None:
+        check_positive(rate=rate)
     if data is None:
         print("Recordings of real arms: none, name their folder with --data")
     else:
-        main(data)
+        main(data, rate)
     return 0
 
 
@@ -339,6 +343,53 @@ def fleet(
     return main(recordings, kills, stops, workers, seed)
 
 
+def workers(
+    *,
+    recordings: int = 20,
+    minutes: float = 10.0,
+    report: Literal["full", "summary", "none"] = "full",
+    workers: int = 2,
+    dask: tuple[int, ...] = (),
+) -> int:
+    """How much faster several processes analyze many recordings, and whether they say the same.
+
+    Example: touchline bench workers --minutes 1 --dask 1 2 4
+
+    Exit status 1 where results differ from those of one process.
+
+    Args:
+        recordings: Number of them, at 1 kHz, touched every ten seconds.
+        minutes: Of each.
+        report: As of `touchline analyze`.
+        workers: Number of processes.
+        dask: Also by clusters of so many workers on this machine.
+    """
+    from touchline.bench.fleet.workers import main
+    from touchline.numbers import check_least, check_positive
+
+    check_least(1, recordings=recordings, workers=workers)
+    check_positive(minutes=minutes)
+    for count in dask:
+        check_least(1, dask=count)
+    return main(recordings, minutes, report, workers, dask)
+
+
+def label(*, hours: float = 1.0, episode: float = 20.0) -> int:
+    """What it costs to label a LeRobot data set of 15 Hz with the touch channel.
+
+    Example: touchline bench label --hours 10
+
+    Args:
+        hours: Of all episodes.
+        episode: Length of each [s]; it is touched every ten seconds.
+    """
+    from touchline.bench.label.run import main
+    from touchline.numbers import check_positive
+
+    check_positive(hours=hours, episode=episode)
+    return main(hours, episode)
+
+
 def interface(
     *,
     runs: int = 100,
@@ -436,6 +487,8 @@ BENCHMARKS: dict[str, Callable[..., int]] = {
     "observer": observer,
     "logs": logs,
     "fleet": fleet,
+    "workers": workers,
+    "label": label,
     "deadline": deadline,
     "localization": localization,
     "classification": classification,

@@ -18,6 +18,7 @@ def label(
     wrench: Annotated[str | None, arg(metavar="NAME")] = None,
     rate: Annotated[float | None, arg(metavar="HZ")] = None,
     bandwidth: Annotated[float | None, arg(metavar="K")] = None,
+    workers: Annotated[int, arg(metavar="N")] = 0,
 ) -> int:
     """Adds what the arm feels to a data set for robot learning.
 
@@ -39,13 +40,19 @@ def label(
         wrench: With six numbers for each force-torque sensor.
         rate: Samples per second. Default: as the data set tells.
         bandwidth: Of the observer [rad/s]. Default: as described.
+        workers: Processes that label the files of a LeRobot data set. Default: one per core.
     """
+    import os
+
     from touchline.label.naming import Given
     from touchline.label.run import label as run
     from touchline.label.run import labelled_text
     from touchline.model.robot import load_robot
+    from touchline.numbers import check_least
 
+    check_least(0, workers=workers)
     model = load_robot(robot)
-    done = run(dataset, model, out, Given(q, qd, tau, wrench, rate, bandwidth))
+    given = Given(q, qd, tau, wrench, rate, bandwidth)
+    done = run(dataset, model, out, given, workers or os.cpu_count() or 1)
     print(labelled_text(done, model))
     return 0

@@ -1,7 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """LeRobot data sets, version 3: Parquet files of many episodes, described in `meta/info.json`."""
 
+import atexit
 import json
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,10 +37,16 @@ def is_lerobot(path: Path) -> bool:
     return (path / INFO).is_file()
 
 
-def label_lerobot(path: Path, robot: Robot, given: Given) -> Labelled:
+def label_lerobot(path: Path, robot: Robot, given: Given, workers: int = 1) -> Labelled:
     """Adds the features `observation.touch.*` to a data set, in place; the rest stays as it is.
 
     Each file is replaced as a whole. Labelled data sets may be labelled again.
+
+    Args:
+        path: of the data set.
+        robot: the robot.
+        given: names and numbers from the user.
+        workers: number of processes; the results do not depend on it.
 
     Raises:
         InputError: it is damaged, of another version, or lacks what is needed.
@@ -52,19 +68,79 @@ def label_lerobot(path: Path, robot: Robot, given: Given) -> Labelled:
     files = sorted((path / "data").glob("**/*.parquet"))
     if not files:
         raise InputError(f"{path / 'data'}: no Parquet files")
-    feeler = Feeler(robot, 1.0 / rate, given.bandwidth)
-    done, spread = Labelled(rate=float(rate)), _Spread()
-    for file in files:
-        _label_file(file, feeler, names, done, spread)
+    task = _Task(robot, float(rate), given.bandwidth, names)
+    done, spread, links = Labelled(rate=float(rate)), _Spread(), tuple[str, ...]()
+    with _hands(task, min(workers, len(files))) as label_all:
+        for counted, spread_of, named in label_all(files):
+            done += counted
+            spread.merge(spread_of)
+            links = named
     stats = path / STATS
     if stats.is_file():
         _write_json(stats, _without_touch(_read_json(stats)) | spread.as_json())
-    about = {"touchline": __version__, "robot": robot.name, "links": feeler.links}
+    about = {"touchline": __version__, "robot": robot.name, "links": links}
     about |= {"levels": LEVELS, "soon_seconds": BEFORE, "rate": rate, "signals": names}
     _write_json(path / ABOUT, about)
     info["features"] = _without_touch(features) | _features(robot)
     _write_json(path / INFO, info)
     return done
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What is to be done with each file."""
+
+    robot: Robot
+    rate: float
+    bandwidth: float | None
+    names: dict[str, str]
+
+
+class _Hand:
+    """Labels files, one after another."""
+
+    def __init__(self, task: _Task) -> None:
+        self._names, self._rate = task.names, task.rate
+        self._feeler = Feeler(task.robot, 1.0 / task.rate, task.bandwidth)
+
+    def label(self, file: Path) -> tuple[Labelled, "_Spread", tuple[str, ...]]:
+        """Label a file; what there was to count, and the links that `link` numbers."""
+        done, spread = Labelled(rate=self._rate), _Spread()
+        _label_file(file, self._feeler, self._names, done, spread)
+        return done, spread, self._feeler.links
+
+
+_HANDS: list[_Hand] = []  # the one of this process, where it is one of several
+
+
+def _begin(task: _Task) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one who asks sees to it
+    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
+    _HANDS.append(_Hand(task))
+    atexit.register(_HANDS.clear)  # before native types go
+
+
+def _end_with(parent: int) -> None:
+    """End when the process that asks is gone, though it was killed."""
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os._exit(1)
+
+
+def _label_here(file: Path) -> tuple[Labelled, "_Spread", tuple[str, ...]]:
+    return _HANDS[0].label(file)
+
+
+@contextmanager
+def _hands(task: _Task, count: int) -> Iterator[Callable[[list[Path]], Iterator[Any]]]:
+    """What labels files, in this process or in several; it answers in the order of the files."""
+    if count <= 1:
+        hand = _Hand(task)
+        yield lambda files: map(hand.label, files)
+        return
+    context = multiprocessing.get_context("spawn")  # native threads do not survive a fork
+    with ProcessPoolExecutor(count, context, _begin, (task,)) as pool:
+        yield lambda files: pool.map(_label_here, files)
 
 
 def _label_file(
@@ -184,6 +260,14 @@ class _Spread:
             (clean**2).sum(0),
             known.sum(0),
         ]
+        self._join(name, new)
+
+    def merge(self, other: "_Spread") -> None:
+        """Take all that another one has taken."""
+        for name, new in other._sums.items():
+            self._join(name, new)
+
+    def _join(self, name: str, new: list[NDArray]) -> None:
         old = self._sums.get(name)
         if old is not None:
             joined = [np.minimum(old[0], new[0]), np.maximum(old[1], new[1])]

@@ -17,7 +17,9 @@ from touchline.model.robot import Robot, load_robot
 FAST = 1000.0  # samples per second, to which others are compared
 
 
-def label(dataset: Path, robot: Robot | str, out: Path | None, given: Given) -> Labelled:
+def label(
+    dataset: Path, robot: Robot | str, out: Path | None, given: Given, workers: int = 1
+) -> Labelled:
     """Adds the touch channel to a data set.
 
     Args:
@@ -25,6 +27,7 @@ def label(dataset: Path, robot: Robot | str, out: Path | None, given: Given) -> 
         robot: the robot, or what `load_robot` takes.
         out: for a copy that is labelled; None: in place.
         given: names and numbers from the user.
+        workers: number of processes that label the files of a LeRobot data set.
 
     Raises:
         InputError: it cannot be used, or `out` exists.
@@ -34,14 +37,14 @@ def label(dataset: Path, robot: Robot | str, out: Path | None, given: Given) -> 
         raise InputError(f"{dataset}: no such file")
     robot = robot if isinstance(robot, Robot) else load_robot(robot)
     if out is None:
-        return _in_place(dataset, robot, given)
+        return _in_place(dataset, robot, given, workers)
     if out.exists():
         raise InputError(f"--out {out}: exists already; name a new place")
     out.parent.mkdir(parents=True, exist_ok=True)
     draft = out.with_name(f".part.{out.name}")  # keeps the ending: it tells the kind
     try:
         (shutil.copytree if dataset.is_dir() else shutil.copyfile)(dataset, draft)
-        done = _in_place(draft, robot, given)
+        done = _in_place(draft, robot, given, workers)
         draft.rename(out)
     finally:
         if draft.is_dir():
@@ -50,9 +53,9 @@ def label(dataset: Path, robot: Robot | str, out: Path | None, given: Given) -> 
     return done
 
 
-def _in_place(path: Path, robot: Robot, given: Given) -> Labelled:
+def _in_place(path: Path, robot: Robot, given: Given, workers: int) -> Labelled:
     if path.is_dir() and is_lerobot(path):
-        return label_lerobot(path, robot, given)
+        return label_lerobot(path, robot, given, workers)
     if not path.is_dir():
         return _kind(path)(path, robot, given)
     files = [f for f in sorted(path.rglob("*")) if f.suffix in (*ENDINGS, ".parquet")]

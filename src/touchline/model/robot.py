@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +66,10 @@ class Robot:
             f"<Robot {self.name}: {len(self.joint_names)} joints, {measured} with torques; "
             f"force-torque sensors: {sensors}; segments: {', '.join(self.segment_names)}>"
         )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled without what has been worked out, part of which is native."""
+        return type(self), (self.description, self.mechanism, self.assumed)
 
     def _repr_html_(self) -> str:
         """The robot as a notebook shows it: its skeleton, and bodies with masses and segments."""

@@ -100,11 +100,11 @@ def chaos(folder: Path, recordings: int, kills: int, stops: int, workers: int, s
     damages = make_recordings(logs, load_robot(ROBOT), recordings, round(DAMAGED * recordings))
     began = time.monotonic()
     _started(logs, folder / "serial", 1).wait()
-    serial, _ = _rows(folder / "serial")
+    serial, _ = manifest_rows(folder / "serial")
     told = Chaos(damages, serial)
     middle = time.monotonic()
     _disturbed(logs, folder / "out", told, kills, stops, workers, random.Random(seed))
-    told.found, told.lines = _rows(folder / "out")
+    told.found, told.lines = manifest_rows(folder / "out")
     told.seconds = middle - began, time.monotonic() - middle
     return told
 
@@ -175,7 +175,8 @@ def _count(out: Path) -> int:
     return path.read_bytes().count(b'{"name"') if path.is_file() else 0
 
 
-def _rows(out: Path) -> tuple[Rows, int]:
+def manifest_rows(out: Path) -> tuple[Rows, int]:
+    """The rows of a manifest by their names, and how many lines it has."""
     lines = (out / MANIFEST).read_text(encoding="utf-8").splitlines()
     rows = [json.loads(line) for line in lines if line]
     return {row["name"]: row for row in rows}, len(rows)

@@ -4,7 +4,7 @@
 No friction, no noise figures, no thresholds: what a new robot starts with.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -108,6 +108,15 @@ def read_free(data: Path, scratch: Path) -> list[Recording]:
             samples = _read(path, robot)
             found.append(Recording(name, robot, samples, _period(samples), np.zeros((0, 2))))
     return found
+
+
+def at_rate(recording: Recording, rate: float) -> Recording:
+    """As if it had been recorded at a lower rate [Hz]: the first sample from each instant on."""
+    s = recording.samples
+    instants = np.arange(s.time[0], s.time[-1], 1.0 / rate)
+    kept = np.zeros(len(s), bool)
+    kept[np.searchsorted(s.time, instants)] = True
+    return replace(recording, samples=s.where(kept), period=1.0 / rate)
 
 
 def _robot(text: str, path: Path, scratch: Path) -> Robot:

@@ -16,7 +16,7 @@ from touchline.bench.real.judged import (
     judge_touched,
 )
 from touchline.bench.real.matching import MARGIN
-from touchline.bench.real.recordings import read_free, read_touched, touched_files
+from touchline.bench.real.recordings import at_rate, read_free, read_touched, touched_files
 from touchline.bench.tables import Row, aligned
 from touchline.errors import InputError
 
@@ -37,8 +37,12 @@ TOUCHED_HEAD = (
 FREE_HEAD = ("recording", "s", "in contact", "longest", "events", "to the end")
 
 
-def main(data: Path) -> None:
+def main(data: Path, rate: float | None = None) -> None:
     """Prints what holds on the recordings below `data`.
+
+    Args:
+        data: folder of the recordings.
+        rate: at which the touched ones are looked at once more [Hz], or None.
 
     Raises:
         InputError: there are none.
@@ -50,17 +54,25 @@ def main(data: Path) -> None:
         if not files and not free:
             raise InputError(f"{data}: holds neither panda_touches nor recordings of free motion")
         if files:
-            print(_touched_text([_judged(path, folder) for path in files]))
+            whole = [_judged(path, folder) for path in files]
+            print(_touched_text("A real Panda touched by hand", whole))
+        if files and rate is not None:
+            thin = [_judged(path, folder, rate) for path in files]
+            print(_touched_text(f"The same at {rate:g} Hz", thin))
+            before, found = (sum(c.found for _, _, c in all_of) for all_of in (whole, thin))
+            print(f"touches found at {rate:g} Hz of those found before: {found} of {before}\n")
         if free:
             print(_free_text([(r.name, judge_free(r, events_of(r))) for r in free]))
 
 
-def _judged(path: Path, folder: Path) -> tuple[str, int, Touched]:
+def _judged(path: Path, folder: Path, rate: float | None = None) -> tuple[str, int, Touched]:
     recording = read_touched(path, folder)
+    if rate is not None:
+        recording = at_rate(recording, rate)
     return recording.name, recording.link, judge_touched(recording, events_of(recording))
 
 
-def _touched_text(judged: list[tuple[str, int, Touched]]) -> str:
+def _touched_text(what: str, judged: list[tuple[str, int, Touched]]) -> str:
     total = Touched.sum(counts for _, _, counts in judged)
     rows: list[Row] = [TOUCHED_HEAD]
     rows += [_touched_row(name, str(link), counts) for name, link, counts in judged]
@@ -68,7 +80,7 @@ def _touched_text(judged: list[tuple[str, int, Touched]]) -> str:
     found = max(total.found, 1)
     return "\n".join(
         [
-            f"A real Panda touched by hand, one event to one touch (margin {MARGIN} s):",
+            f"{what}, one event to one touch (margin {MARGIN} s):",
             aligned(rows),
             f"found {_percent(total.found, total.touches)}; of these: right link "
             f"{_percent(total.right, found)}, beyond the touched one "
