@@ -272,6 +272,12 @@ def test_a_killed_run_goes_on_where_it_was(made, tmp_path):
 def test_results_in_python(made, tmp_path):
     results = tl.analyze(made / "a" / "whole.parquet", "sara")
     assert results.estimates.num_rows == 400 and len(results.events) == 1
+    (event,) = results.events
+    where = event["link"] or event["segment"]
+    told = f"0: {event['level']} at {event['detected']:.3f} s on {where}"
+    assert repr(results).startswith("<Results: 400 samples, 1 events, ")
+    assert repr(results).endswith(f"{told}>")
+    assert f"<td>{where}</td>" in results._repr_html_()
     tables = results.to_arrow()
     assert set(tables) == {"estimates", "contacts", "events"}
     assert tables["events"]["segment"].to_pylist() == [results.events[0]["segment"]]

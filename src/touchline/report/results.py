@@ -4,6 +4,7 @@
 import json
 import tempfile
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,22 @@ from touchline.model.robot import Robot
 from touchline.report.analysis import analyze as analyze_files
 from touchline.report.outputs import CONTACTS, ESTIMATES, EVENTS
 
+MOST_SHOWN, MOST_ROWS = 3, 20  # events in a line, and in a notebook
+# Titles of a notebook's columns, and what stands in them.
+SHOWN = {
+    "event": "id",
+    "detected [s]": "detected",
+    "cleared [s]": "cleared",
+    "level": "level",
+    "segment": "segment",
+    "link": "link",
+    "probability": "body_probability",
+    "largest force [N]": "force_peak",
+    "status": "status",
+}
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Results:
     """What came out of a recording, with the columns and keys of the files.
 
@@ -28,6 +43,30 @@ class Results:
     events: list[dict[str, Any]]
     warnings: list[str]
 
+    def __repr__(self) -> str:
+        collisions = sum(event["level"] == "collision" for event in self.events)
+        events = "; ".join(_line(event) for event in self.events[:MOST_SHOWN])
+        more = len(self.events) - MOST_SHOWN
+        return (
+            f"<Results: {self.estimates.num_rows} samples, {len(self.events)} events, {collisions} "
+            f"of them collisions{': ' if events else ''}{events}"
+            f"{f'; {more} more' if more > 0 else ''}>"
+        )
+
+    def _repr_html_(self) -> str:
+        """The events as a notebook shows them."""
+        head = "".join(f"<th>{escape(title)}</th>" for title in SHOWN)
+        rows = "".join(
+            "<tr>"
+            + "".join(f"<td>{escape(_told(event[key]))}</td>" for key in SHOWN.values())
+            + "</tr>"
+            for event in self.events[:MOST_ROWS]
+        )
+        more = len(self.events) - MOST_ROWS
+        caption = f"{self.estimates.num_rows} samples, {len(self.events)} events"
+        caption += f", the first {MOST_ROWS}" if more > 0 else ""
+        return f"<table><caption>{caption}</caption><tr>{head}</tr>{rows}</table>"
+
     def to_arrow(self) -> dict[str, Any]:
         """The tables `estimates`, `contacts` and `events`, as Arrow tables."""
         import pyarrow as pa
@@ -42,6 +81,17 @@ class Results:
             ModuleNotFoundError: pandas is not installed.
         """
         return {name: table.to_pandas() for name, table in self.to_arrow().items()}
+
+
+def _line(event: dict[str, Any]) -> str:
+    where = event["link"] or event["segment"]
+    return f"{event['id']}: {event['level']} at {event['detected']:.3f} s on {where}"
+
+
+def _told(value: Any) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def analyze(
