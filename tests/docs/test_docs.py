@@ -8,6 +8,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -197,3 +198,24 @@ def test_the_site_is_built_without_a_warning_and_loads_nothing_from_elsewhere(tm
     for file in tmp_path.rglob("*.html"):
         loaded = re.findall(r'<(?:script|img|iframe)[^>]* src="(http[^"]*)"', file.read_text())
         assert loaded == []
+
+
+def test_a_package_gets_the_address_it_is_published_from(tmp_path):
+    for name in ("README.md", "pyproject.toml"):
+        shutil.copy(REPOSITORY / name, tmp_path)
+    (tmp_path / "examples").mkdir()
+    script = [sys.executable, str(REPOSITORY / "scripts" / "put_address.py")]
+    address = "https://code.example/arm/touchline"
+    subprocess.run([*script, f"{address}/", "v0.1.0", str(tmp_path)], check=True)
+    project = tomllib.loads((tmp_path / "pyproject.toml").read_text())["project"]
+    assert project["urls"]["Homepage"] == address
+    assert project["urls"]["Changelog"] == f"{address}/blob/v0.1.0/CHANGELOG.md"
+    text = (tmp_path / "README.md").read_text()
+    targets = re.findall(r"\]\(([^)\s]+)\)", text)
+    assert targets and all(target.startswith(f"{address}/") for target in targets)
+    assert f"({address}/raw/v0.1.0/docs/images/sara.png)" in text
+    assert f"({address}/tree/v0.1.0/examples)" in text
+    for given, told in ((address, b"has an address already"), ("here", b"no address like")):
+        command = [*script, given, "v0.1.0", str(tmp_path)]
+        refused = subprocess.run(command, check=False, capture_output=True)
+        assert refused.returncode == 1 and told in refused.stderr

@@ -9,6 +9,7 @@ our own would have to be built on every machine that listens. Markers and wrench
 
 import json
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -67,17 +68,16 @@ class Messages:
             "/diagnostics": self._array,
         }
 
-    def of(self, sample: Sample, result: Result) -> dict[str, Any]:
-        """What is published of a sample, by topic."""
-        messages: dict[str, Any] = {"~/external_joint_torques": self._torques(sample, result)}
+    def of(self, sample: Sample, result: Result) -> Iterator[tuple[str, Any]]:
+        """Topic and message of what is published of a sample, each as soon as it is made."""
+        yield "~/external_joint_torques", self._torques(sample, result)
+        yield "~/contacts", self._text(data=contacts_json(sample.time, result))
         for segment, name in enumerate(self._robot.segment_names):
             if name in self._forces:
                 wrench = result.estimate.segment_wrench[segment]
-                messages[wrench_topic(name)] = self._segment(sample, wrench)
-        messages["~/contacts"] = self._text(data=contacts_json(sample.time, result))
+                yield wrench_topic(name), self._segment(sample, wrench)
         if result.contacts or self._drawn:
-            messages["~/markers"] = self._draw(sample, result.contacts)
-        return messages
+            yield "~/markers", self._draw(sample, result.contacts)
 
     def collision(self, collision: bool) -> Any:
         """Whether there was one since the last reset."""

@@ -10,7 +10,7 @@ from touchline.model.robot import Robot
 from touchline.pipeline.pipeline import Pipeline
 
 SLOTS = 16384  # samples and results that may wait: two seconds at 8 kHz
-POLL = 0.0005  # s between two looks whether something has been felt
+POLL = 0.0002  # s between two looks whether something has been felt
 
 
 class Felt:
