@@ -83,10 +83,10 @@ def test_topics_are_recorded_and_replayed_to_the_last_bit(tmp_path, suffix):
 @needs_ros
 def test_a_silent_wrench_and_silent_joints_are_told(tmp_path):
     robot = write_arm(tmp_path, 6, extra=LOG)
-    status, out, err = together(robot, 72, ["nowrench"], "--duration", "4")
+    status, out, err = together(robot, 72, ["nowrench"], "--duration", "6")
     assert status == 0, err
     assert "wrist: stale" in out and " 0 events" in out
-    status, out, err = together(robot, 73, ["gone"], "--duration", "4")
+    status, out, err = together(robot, 73, ["gone"], "--duration", "6")
     assert status == 0, err
     assert "joints: stale" in out and "estimates are withheld" in out and " 0 events" in out
 
