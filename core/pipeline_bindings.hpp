@@ -7,6 +7,8 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -46,8 +48,8 @@ struct Pipeline {
 };
 
 // Where the parts of a snapshot stand: the observer's row with the health of the pipeline, what the
-// detector says, and the faults of channels. Then the sample's time and joint positions, and how many
-// contacts and changes of events follow.
+// detector says, the faults of channels, and the resets of estimates. Then the sample's time and
+// joint positions, and how many contacts and changes of events follow.
 struct Snapshot {
   explicit Snapshot(const tl::RedundantPipeline& p)
       : width(p.row_layout().width()),
@@ -60,13 +62,16 @@ struct Snapshot {
         watch(quiet + segments),
         faults(watch + segments),
         ratios(faults + p.channels().count()),
-        time(ratios + p.channels().count()),
+        resets(ratios + p.channels().count()),
+        time(resets + kOfReset * p.resets().size()),
         q(time + 1),
         contacts(q + p.row_layout().joints),
         changes(contacts + 1),
         end(changes + 1) {}
   std::size_t width, segments, rows;
-  std::size_t levels, normalized, drift, quiet, watch, faults, ratios, time, q, contacts,
+  static constexpr std::size_t kOfReset = 7;  // its count, its jump
+
+  std::size_t levels, normalized, drift, quiet, watch, faults, ratios, resets, time, q, contacts,
       changes, end;
 };
 
@@ -79,6 +84,11 @@ inline void write_row(const tl::Result& result, const tl::RowLayout& layout, dou
 inline double* write_watch(const tl::Result& result, double* out) {
   for (const tl::Watch watch : result.watch) *out++ = static_cast<double>(watch);
   return out;
+}
+
+inline double* write_reset(const tl::Reset& reset, double* out) {
+  *out++ = static_cast<double>(reset.count);
+  return std::copy(std::begin(reset.jump), std::end(reset.jump), out);
 }
 
 // Keeps the events that a sample has ended.
@@ -106,6 +116,8 @@ inline void take_snapshot(Pipeline& of, const tl::Sample& sample, const tl::Resu
   for (std::size_t c = 0; c < result.faults.size(); ++c)
     out[at.faults + c] = static_cast<double>(result.faults[c]);
   std::copy(result.ratios.begin(), result.ratios.end(), out.data() + at.ratios);
+  double* reset = out.data() + at.resets;
+  for (const tl::Reset& r : result.resets) reset = write_reset(r, reset);
   out[at.time] = sample.time;
   std::copy_n(sample.q, at.contacts - at.q, out.data() + at.q);
   out[at.contacts] = static_cast<double>(result.contacts.size());
@@ -165,13 +177,16 @@ inline nb::tuple run(Pipeline& p, nb::handle time, nb::handle q, nb::handle qd, 
   arrays::Out rows({in.rows, at.width}), levels({in.rows, at.segments}),
       normalized({in.rows, at.rows}), drift({in.rows, at.rows}), quiet({in.rows, at.segments}),
       watch({in.rows, at.segments});
-  std::vector<double> contacts, faults;
+  std::vector<double> contacts, faults, resets;
   std::vector<tl::Fault> before(p.value->channels().count(), tl::Fault::none);
   const std::size_t contact = fields::width<tl::Contact>() + 1;
   double *level = levels.data(), *x = normalized.data(), *y = drift.data(), *since = quiet.data(),
          *watched = watch.data();
   {
     const guard::Turn turn(p.turn);
+    const tl::Span<tl::Reset> so_far = p.value->resets();
+    std::vector<std::uint32_t> counts(so_far.size());
+    for (std::size_t k = 0; k < counts.size(); ++k) counts[k] = so_far[k].count;
     nb::gil_scoped_release release;
     std::size_t i = 0;
     const auto lacking = [&p](const std::vector<int>& lost) {
@@ -196,6 +211,13 @@ inline nb::tuple run(Pipeline& p, nb::handle time, nb::handle q, nb::handle qd, 
         faults.insert(faults.end(), {static_cast<double>(i), static_cast<double>(c),
                                      static_cast<double>(before[c]), result.ratios[c]});
       }
+      for (std::size_t k = 0; k < counts.size(); ++k) {
+        if (result.resets[k].count == counts[k]) continue;
+        counts[k] = result.resets[k].count;
+        resets.insert(resets.end(), {static_cast<double>(i), static_cast<double>(k)});
+        resets.resize(resets.size() + Snapshot::kOfReset);
+        write_reset(result.resets[k], &*resets.end() - Snapshot::kOfReset);
+      }
       keep_ended(p, result);
       const std::size_t health = i * at.width + p.value->row_layout().health();
       rows.data()[health] = static_cast<double>(result.health);
@@ -205,7 +227,7 @@ inline nb::tuple run(Pipeline& p, nb::handle time, nb::handle q, nb::handle qd, 
   }
   return nb::make_tuple(rows.release(), levels.release(), normalized.release(), drift.release(),
                         quiet.release(), watch.release(), arrays::table(contacts, contact),
-                        arrays::table(faults, 4));
+                        arrays::table(faults, 4), arrays::table(resets, Snapshot::kOfReset + 2));
 }
 
 // The events that have ended, from number `from` of them on, and those that last.
@@ -242,6 +264,7 @@ inline void restart(Pipeline& p, const tl::Robot& robot) {
     tl::write_numbers(event, &*p.closed.end() - width);
   });
   fresh->number_events_from(p.value->next_event());
+  fresh->count_resets_from(*p.value);
   p.value.swap(fresh);
   p.hopeless.clear();
 }
@@ -279,7 +302,8 @@ inline nb::dict slices(const Pipeline& p) {
   add("quiet", at.quiet, at.watch);
   add("watch", at.watch, at.faults);
   add("faults", at.faults, at.ratios);
-  add("ratios", at.ratios, at.time);
+  add("ratios", at.ratios, at.resets);
+  add("resets", at.resets, at.time);
   add("time", at.time, at.q);
   add("q", at.q, at.contacts);
   add("counts", at.contacts, at.end);

@@ -23,6 +23,7 @@ from touchline.result.contact import Candidate, Contact
 from touchline.result.event import Event, EventChange
 from touchline.result.fault import ChannelFault, FaultChange
 from touchline.result.kinds import ContactLevel, Fault, Happened, Status, Watch, Zone
+from touchline.result.reset import Reset, ResetChange
 from touchline.result.standing import Standing
 
 if TYPE_CHECKING:
@@ -56,6 +57,8 @@ __all__ = [
     "Level",
     "Observer",
     "Pipeline",
+    "Reset",
+    "ResetChange",
     "Result",
     "Robot",
     "Standing",

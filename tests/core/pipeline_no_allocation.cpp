@@ -67,6 +67,10 @@ struct Said {
     add(row.begin(), row.end());
     add(result.normalized.begin(), result.normalized.end());
     add(result.drift.begin(), result.drift.end());
+    for (const Reset& reset : result.resets) {
+      numbers[0] = reset.count;
+      add(numbers, std::copy_n(reset.jump, 6, numbers + 1));
+    }
     for (const Contact& contact : result.contacts) add(numbers, write_numbers(contact, numbers));
     for (const EventChange& change : result.events) {
       add(numbers, write_numbers(change.event, numbers));

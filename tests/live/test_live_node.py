@@ -53,6 +53,7 @@ def test_what_is_felt_is_published_and_services_answer(tmp_path):
     assert told["links"] and "force" in told["shapes"]
     assert told["status"][0] == "touchline: simulation" and float(told["facts"]["rate_hz"]) > 0
     assert 0.0 < float(told["facts"]["gate_ratio"]) < 1.0
+    assert told["facts"]["resets"].isdigit()
     assert set(told["touches"]) <= {*GESTURES, "press", "release", "toggle"} and told["touches"]
     assert told["collision"] in (True, False)
     assert told["answers"]["reset"] == [True, "reset: the estimate starts anew"]

@@ -16,6 +16,7 @@
 #include "touchline/detail/events/period_watch.hpp"
 #include "touchline/detail/localizer/localizer.hpp"
 #include "touchline/detail/observer/observer.hpp"
+#include "touchline/detail/observer/reset_watch.hpp"
 #include "touchline/detail/observer/rest_meter.hpp"
 #include "touchline/result.hpp"
 #include "touchline/robot.hpp"
@@ -38,6 +39,7 @@ class Pipeline {
         classifier_(observer_, robot_.blows),
         recorder_(robot_, observer_, localizer_),
         rest_(observer_.row_layout()),
+        resets_(observer_.row_layout()),
         period_(robot_.noise.period),
         levels_(robot_.segment_names.size(), 0.0),
         watch_(levels_.size(), Watch::blind),
@@ -128,6 +130,7 @@ class Pipeline {
     recorder_.finish();
     period_.take(observer_.time(), observer_.max_gap());
     rest_.take(row, sample.qd, observer_.time());
+    resets_.step(row, [this](std::size_t i) { return observer_.restarts(i); });
     judge_watch();
     return result(sample, row);
   }
@@ -214,7 +217,8 @@ class Pipeline {
             {contacts_.data(), count_},
             view(recorder_.changes()),
             {},
-            {}};
+            {},
+            view(resets_.resets())};
   }
 
   template <class T>
@@ -230,6 +234,7 @@ class Pipeline {
   Classifier classifier_;
   EventRecorder recorder_;
   RestMeter rest_;
+  ResetWatch resets_;
   PeriodWatch period_;
   std::vector<double> levels_;  // of the segments, as the classifier takes them
   std::vector<Watch> watch_;

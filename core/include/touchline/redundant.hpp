@@ -16,6 +16,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <stdexcept>
 #include <utility>
@@ -42,7 +43,8 @@ class RedundantPipeline {
   explicit RedundantPipeline(Robot robot, const Tuning& tuning = {})
       : whole_(std::move(robot), tuning),
         gates_(whole_.robot()),
-        parity_(whole_.robot(), whole_.observer()) {
+        parity_(whole_.robot(), whole_.observer()),
+        resets_(whole_.row_layout()) {
     const Robot& own = whole_.robot();
     const std::size_t n = own.joints.size(), k = own.sensors.size();
     absent_.resize(k, 0);
@@ -62,6 +64,7 @@ class RedundantPipeline {
     until_.resize(sound_.size(), -kAbsurd);
     faults_ = sound_;
     left_.resize(sound_.size());
+    restarts_.resize(n + levels_.size(), 0);
   }
 
   // Allocates. Throws std::invalid_argument where it does not fit the robot.
@@ -159,6 +162,10 @@ class RedundantPipeline {
     whole_.number_events_from(next);
   }
   double time() const { return whole_.time(); }
+  // How often each estimate has begun anew, as `Result::resets`; another pipeline of this robot that
+  // goes on for this one, with other figures, counts on from there.
+  Span<Reset> resets() const { return {resets_.resets().data(), resets_.resets().size()}; }
+  void count_resets_from(const RedundantPipeline& before) { resets_.go_on_from(before.resets_); }
   const RestMeter& rest() const { return whole_.rest(); }
   std::vector<SurfaceCell> region() const {
     return now_ != nullptr ? now_->pipeline.region() : whole_.region();
@@ -233,7 +240,21 @@ class RedundantPipeline {
     }
     result.faults = {told->data(), told->size()};
     result.ratios = {ratios, told->size()};
+    count_resets(result);
     return result;
+  }
+
+  // Of what is said, whoever says it: `Result::resets` is still that of who makes the estimate.
+  void count_resets(Result& result) {
+    if (now_ != spoke_) resets_.begin_anew();
+    spoke_ = now_;
+    const std::size_t n = joints_;
+    for (std::size_t i = 0; i < result.resets.size(); ++i) {
+      const std::size_t g = i < n || now_ == nullptr ? i : n + now_->given.segments[i - n];
+      restarts_[g] = result.resets[i].count;
+    }
+    resets_.step(result.estimate.row().data(), [this](std::size_t i) { return restarts_[i]; });
+    result.resets = resets();
   }
 
   static constexpr double kContradicted = 2.0;  // [s] for which one that others contradict is out
@@ -605,6 +626,9 @@ class RedundantPipeline {
   std::vector<double> until_, left_;  // per channel: when it counts again [s]; what is left of it
   std::vector<Fault> faults_;         // of gates and parity together
   bool contradicted_ = false;         // does any channel count no more?
+  ResetWatch resets_;
+  std::vector<std::uint32_t> restarts_;  // per joint, then per segment: as told by who speaks
+  const Second* spoke_ = nullptr;        // at the last sample
   std::vector<Fault> sound_;    // of channels that are all believed
   std::vector<double> ratios_;  // (kAhead, channels)
   std::vector<std::unique_ptr<Second>> stand_ins_;

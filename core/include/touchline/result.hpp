@@ -11,6 +11,7 @@
 #include "touchline/detail/detector/standing.hpp"
 #include "touchline/detail/gates/fault.hpp"
 #include "touchline/detail/observer/health.hpp"
+#include "touchline/detail/observer/reset_watch.hpp"
 #include "touchline/detail/observer/row.hpp"
 #include "touchline/detail/place/answer.hpp"
 #include "touchline/robot.hpp"
@@ -166,6 +167,7 @@ struct Result {
   Span<EventChange> events;
   Span<Fault> faults;       // per channel, as `ChannelLayout`; none where nothing was judged
   Span<double> ratios;      // per channel: its last step over what is believed at once
+  Span<Reset> resets;       // per joint, then per segment: `count` tells when its estimate jumped
 };
 
 // --- the fields, each told once ---

@@ -149,12 +149,13 @@ class Messages:
         return self._point(x=x, y=y, z=z)
 
     def diagnostics(self, session: Session, stamp: Any, node: str) -> Any:
-        """Each stream's state, rate, age, losses and gate ratio."""
+        """Each stream's state, rate, age, losses, gate ratio and resets."""
         message = self._array()
         message.header.stamp = stamp
         now, source = time.monotonic(), session.connection.source.name
         streams = session.connection.streams
         ratios = _gate_ratios(session.result, len(streams), len(self._robot.joint_names))
+        resets = _resets(session.result, self._robot, len(streams))
         message.status = [
             self._status(
                 level=self._level(stream.state(now)),
@@ -163,10 +164,14 @@ class Messages:
                 hardware_id=source,
                 values=[
                     self._pair(key=key, value=value)
-                    for key, value in [*_facts(stream, now), ("gate_ratio", ratio)]
+                    for key, value in [
+                        *_facts(stream, now),
+                        ("gate_ratio", ratio),
+                        ("resets", count),
+                    ]
                 ],
             )
-            for stream, ratio in zip(streams, ratios, strict=True)
+            for stream, ratio, count in zip(streams, ratios, resets, strict=True)
         ]
         return message
 
@@ -186,6 +191,17 @@ def _gate_ratios(result: Result | None, streams: int, joints: int) -> list[str]:
     if streams > 1:  # the joints', then one for each sensor
         parts = [result.ratios[: 3 * joints], *result.ratios[3 * joints :].reshape(-1, 6)]
     return [f"{np.nan_to_num(part).max(initial=0.0):.2f}" for part in parts]
+
+
+def _resets(result: Result | None, robot: Robot, streams: int) -> list[str]:
+    """Of each stream: how often an estimate that begins with it has begun anew; the largest."""
+    if result is None:
+        return [""] * streams
+    counts = {reset.name: reset.count for reset in result.resets}
+    if streams == 1:
+        return [str(max(counts.values()))]
+    joints = max(counts[name] for name in robot.joint_names)
+    return [str(joints), *(str(counts.get(name, "")) for name in robot.sensor_names)]
 
 
 def _facts(stream: Stream, now: float) -> list[tuple[str, str]]:

@@ -30,6 +30,7 @@ from touchline.pipeline.table import ContactTable
 from touchline.result.event import Event
 from touchline.result.fault import FaultChange, changes_of, channel_names
 from touchline.result.native import Names
+from touchline.result.reset import ResetChange, estimate_names, resets_in
 from touchline.result.standing import Standing
 from touchline.suggest import unknown
 
@@ -83,6 +84,7 @@ class Pipeline:
         watch: (N, m) of the last `run`: can a touch of each segment be felt (`tl.Watch`, by number:
             0 watched, 1 degraded, 2 blind)?
         faults: of channels, that began, changed or ended in the last `run`.
+        resets: of estimates, in the last `run`, with the jump that each made.
 
     Raises:
         ValueError: an option is not among those allowed, or the surfaces are another robot's.
@@ -135,10 +137,12 @@ class Pipeline:
         )
         slices = {name: slice(*ends) for name, ends in self._observer.kernel.slices.items()}
         self._channels = channel_names(robot.joint_names, robot.sensor_names)
-        self._layout = Layout(self._core, slices, names, self._channels)
+        self._estimates = estimate_names(robot.joint_names, robot.segment_names)
+        self._layout = Layout(self._core, slices, names, self._channels, self._estimates)
         self.contacts = ContactTable.empty(names)
         self.watch = np.empty((0, len(robot.segment_names)), np.int8)
         self.faults: tuple[FaultChange, ...] = ()
+        self.resets: tuple[ResetChange, ...] = ()
         self._ended: list[Event] = []
         self._loads: dict[str, Load] = {}  # by link, of `set_load`
 
@@ -198,11 +202,12 @@ class Pipeline:
         """
         stamps, signals = self._observer.recording(time, q, qd, tau, wrench)
         numbers = self._core.run(stamps, *signals)
-        rows, levels, normalized, drift, quiet, watch, contacts, faults = numbers
+        rows, levels, normalized, drift, quiet, watch, contacts, faults, resets = numbers
         sample = contacts[:, 0].astype(np.int64)
         self.contacts = ContactTable(sample, contacts[:, 1:], self._layout.names)
         self.watch = watch.astype(np.int8)
         self.faults = changes_of(faults, self._channels)
+        self.resets = resets_in(resets, self._estimates)
         detection = Detection(levels, normalized, drift, quiet)
         return Estimate(rows, self._layout.estimate), detection
 

@@ -14,6 +14,7 @@ from touchline.result.event import Event, EventChange
 from touchline.result.fault import ChannelFault, faults_of
 from touchline.result.kinds import Happened, Watch
 from touchline.result.native import Names
+from touchline.result.reset import Reset, resets_of
 from touchline.value import Value, lazily
 
 Array = NDArray[np.float64]
@@ -30,6 +31,7 @@ class Layout:
         estimate: slices of the observer's row.
         names: of the robot.
         channels: names of its channels.
+        estimates: names of what is estimated, and how many numbers each has.
     """
 
     def __init__(
@@ -38,15 +40,17 @@ class Layout:
         estimate: dict[str, slice],
         names: Names,
         channels: tuple[str, ...],
+        estimates: tuple[tuple[str, int], ...],
     ) -> None:
         slices = {name: slice(*ends) for name, ends in native.slices.items()}
-        self.estimate, self.names, self.channels = estimate, names, channels
+        self.estimate, self.names = estimate, names
+        self.channels, self.estimates = channels, estimates
         self.row, self.levels = slices["row"], slices["levels"]
         self.normalized, self.drift, self.quiet = (
             slices[name] for name in ("normalized", "drift", "quiet")
         )
-        self.watch, self.faults, self.ratios = (
-            slices[name] for name in ("watch", "faults", "ratios")
+        self.watch, self.faults, self.ratios, self.resets = (
+            slices[name] for name in ("watch", "faults", "ratios", "resets")
         )
         self.time, self.q = slices["time"].start, slices["q"]
         self.health = estimate["health"].start
@@ -71,6 +75,8 @@ class Result(Value):
         faults: channels that are not believed.
         ratios: (channels,) of each one's last step over what is believed at once, in the order
             q, qd, tau of all joints, six axes of each sensor.
+        resets: of each joint, then of each segment: how often its estimate has begun anew so far,
+            and the jump that the last time made.
     """
 
     time: float
@@ -83,6 +89,7 @@ class Result(Value):
     watch: tuple[Watch, ...] = ()
     faults: tuple[ChannelFault, ...] = ()
     ratios: Array = field(default_factory=lambda: np.empty(0))
+    resets: tuple[Reset, ...] = ()
 
 
 def _time(row: Array, at: Layout) -> float:
@@ -136,11 +143,16 @@ def _ratios(row: Array, at: Layout) -> Array:
     return row[at.ratios]
 
 
+def _resets(row: Array, at: Layout) -> tuple[Reset, ...]:
+    return resets_of(row[at.resets], at.estimates)
+
+
 lazily(
     Result,
     {
         "faults": _faults,
         "ratios": _ratios,
+        "resets": _resets,
         "watch": _watch,
         "time": _time,
         "q": _q,

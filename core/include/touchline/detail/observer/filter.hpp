@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "touchline/detail/observer/balance.hpp"
@@ -42,6 +43,7 @@ class Filters {
     std::size_t bandwidth;  // its handle
     double time = kNaN;     // of the last step or restart
     double since = kNaN;    // of the last restart
+    std::uint32_t restarts = 0;
     bool present = false;   // there is a value at this instant
   };
 
@@ -128,6 +130,7 @@ class Filters {
     std::fill_n(half_change_.begin() + group.first, group.count, 0.0);
     std::fill_n(surprise_.begin() + group.first, group.count, 0.0);
     group.time = group.since = now.time;
+    ++group.restarts;
   }
 
   // Takes the inputs for the change of the known loads over a gap.

@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -139,6 +140,12 @@ class Observer {
   // External torque that contacts on its own segment put on joint j, mean over the last interval,
   // not filtered; 0 where it is not known.
   double own_innovation(std::size_t j) const { return channels_.filters.input(channels_.own(j))[0]; }
+  // How often the filter of joint i, or of segment i - joints, has begun anew.
+  std::uint32_t restarts(std::size_t i) const {
+    const std::size_t n = joints_.size();
+    return channels_.filters.group(i < n ? channels_.external(i) : channels_.segment_filter(i - n))
+        .restarts;
+  }
   // The model's terms alone, for a state of its own.
   Terms<double>& terms() { return terms_; }
 
