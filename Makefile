@@ -3,7 +3,7 @@
 PYTHON := .venv/bin/python
 CORE := $(shell find core -name '*.hpp' -o -name '*.cpp' -o -name 'CMakeLists.txt')
 
-.PHONY: demo test check format docs wheels acceptance clean
+.PHONY: demo test check accept format docs wheels acceptance clean
 
 demo: .venv/demo
 	.venv/bin/touchline demo $(ARGS)
@@ -16,6 +16,10 @@ check: .venv/ready
 	.venv/bin/ruff format --check .
 	.venv/bin/pyright --pythonpath $(PYTHON)
 	.venv/bin/lint-imports
+
+# What recordings give now becomes the reference; `git diff` shows what has changed.
+accept: .venv/ready
+	$(PYTHON) tests/references/accept.py $(ARGS)
 
 format: .venv/ready
 	.venv/bin/ruff check --fix .
