@@ -33,19 +33,25 @@ by number. Written by <code>touchline reproduce</code>, version {version}.</p>
 </html>
 """
 STYLE = """
-body{margin:0;background:#fff;color:#22262b;font:16px/1.55 Georgia,'Times New Roman',serif}
+:root{color-scheme:light dark;--ground:#fff;--ink:#22262b;--soft:#5d656e;--line:#dfe3e7;
+--holds:#237048;--fails:#b3341f}
+@media (prefers-color-scheme:dark){:root{--ground:#16181b;--ink:#e4e7ea;--soft:#aab2ba;
+--line:#383e45;--holds:#6fcf97;--fails:#ff8a75}}
+body{margin:0;background:var(--ground);color:var(--ink);
+font:16px/1.55 Georgia,'Times New Roman',serif}
 main{max-width:60rem;margin:0 auto;padding:2rem 1.2rem 4rem}
 h1{font-size:1.8rem;margin:.4rem 0}h2{font-size:1.3rem;margin:2.6rem 0 .4rem;padding-top:1.2rem;
-border-top:1px solid #dfe3e7}h3{font-size:1rem;margin:1.4rem 0 .2rem}
-.soft,figcaption{color:#5d656e;font-size:.92rem}
-figure{margin:1.4rem 0}figure img{width:100%;height:auto;max-width:var(--width)}
+border-top:1px solid var(--line)}h3{font-size:1rem;margin:1.4rem 0 .2rem}
+.soft,figcaption{color:var(--soft);font-size:.92rem}
+figure{margin:1.4rem 0}figure img{width:100%;height:auto;max-width:var(--width);
+background:#fff}
 dt{font-weight:bold;margin-top:.7rem}dd{margin:0}
 .scroll{overflow:auto;max-height:30rem;margin:.5rem 0}
 table{border-collapse:collapse;font:.85rem/1.4 ui-monospace,monospace}
-th,td{padding:.2rem .7rem;text-align:right;border-bottom:1px solid #e8ebee;white-space:nowrap}
-th{position:sticky;top:0;background:#fff;white-space:normal;vertical-align:bottom}
+th,td{padding:.2rem .7rem;text-align:right;border-bottom:1px solid var(--line);white-space:nowrap}
+th{position:sticky;top:0;background:var(--ground);white-space:normal;vertical-align:bottom}
 th:first-child,td:first-child,.text{text-align:left}
-.holds{color:#2c7a52}.fails{color:#b3341f;font-weight:bold}
+.holds{color:var(--holds)}.fails{color:var(--fails);font-weight:bold}
 """
 DOTS = 96  # per inch, at which a figure is shown at most 1.35 times its size in print
 
@@ -94,8 +100,8 @@ def _checks(checks: Sequence[Check]) -> str:
         f'<td class="{_word(c)}">{_word(c)}</td></tr>'
         for c in checks
     )
-    head = "<tr><th>must stay below its limit</th><th>value</th><th>limit</th><th></th></tr>"
-    return f'<div class="scroll"><table>{head}{rows}</table></div>'
+    head = "<tr><th>must stay below its limit</th><th>value</th><th>limit</th><th>kept</th></tr>"
+    return f"{_scrolling('Checks')}<table>{head}{rows}</table></div>"
 
 
 def _word(check: Check) -> str:
@@ -111,9 +117,14 @@ def _table(name: str, table: Table) -> str:
     rows = "".join(f"<tr>{_cells(row, keys)}</tr>" for row in table.rows)
     return (
         f'<h3>{escape(name)}.csv</h3><div class="soft">{escape(table.caption)}</div>'
-        f'<div class="scroll"><table><thead><tr>{head}</tr></thead>'
+        f"{_scrolling(f'{name}.csv')}<table><thead><tr>{head}</tr></thead>"
         f"<tbody>{rows}</tbody></table></div>"
     )
+
+
+def _scrolling(name: str) -> str:
+    """Opens a part of the page that scrolls by itself, with the keyboard, too."""
+    return f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(name)}">'
 
 
 def _cells(row: Row, keys: Sequence[str]) -> str:
