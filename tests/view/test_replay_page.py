@@ -8,7 +8,7 @@ from projection import count_near, pixel
 from touchline.model.surface import link_surface
 from touchline.view.markers import COLOURS
 from touchline.view.replay import Replay
-from touchline.view.replay_page import ReplayPage
+from touchline.view.replay_page import ReplayPage, faint_events
 from touchline.view.scene import ALARM, TINT
 from touchline.view.server import PageServer
 from touchline.view.signals import JOINTS
@@ -125,3 +125,12 @@ def test_a_replay_is_seen_played_and_jumped_in(browser, touched):
         curves = " ".join(["s", *replay.robot.joint_names, "no data now"])
         visitor.until(lambda: browser.run(series).count(curves) == 2, "other curves")
         assert browser.complaints == []
+
+
+def test_events_weaker_than_what_is_surely_felt_are_told(touched):
+    replay = Replay(touched.out)
+    assert replay.events and faint_events(replay) == {}
+    weak = next(event for event in replay.events if event.link is not None)
+    replay.events = [weak.replace(force_peak=0.1)]
+    told = faint_events(replay)
+    assert told[weak.id].startswith(f"event {weak.id}: 0.1 N on {weak.link} lies below what can be")

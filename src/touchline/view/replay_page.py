@@ -8,6 +8,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
+from touchline.check.felt import felt
 from touchline.result.contact import Contact
 from touchline.result.event import Event
 from touchline.view.contacts import ContactScene, candidates
@@ -58,6 +59,7 @@ class ReplayPage:
         look_from(self._page.initial_camera, replay)
         self._arm = RobotScene(self._page.scene, replay.robot)
         self._contacts = ContactScene(self._page.scene, self._arm)
+        self._faint = faint_events(replay)
         self._build(self._page.gui)
         self._drawn: tuple = ()
         self._plotted = -np.inf
@@ -181,9 +183,23 @@ class ReplayPage:
         lines = [f"**{time - self._origin:.3f} s**"]
         for contact in contacts:
             lines.append(f"* event {contact.event}: {_sentence(contact)}")
+            if contact.event in self._faint:
+                lines.append(f"* {self._faint[contact.event]}")
         if not contacts:
             lines.append("* nothing touches")
         return "\n".join(lines)
+
+
+def faint_events(replay: Replay) -> dict[int, str]:
+    """A line for each event that is weaker than what is surely felt on its link."""
+    able = {one.link: one for one in felt(replay.robot)} if replay.events else {}
+    lines = {}
+    for event in replay.events:
+        if event.link in able and event.force_peak is not None:
+            told = able[event.link].faint(f"event {event.id}", event.force_peak)
+            if told is not None:
+                lines[event.id] = told
+    return lines
 
 
 def look_from(camera: viser.InitialCameraConfig, replay: Replay) -> None:
