@@ -4,6 +4,7 @@
 import base64
 from collections.abc import Sequence
 from html import escape
+from pathlib import Path
 
 from touchline import __version__
 from touchline.figure import rendered
@@ -32,27 +33,7 @@ by number. Written by <code>touchline reproduce</code>, version {version}.</p>
 </body>
 </html>
 """
-STYLE = """
-:root{color-scheme:light dark;--ground:#fff;--ink:#22262b;--soft:#5d656e;--line:#dfe3e7;
---holds:#237048;--fails:#b3341f}
-@media (prefers-color-scheme:dark){:root{--ground:#16181b;--ink:#e4e7ea;--soft:#aab2ba;
---line:#383e45;--holds:#6fcf97;--fails:#ff8a75}}
-body{margin:0;background:var(--ground);color:var(--ink);
-font:16px/1.55 Georgia,'Times New Roman',serif}
-main{max-width:60rem;margin:0 auto;padding:2rem 1.2rem 4rem}
-h1{font-size:1.8rem;margin:.4rem 0}h2{font-size:1.3rem;margin:2.6rem 0 .4rem;padding-top:1.2rem;
-border-top:1px solid var(--line)}h3{font-size:1rem;margin:1.4rem 0 .2rem}
-.soft,figcaption{color:var(--soft);font-size:.92rem}
-figure{margin:1.4rem 0}figure img{width:100%;height:auto;max-width:var(--width);
-background:#fff}
-dt{font-weight:bold;margin-top:.7rem}dd{margin:0}
-.scroll{overflow:auto;max-height:30rem;margin:.5rem 0}
-table{border-collapse:collapse;font:.85rem/1.4 ui-monospace,monospace}
-th,td{padding:.2rem .7rem;text-align:right;border-bottom:1px solid var(--line);white-space:nowrap}
-th{position:sticky;top:0;background:var(--ground);white-space:normal;vertical-align:bottom}
-th:first-child,td:first-child,.text{text-align:left}
-.holds{color:var(--holds)}.fails{color:var(--fails);font-weight:bold}
-"""
+STYLE = Path(__file__).parent / "assets" / "page.css"
 DOTS = 96  # per inch, at which a figure is shown at most 1.35 times its size in print
 
 
@@ -61,7 +42,10 @@ def page_text(experiments: Sequence[Experiment]) -> str:
     body = "\n".join(_section(experiment) for experiment in experiments)
     title = ", ".join(experiment.name for experiment in experiments)
     return PAGE.format(
-        title=escape(f"{title} - Touchline"), style=STYLE, body=body, version=__version__
+        title=escape(f"{title} - Touchline"),
+        style=STYLE.read_text(encoding="utf-8"),
+        body=body,
+        version=__version__,
     )
 
 
