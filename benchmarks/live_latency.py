@@ -3,11 +3,13 @@
 
 python benchmarks/live_latency.py [SECONDS] [RATE]
 
-Three processes on this machine: an arm that publishes, the node, and this listener. All times are
-from the stamp that the arm gives a joint state when it publishes it. Of the joint states that were
-published those are counted that the node's pipeline took. Needs touchline[ros2].
+Three processes on this machine: an arm that publishes a motion with touches, the node, and this
+listener. All times are from the stamp that the arm gives a joint state when it publishes it. Of
+the joint states that were published those are counted that the node's pipeline took. Needs
+touchline[ros2].
 """
 
+import json
 import os
 import subprocess
 import sys
@@ -27,10 +29,10 @@ from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 import touchline as tl
 from touchline.simulation.noise import SensorNoise
-from touchline.simulation.scenario import free_motion
+from touchline.simulation.scenario import demo
 from touchline.simulation.scene import Run
 robot, rate, seconds = tl.load_robot(sys.argv[1]), float(sys.argv[2]), float(sys.argv[3])
-s = free_motion(robot, 2.0, 0.0, Run(noise=SensorNoise(), rate=rate)).samples
+s = demo(robot, 20.0, Run(noise=SensorNoise(), rate=rate)).samples
 rclpy.init()
 node = rclpy.create_node("arm")
 out = node.create_publisher(JointState, "/joint_states", qos_profile_sensor_data)
@@ -51,6 +53,7 @@ print(int(rate * seconds), flush=True)
 sys.stdin.read()
 """
 DRAIN = 3.0  # s in which what was published last is counted
+START = 1.0  # s: the samples of the start wait until the arm has been looked at
 ROBOT = """name: sara-joints
 model: {model}
 joints: [{joints}]
@@ -64,7 +67,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         robot = _robot(Path(folder))
         arm = [sys.executable, "-c", ARM, str(robot), str(rate), str(seconds)]
-        parameters = ["-p", f"robot:={robot}", "-p", "source:=ros2://"]
+        parameters = ["-p", f"robot:={robot}", "-p", "source:=ros2://", "-p", "force:=true"]
         node = [sys.executable, "-m", "touchline.live.node", "--ros-args", *parameters]
         pipe = subprocess.PIPE
         with subprocess.Popen(arm, stdin=pipe, stdout=pipe, text=True) as publishes:
@@ -81,10 +84,12 @@ def main() -> None:
         if not found:
             print(f"{name}: nothing came")
             continue
-        p50, p99 = np.percentile(found, [50, 99])
+        at, late = np.array(found).T
+        p50, p99 = np.percentile(late, [50, 99])
+        later = late[at > at[0] + START].max(initial=0.0)
         print(
             f"{name}: {len(found)} messages, p50 {p50:.2f} ms, p99 {p99:.2f} ms, "
-            f"largest {max(found):.1f} ms"
+            f"largest {late.max():.1f} ms, {later:.1f} ms after the first second"
         )
     print(f"load of this machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
 
@@ -99,27 +104,38 @@ def _robot(folder: Path) -> Path:
     return path
 
 
-def _listen(seconds: float) -> tuple[dict[str, list[float]], str]:
-    """Delays [ms], and how many joint states the node has received at the end."""
+def _listen(seconds: float) -> tuple[dict[str, list[tuple[float, float]]], str]:
+    """When each message came [s], how late [ms]; how many joint states the node has received."""
     import rclpy
     from diagnostic_msgs.msg import DiagnosticArray
     from rclpy.qos import qos_profile_sensor_data
     from sensor_msgs.msg import JointState
+    from std_msgs.msg import String
 
     rclpy.init()
     listener = rclpy.create_node("listener")
-    delays: dict[str, list[float]] = {"bare delivery": [], "felt": []}
+    delays: dict[str, list[tuple[float, float]]] = {
+        "bare delivery": [],
+        "felt": [],
+        "a contact": [],
+    }
 
     def note(name: str):
         def take(message: JointState) -> None:
-            stamp = message.header.stamp
-            delays[name].append((time.time_ns() - stamp.sec * 10**9 - stamp.nanosec) * 1e-6)
+            now, stamp = time.time_ns(), message.header.stamp
+            delays[name].append((now * 1e-9, (now - stamp.sec * 10**9 - stamp.nanosec) * 1e-6))
 
         return take
+
+    def contacts(message: String) -> None:
+        now, felt = time.time_ns() * 1e-9, json.loads(message.data)
+        if felt["contacts"]:
+            delays["a contact"].append((now, 1e3 * (now - felt["time"])))
 
     topics = {"bare delivery": "/joint_states", "felt": "/touchline/external_joint_torques"}
     for name, topic in topics.items():
         listener.create_subscription(JointState, topic, note(name), qos_profile_sensor_data)
+    listener.create_subscription(String, "/touchline/contacts", contacts, qos_profile_sensor_data)
     facts: dict[str, str] = {}
 
     def diagnose(message: DiagnosticArray) -> None:

@@ -68,7 +68,12 @@ class Runner {
     }
     return found;
   }
-  bool idle() const { return results_.empty(); }
+  // Waits at most so long [s] for a result; whether there is one. No interpreter may be held.
+  bool wait(double seconds) {
+    std::unique_lock<std::mutex> lock(waiting_);
+    return come_.wait_for(lock, std::chrono::duration<double>(seconds),
+                          [this] { return !results_.empty(); });
+  }
 
   std::size_t refused() const { return refused_.load(); }
   std::size_t unseen() const { return unseen_.load(); }
@@ -97,6 +102,8 @@ class Runner {
     out->insert(out->end(), arrived.ages.begin(), arrived.ages.end());
     out->insert(out->end(), snapshot_.begin(), snapshot_.end());
     results_.publish();
+    { const std::lock_guard<std::mutex> nobody_between_look_and_wait(waiting_); }
+    come_.notify_one();
   }
 
   pipelines::Pipeline& pipeline_;
@@ -105,6 +112,8 @@ class Runner {
   std::vector<double> snapshot_;
   tl::Admission admission_;
   std::atomic<std::size_t> refused_{0}, unseen_{0};
+  std::mutex waiting_;
+  std::condition_variable come_;
   tl::Runner runner_;  // last: its thread uses all of the others
 };
 
@@ -347,7 +356,7 @@ inline void bind(nb::module_& m) {
       .def(nb::init<pipelines::Pipeline&, std::size_t>(), "pipeline"_a, "slots"_a,
            nb::keep_alive<1, 2>())
       .def("results", &Runner::results)
-      .def_prop_ro("idle", &Runner::idle)
+      .def("wait", &Runner::wait, "seconds"_a, nb::call_guard<nb::gil_scoped_release>())
       .def_prop_ro("refused", &Runner::refused)
       .def_prop_ro("unseen", &Runner::unseen)
       .def_prop_ro("overrun", &Runner::overrun)

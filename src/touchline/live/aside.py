@@ -5,6 +5,7 @@ The reading process sends frames over a socket of this machine: size (4 bytes), 
 payload. A native thread takes the samples from it and feels with them.
 """
 
+import gc
 import os
 import pickle
 import select
@@ -285,6 +286,12 @@ def _numbers(s: Sample) -> bytes:
     return np.concatenate([head, s.q, s.qd, s.tau, s.wrench.ravel(), s.ages]).tobytes()
 
 
+def settle() -> None:
+    """Garbage collection leaves alone what is there: a whole one takes as long as many samples."""
+    gc.collect()
+    gc.freeze()
+
+
 def main(number: int) -> int:
     """The reading process: `number` is that of its socket; standard input says what to read."""
     from touchline.live.sources import own_source
@@ -292,6 +299,7 @@ def main(number: int) -> int:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the program that started it
     link = socket.socket(fileno=number)
     name, description, mechanism = pickle.loads(sys.stdin.buffer.read())
+    settle()
     try:
         _Reading(link, own_source(name, Robot(description, mechanism))).run()
     except InputError as error:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from touchline.errors import InputError
+from touchline.live.aside import settle
 from touchline.live.connection import Connection
 from touchline.live.loopback import keep_local
 from touchline.live.messages import TOUCH, Messages
@@ -26,7 +27,8 @@ from touchline.model.robot import load_robot
 
 DIAGNOSTICS = 1.0  # s between two of them
 IDLE = 0.05  # s that an inactive node waits for requests
-REQUESTS = 0.005  # s between two looks of an active one: each costs as much as a sample
+REQUESTS = 0.05  # s between two looks of an active one: each costs as much as a sample
+BURST = 2.0  # periods of publish_rate that may be made up for: samples come with a jitter
 MISSING = "ROS 2 is not there ({}): source a ROS 2 installation, or pip install 'touchline[ros2]'"
 
 
@@ -88,7 +90,7 @@ class TouchlineNode:
         self._news: Iterator[EventNews] | None = None
         self._publishers: dict[str, Any] = {}
         self._collision: bool | None = None
-        self._told, self._published, self._asked = 0.0, 0.0, 0.0
+        self._told, self._due, self._asked = 0.0, 0.0, 0.0
         self._declare()
         self._executor = self._rclpy.executors.SingleThreadedExecutor(context=context)
         self._executor.add_node(self.node)
@@ -261,10 +263,12 @@ class TouchlineNode:
         now = time.monotonic()
         if now - self._told >= DIAGNOSTICS:
             self._diagnose()
-        due = now - self._published >= 0.999 / self._value("publish_rate")
-        if result is None or sample is None or not (due or news.began or news.ended):
+        if result is None or sample is None:
             return
-        self._published = now
+        if now < self._due and not (news.began or news.ended):
+            return
+        period = 1.0 / self._value("publish_rate")
+        self._due = max(self._due, now - BURST * period) + period
         if any(contact.level == "collision" for contact in result.contacts):
             self._publish_collision(True)
         for name, message in self._messages.of(sample, result):
@@ -319,6 +323,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         if start and not node.autostart():
             return 2
+        settle()
         node.spin(context)
     except KeyboardInterrupt:
         pass

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A pipeline in a native thread, and what it has left for Python."""
 
-import time
-
 import numpy as np
 
 from touchline.live.sample import Sample
@@ -10,7 +8,6 @@ from touchline.model.robot import Robot
 from touchline.pipeline.pipeline import Pipeline
 
 SLOTS = 16384  # samples and results that may wait: two seconds at 8 kHz
-POLL = 0.0002  # s between two looks whether something has been felt
 
 
 class Felt:
@@ -32,9 +29,7 @@ class Felt:
 
     def read(self, timeout: float) -> list[Sample]:
         """What the thread has left, after waiting at most so long [s] for the first."""
-        end = time.monotonic() + timeout
-        while self.runner.idle and time.monotonic() < end:
-            time.sleep(POLL)
+        self.runner.wait(timeout)
         return [self._sample(numbers) for numbers in self.runner.results()]
 
     def _sample(self, numbers: np.ndarray) -> Sample:

@@ -3,6 +3,7 @@
 
 from collections import deque
 from enum import StrEnum
+from statistics import median
 
 import numpy as np
 
@@ -91,7 +92,7 @@ class Stream:
         """Between samples [s]: as known beforehand, else the median so far."""
         if self._expected is not None or len(self._steps) < 3:
             return self._expected
-        return float(np.median(self._steps))
+        return median(self._steps)
 
     @property
     def patience(self) -> float:
