@@ -127,7 +127,8 @@ class Pipeline:
             pipeline = own()
             return pipeline._stand_in(lost) if pipeline is not None else None
 
-        self._core = core.Pipeline(self._native(), tuning, build)
+        self._made = self._native()
+        self._core = core.Pipeline(self._made, tuning, build)
         self._update = self._core.update
         names = Names.of(
             robot.segment_names,
@@ -223,7 +224,7 @@ class Pipeline:
 
     def reset(self) -> None:
         """Forgets the past, as after a long gap; events that last end, their numbers go on."""
-        self._core.restart(self._native())
+        self._core.restart(self._made)
 
     def tare(self) -> Tare:
         """Takes what is felt now for the sensors' and joints' offsets: nothing may touch the arm.
@@ -285,7 +286,9 @@ class Pipeline:
     def _go_on_with(self, robot: Robot) -> None:
         before, self.robot = self.robot, robot
         try:
-            self._core.restart(self._native())
+            made = self._native()
+            self._core.restart(made)
+            self._made = made
         except BaseException:
             self.robot = before
             raise
