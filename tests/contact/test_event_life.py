@@ -56,6 +56,29 @@ def test_what_rests_after_a_touch_is_no_event_and_the_next_push_is_one():
     assert 2.4 < second[1] < 2.7
 
 
+def test_a_hand_that_is_there_at_the_start_and_lets_go_leaves_no_event():
+    """The same hand is felt when it comes again."""
+    s = signals(ROBOT, Q, [pushed((-1.0, 1.0), (2.0, 2.4))], 3.0, 4)
+    release, push = spans(felt(s))
+    assert 1.0 < release[0] < 1.05
+    assert release[1] < 1.4
+    assert 2.0 < push[0] < 2.05
+    assert 2.4 < push[1] < 2.7
+
+
+def test_a_hand_that_comes_to_rest_and_lets_go_leaves_no_event():
+    """A quarter of the first push is held, and taken for friction of an arm with an offset."""
+    s = signals(ROBOT, Q, [pushed((1.0, 1.4), left=0.25)], 2.2, 4)
+    let_go = signals(ROBOT, Q, [], 1.3, 5)
+    time = np.arange(len(s.time) + len(let_go.time)) * 1e-3
+    names = ("q", "qd", "tau", "wrench")
+    joined = [np.concatenate([getattr(part, name) for part in (s, let_go)]) for name in names]
+    touch, release = spans(felt(Signals(time, *joined), OFFSET))
+    assert 1.4 < touch[1] < 1.7
+    assert 2.2 <= release[0] < 2.25
+    assert release[1] < 2.6
+
+
 def test_on_an_arm_as_told_what_is_left_of_a_push_is_a_push():
     """20 N, then 5 N for a second: with nothing wrong with the arm that is one contact."""
     ((_, end),) = spans(felt(signals(ROBOT, Q, [pushed((1.0, 1.4), left=0.25)], 2.5, 4)))

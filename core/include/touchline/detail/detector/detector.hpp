@@ -143,7 +143,8 @@ class Detector {
     RowState& s = states_[row];
     const double moved = baseline - other.states_[of].baseline;
     s = other.states_[of];
-    for (double* value : {&s.baseline, &s.anchor, &s.reference}) *value += moved;
+    for (double* value : {&s.baseline, &s.anchor, &s.reference, &s.other.baseline, &s.other.anchor})
+      *value += moved;
     s.trend = baseline;
     spreads_[row] = other.spreads_[of];
     meters_[row] = other.meters_[of];
@@ -157,6 +158,10 @@ class Detector {
   const Observer& observer() const { return observer_; }
 
  private:
+  // What may stand on a row while nothing touches.
+  struct Calm {
+    double baseline = 0.0, anchor = 0.0, shown = 0.0;  // as of `RowState`
+  };
   struct RowState {
     double baseline = 0.0, reference = 0.0;
     double anchor = 0.0;  // what stood there at the start, or rests there since a contact
@@ -164,6 +169,7 @@ class Detector {
     double seconds = 0.0;  // since the first settled sample
     double trend = 0.0;   // mean of the last moments
     double age = 0.0, referred = 0.0;  // over how long they have been averaged [s]
+    Calm other;  // what stood there before the last contact came to rest; the model's zero at first
     double side = 1.0, turns = 0.0;  // of its trend it was last far off on, and how often of late
     bool started = false;
   };
@@ -185,6 +191,9 @@ class Detector {
     double highest = 0.0;  // of the score while a test holds
     double top = 0.0;    // the largest mean of the last moments since then, in limits
     double rest = 0.0;   // for how long little has been left of it, and that has not changed [s]
+    double back = 0.0;   // for how long all has been as before the offset that stands there now [s]
+    double other_quiet = 0.0;  // over how long its rows' `other` has been averaged [s]
+    bool in_motion = false;  // did the present event begin while the arm moved?
     bool pending = false, pending_collision = false;
     bool off = false;  // has the arm shown that it is not as told?
   };
@@ -405,14 +414,19 @@ class Detector {
     s.below = lasting(s.score < release, dt, s.below);
     if (lasts(g, s.pending, s.above, s.score, s.borne_score)) levels_[g] = std::max(levels_[g], 1);
     if (lasts(g, s.pending_collision, s.above_collision, s.collision, s.borne_collision)) levels_[g] = 2;
-    if (levels_[g] == 0) s.top = s.rest = s.below = s.lasted = 0.0;
-    if (levels_[g] == 0) return;
+    if (levels_[g] == 0) {
+      s.top = s.rest = s.back = s.below = s.lasted = 0.0;
+      s.in_motion = still_ < kPause;
+      return;
+    }
     s.lasted += dt;
     s.top = std::max(s.top, lately(g));
     s.rest = lasting(may_rest(g) && steady(g), dt, s.rest);
     if (s.below >= settings_.times.hold) levels_[g] = 0;
     const double least = kRest / slowest_[g];
     if (levels_[g] > 0 && s.rest >= (stands() ? least : std::max(least, kLeft))) come_to_rest(g);
+    s.back = lasting(stands() && is_back(g) && steady(g), dt, s.back);
+    if (levels_[g] > 0 && s.back >= std::max(least, kLeft)) go_back(g);
   }
 
   // Has a test held for long enough, not by one sample alone, and not by noise that has yet to be
@@ -484,12 +498,14 @@ class Detector {
   }
 
   // May what the last moments have of a contact be friction or an error of the model? Only if it is
-  // little of the contact's peak, and the arm stands and has shown that it is not as told, or moves
-  // and hardly anything is left. Two contacts against each other leave more.
+  // little of the contact's peak. An arm that stands must have shown that it is not as told. Of one
+  // that moves, by itself and not by the contact alone, hardly anything may be left. Two contacts
+  // against each other leave more.
   bool may_rest(std::size_t g) const {
     const Segment& s = segments_[g];
     const bool little = s.origin == Origin::start || lately(g) < kLittle * s.top;
-    return little && (stands() ? s.off : lately(g) < std::max(kBarely, kTrace * s.top));
+    if (!little || !(s.off || s.in_motion)) return false;
+    return stands() ? s.off : lately(g) < std::max(kBarely, kTrace * s.top);
   }
 
   bool stands() const { return activity().speed2 < kStanding * kStanding; }
@@ -522,14 +538,46 @@ class Detector {
     s.age = s.referred = kTrend / bandwidth(rows_[i]);
   }
 
-  // What is left of a contact and does not change rests there: an offset from now on.
+  // What is left of a contact and does not change rests there: an offset from now on. What stood
+  // there before is remembered, unless what is remembered stood there for longer.
   void come_to_rest(std::size_t g) {
-    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) rest(i);
+    const bool longer = quiet_[g] > segments_[g].other_quiet;
+    if (longer) segments_[g].other_quiet = quiet_[g];
+    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+      RowState& s = states_[i];
+      if (longer) s.other = {s.baseline, s.anchor, s.shown};
+      rest(i);
+    }
+    end_event(g);
+  }
+
+  // Is all of the segment as it was before the offset that stands there now? That was a contact
+  // then, of which nothing is left: one that was held, or there when observation began.
+  bool is_back(std::size_t g) const {
+    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+      const double most = settings_.times.release * limits_[i] * rows_[i].contact;
+      if (!samples_[i].known || std::fabs(states_[i].trend - states_[i].other.baseline) > most)
+        return false;
+    }
+    return true;
+  }
+
+  void go_back(std::size_t g) {
+    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+      RowState& s = states_[i];
+      rest(i);
+      s.anchor = s.other.anchor;
+      s.shown = s.other.shown;
+    }
+    end_event(g);
+  }
+
+  void end_event(std::size_t g) {
     quiet_[g] = kTrend / slowest_[g];
     levels_[g] = 0;
     Segment& s = segments_[g];
     s.pending = s.pending_collision = false;
-    s.above = s.above_collision = s.below = s.top = s.rest = 0.0;
+    s.above = s.above_collision = s.below = s.top = s.rest = s.back = 0.0;
   }
 
   // For how long a test has held without a break.
