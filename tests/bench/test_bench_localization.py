@@ -11,7 +11,9 @@ import touchline as tl
 from touchline.bench.localization.arm import TIERS, load_arm
 from touchline.bench.localization.cell import Cell
 from touchline.bench.localization.columns import wilson
+from touchline.bench.localization.course import hands_table
 from touchline.bench.localization.credibility import mixture_level
+from touchline.bench.localization.hands import in_cone, tremor
 from touchline.bench.localization.matching import distances, match
 from touchline.bench.localization.run import Plan, main, run_plan
 from touchline.bench.localization.scene import make_scene
@@ -305,3 +307,42 @@ def test_colours_are_those_of_the_nearest_touches():
     near = values.at("link3", np.array([[0.0, 0.0, 0.02], [0.0, 0.0, 0.37]]))
     np.testing.assert_allclose(near, [1e-3, 1e-2])
     assert np.isnan(values.at("link4", points)).all()
+
+
+def test_hands_tremble_as_stated_and_stay_in_their_friction_cones():
+    time = np.arange(20000) * 1e-3
+    change = tremor(time, np.random.default_rng(0))
+    assert np.sqrt((change**2).sum(axis=1).mean()) == pytest.approx(2.0, rel=0.1)
+    power = (np.abs(np.fft.rfft(change, axis=0)) ** 2).sum(axis=1)
+    frequency = np.fft.rfftfreq(len(time), 1e-3)
+    inside = (frequency > 0.9) & (frequency < 10.1)
+    assert power[inside].sum() > 0.99 * power.sum()
+    normal = np.array([0.0, 0.6, 0.8])
+    force = in_cone(10.0 * change - 20.0 * normal, normal, 0.5)
+    across = force + np.outer(-force @ normal, normal)
+    assert (np.linalg.norm(across, axis=1) <= 0.5 * (-force @ normal) + 1e-9).all()
+    gentle = in_cone(0.5 * change - 20.0 * normal, normal, 0.5)
+    np.testing.assert_allclose(gentle, 0.5 * change - 20.0 * normal)
+
+
+def test_a_contact_slides_at_the_stated_speed_over_its_link():
+    cell = Cell("sara", 2, tier=1, hands="sliding")
+    scene = make_scene(cell, 0)
+    skin = Skin(load_arm("sara", 1))
+    held, slid = scene.places
+    assert np.ptp(held, axis=0).max() == 0.0
+    steps = np.linalg.norm(np.diff(slid, axis=0), axis=1)
+    assert steps.sum() == pytest.approx(0.06, rel=0.1) and steps.max() < 1.5 * 0.15e-3
+    touch, _ = scene.touches[1]
+    assert max(skin.nearest(touch.q, touch.patch.link, p)[0] for p in slid[::20]) < 1e-6
+
+
+def test_a_contact_that_slides_beside_one_that_is_held_is_found():
+    trial = run_trial(Cell("sara", 2, tier=1, hands="sliding"), 0)
+    assert trial.found and trial.events == 2 and trial.course.false == 0
+    assert hands_table([trial]).splitlines()[1].split()[-3] == "2.00"
+
+
+def test_hands_that_are_not_steady_touch_arms_at_rest():
+    with pytest.raises(InputError, match="--hands sliding: hands that tremble or slide"):
+        Plan(("sara",), (2,), (1,), ("apart",), (1.0,), hands=("sliding",)).cells()

@@ -9,7 +9,7 @@ import pytest
 import touchline as tl
 from touchline.bench.localization.cell import Cell
 from touchline.bench.localization.course import follow_course
-from touchline.bench.localization.scene import make_scene, told_and_real, true_places
+from touchline.bench.localization.scene import make_scene, told_and_real
 from touchline.bench.localization.trial import make_pipeline, run_trial
 from touchline.bench.touches import TouchSampler, resting_signals
 from touchline.detector.detector import Detection, Detector
@@ -159,7 +159,7 @@ def judged(cell, run):
     (event,) = pipeline.events
     answer = pipeline.contacts[-1]
     row = np.searchsorted(s.time, event.time_of_position)
-    off = np.linalg.norm(event.position - true_places(robot, scene, s.q[row])[0])
+    off = np.linalg.norm(event.position - scene.places[0, row])
     return event.position_std, np.sqrt(np.trace(answer.covariance)), off
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from touchline.bench.localization.cell import Cell
-from touchline.bench.localization.scene import make_scene, told_and_real, true_places
+from touchline.bench.localization.scene import make_scene, told_and_real
 from touchline.bench.localization.trial import make_pipeline
 
 
@@ -19,7 +19,7 @@ def test_the_pushed_face_is_never_lost_to_one_that_is_grazed(arm, tier, run):
     s = scene.signals
     pipeline = make_pipeline(robot, skin, model_error=0.0)
     pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
-    (place,) = true_places(robot, scene, s.q[-1])
+    place = scene.places[0, -1]
     columns = pipeline.contacts.columns()
     late = pipeline.contacts.sample > 600
     found = np.column_stack([columns[axis] for axis in "xyz"]).astype(float)[late]

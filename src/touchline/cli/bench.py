@@ -50,7 +50,7 @@ def deadline(
     Args:
         updates: Of each line of the table; three times as many are run. 10,000 take some seconds a
             line.
-        robots: The arms; the pandas and ur10 need the package example-robot-data.
+        robots: The arms; the pandas, ur5 and ur10 need the package example-robot-data.
         seed: Of all that is random.
     """
     from touchline.bench.deadline.run import main
@@ -61,13 +61,16 @@ def deadline(
 
 def localization(
     *,
-    robots: tuple[Literal["panda", "panda-torques", "sara", "sara-full", "ur10"], ...] = ("panda",),
+    robots: tuple[Literal["panda", "panda-torques", "sara", "sara-full", "ur5", "ur10"], ...] = (
+        "panda",
+    ),
     contacts: tuple[Literal[1, 2, 3], ...] = (1, 2, 3),
     noise: tuple[Literal[0, 1, 2, 3], ...] = (0, 1, 2, 3),
     begin: tuple[Literal["apart", "together", "segments"], ...] = ("apart", "together"),
     speeds: tuple[float, ...] = (0.0,),
     model_error: tuple[float, ...] = (0.0,),
     calibrated: bool = True,
+    hands: tuple[Literal["steady", "trembling", "sliding"], ...] = ("steady",),
     runs: int = 1000,
     baselines: tuple[Literal["first", "nearest", "particles"], ...] = (
         "first",
@@ -82,7 +85,7 @@ def localization(
     Example: touchline bench localization --robots panda sara --runs 10000 --out figures
 
     Args:
-        robots: The arms; the pandas and ur10 need the package example-robot-data.
+        robots: The arms; the pandas, ur5 and ur10 need the package example-robot-data.
         contacts: How many contacts at once, at most one per rigid body.
         noise: Tiers of sensor noise, 0 is none.
         begin: Several contacts begin 0.1 s apart, or at the same instant; segments: one on each
@@ -95,6 +98,9 @@ def localization(
         calibrated: Thresholds and model errors of such arms are those that `calibrate` finds in
             six minutes of their motion without contact; otherwise those of an arm of which nothing
             but its model is known.
+        hands: Trembling ones change their forces by 2 N rms at 1 to 10 Hz, for 2 s. Sliding: the
+            last contact slides at 0.15 m/s over 6 cm of its link, the others are held. The arm is
+            at rest.
         runs: Random poses and places per line of the tables.
         baselines: What runs along: the first entry of the line of force action, the surface
             nearest to the line, a contact particle filter (on 100 runs a line).
@@ -104,7 +110,17 @@ def localization(
     from touchline.bench.localization.run import Plan, main
 
     plan = Plan(
-        robots, contacts, noise, begin, speeds, runs, seed, baselines, model_error, calibrated
+        robots,
+        contacts,
+        noise,
+        begin,
+        speeds,
+        runs,
+        seed,
+        baselines,
+        model_error,
+        calibrated,
+        hands,
     )
     main(plan, out)
     return 0

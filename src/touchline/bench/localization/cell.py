@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 Begin = Literal["apart", "together", "segments"]
+Hands = Literal["steady", "trembling", "sliding"]
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,8 @@ class Cell:
         model_error: 1 sigma of the relative errors of the masses and inertias that the pipeline is
             told; the arm then swings, with `speed` at most.
         calibrated: is it calibrated on motion of the same arm without contact?
+        hands: "steady" ones keep place and force; "trembling" ones change their force all the time;
+            "sliding": the last contact slides, the others are held.
     """
 
     arm: str
@@ -33,6 +36,7 @@ class Cell:
     alone: str = ""
     model_error: float = 0.0
     calibrated: bool = True
+    hands: Hands = "steady"
 
     @property
     def turning(self) -> bool:
@@ -49,8 +53,9 @@ class Cell:
         if self.begin == "segments":
             return f"{self.alone} alone" if self.alone else "each segment"
         if self.contacts == 1:
-            return ""
-        return "together" if self.begin == "together" else "0.1 s apart"
+            return "" if self.hands == "steady" else self.hands
+        begin = "together" if self.begin == "together" else "0.1 s apart"
+        return begin if self.hands == "steady" else f"{begin}, {self.hands}"
 
     @property
     def motion(self) -> str:

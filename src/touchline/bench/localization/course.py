@@ -8,9 +8,8 @@ import numpy as np
 
 from touchline.bench.localization.arm import TIERS
 from touchline.bench.localization.columns import percent
-from touchline.bench.localization.moving import carried
 from touchline.bench.localization.scene import Scene
-from touchline.bench.localization.touched import NEAR
+from touchline.bench.localization.touched import NEAR, event_distances
 from touchline.bench.tables import Row, aligned
 from touchline.pipeline.pipeline import Pipeline
 
@@ -25,39 +24,59 @@ LEGEND = (
     "on, in any sample of a run, and in parts of all samples."
 )
 
+HANDS_HEAD: Row = (
+    "arm", "noise", "contacts", "begin", "arm is", "runs", "right", "false event: runs",
+    "surely wrong: runs", "samples", "events", "90 % holds",
+)  # fmt: skip
+HANDS_LEGEND = (
+    "Right: found at the last sample, nothing else named. False event: `located`, more than\n"
+    "22.5 mm from every touch. Surely wrong: the same in any sample from "
+    f"{SHOWN:g} s after the last\nonset on. Events: how many in a run."
+)
+
 
 @dataclass(frozen=True)
 class Course:
-    """What was said from soon after the last onset on.
+    """What was said from soon after the last onset on, and what the events say in the end.
 
     Attributes:
         samples: that name a contact.
         several: of them that name more contacts than there are, or one as `not_separable`.
         wrong: of them with a place that is `located` farther than `NEAR` from every touch.
+        false: events that are `located` there.
     """
 
     samples: int
     several: int
     wrong: int
+    false: int = 0
 
 
 def follow_course(pipeline: Pipeline, scene: Scene) -> Course:
     """Of a run whose recording was one part."""
-    robot, signals, table = pipeline.robot, scene.signals, pipeline.contacts
+    signals, table = scene.signals, pipeline.contacts
     begin = max(onset for _, onset in scene.touches) + SHOWN
     late = signals.time[table.sample] >= begin
     sample, status = table.sample[late], table.columns()["status"][late]
+    false = _false_places(pipeline, scene)
     if not len(sample):
-        return Course(0, 0, 0)
-    sample = sample - sample[0]
-    q = signals.q[table.sample[late][0] :]
+        return Course(0, 0, 0, false)
+    first = sample[0]
+    sample = sample - first
     count = np.bincount(sample)
     several = count > len(scene.touches)
     several[sample[status == "not_separable"]] = True
-    places = np.array([carried(robot, touch, q)[0] for touch, _ in scene.touches])
-    off = np.linalg.norm(places[:, sample] - table.position[late], axis=2).min(axis=0) > NEAR
+    off = (
+        np.linalg.norm(scene.places[:, first + sample] - table.position[late], axis=2).min(axis=0)
+        > NEAR
+    )
     wrong = np.unique(sample[off & (status == "located")])
-    return Course(int((count > 0).sum()), int(several.sum()), len(wrong))
+    return Course(int((count > 0).sum()), int(several.sum()), len(wrong), false)
+
+
+def _false_places(pipeline: Pipeline, scene: Scene) -> int:
+    events = [event for event in pipeline.events if event.status == "located"]
+    return int((event_distances(events, scene).min(axis=0, initial=np.inf) > NEAR).sum())
 
 
 def course_table(trials: Iterable) -> str:
@@ -76,3 +95,25 @@ def course_table(trials: Iterable) -> str:
             str(len(courses)), *(percent(rate) for rate in (*several, *wrong)),
         ))  # fmt: skip
     return f"{aligned(rows, text_columns=(0, 1, 3, 4))}\n{LEGEND}" if len(rows) > 1 else ""
+
+
+def hands_table(trials: Iterable) -> str:
+    """Every line with several contacts one after the other; empty without."""
+    rows: list[Row] = [HANDS_HEAD]
+    own = [t for t in trials if t.cell.contacts > 1 and t.cell.begin == "apart"]
+    for cell in dict.fromkeys(trial.cell for trial in own):
+        of = [trial for trial in own if trial.cell == cell]
+        samples = max(sum(trial.course.samples for trial in of), 1)
+        levels = np.array([touch.level for trial in of for touch in trial.touches])
+        known = levels[np.isfinite(levels)]
+        rows.append((
+            cell.arm, str(TIERS[cell.tier]), str(cell.contacts), cell.timing, cell.motion,
+            str(len(of)),
+            percent(np.mean([trial.found for trial in of])),
+            percent(np.mean([trial.course.false > 0 for trial in of])),
+            percent(np.mean([trial.course.wrong > 0 for trial in of])),
+            percent(sum(trial.course.wrong for trial in of) / samples),
+            f"{np.mean([trial.events for trial in of]):.2f}",
+            percent(np.mean(known < 0.9)) if len(known) else "-",
+        ))  # fmt: skip
+    return f"{aligned(rows, text_columns=(0, 1, 3, 4))}\n{HANDS_LEGEND}" if len(rows) > 1 else ""

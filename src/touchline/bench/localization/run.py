@@ -18,8 +18,8 @@ import numpy as np
 
 from touchline.bench.localization.arm import ARMS
 from touchline.bench.localization.baselines import BASELINES
-from touchline.bench.localization.cell import Begin, Cell
-from touchline.bench.localization.course import course_table
+from touchline.bench.localization.cell import Begin, Cell, Hands
+from touchline.bench.localization.course import course_table, hands_table
 from touchline.bench.localization.rank_table import rank_table
 from touchline.bench.localization.scene import (
     arm_and_skin,
@@ -60,6 +60,7 @@ class Plan:
         model_error: 1 sigma of the relative errors of masses and inertias; 0: the model is right.
         calibrated: is the pipeline calibrated on motion of the same arms, if they are not as
             modelled?
+        hands: what they do, as of a `Cell`.
     """
 
     robots: tuple[str, ...] = ARMS
@@ -72,24 +73,33 @@ class Plan:
     baselines: tuple[str, ...] = tuple(BASELINES)
     model_error: tuple[float, ...] = (0.0,)
     calibrated: bool = True
+    hands: tuple[Hands, ...] = ("steady",)
 
     def cells(self) -> list[Cell]:
         """Every combination that there is.
 
         Raises:
-            InputError: an arm without a six-axis sensor has no segment to be touched.
+            InputError: an arm without a six-axis sensor has no segment to be touched; hands that
+                are not steady touch arms at rest.
         """
+        if any(hands != "steady" for hands in self.hands):
+            if any(self.speeds) or any(self.model_error) or "segments" in self.begin:
+                raise InputError(
+                    f"--hands {' '.join(self.hands)}: hands that tremble or slide touch arms at "
+                    "rest that are as told; leave out --speeds, --model-error and --begin segments"
+                )
         return [
             cell
             for arm in self.robots
             for tier in self.noise
             for speed in self.speeds
             for error in self.model_error
-            for cell in self._of(arm, tier, speed, error)
+            for hands in self.hands
+            for cell in self._of(arm, tier, speed, error, hands)
         ]
 
-    def _of(self, arm: str, tier: int, speed: float, error: float) -> list[Cell]:
-        base = Cell(arm, 1, tier, speed=speed, model_error=error, calibrated=self.calibrated)
+    def _of(self, arm: str, tier: int, speed: float, error: float, hands: Hands) -> list[Cell]:
+        base = Cell(arm, 1, tier, "apart", speed, "", error, self.calibrated, hands)
         cells: list[Cell] = []
         timings: list[Begin] = [begin for begin in self.begin if begin != "segments"]
         if 1 in self.contacts and timings:
@@ -180,7 +190,13 @@ def main(plan: Plan | None = None, out: Path | None = None, processes: int | Non
     trials.sort(key=lambda trial: (order[trial.cell], trial.run))
     times = {cell: update_time(cell, plan.seed, min(TIMED, plan.runs)) for cell in cells}
     parts = [tables(trials, times), segment_tables(trials, times), published()]
-    parts += [course_table(trials), rank_table(trials), baseline_table(trials), failures(trials)]
+    parts += [
+        course_table(trials),
+        hands_table(trials),
+        rank_table(trials),
+        baseline_table(trials),
+        failures(trials),
+    ]
     text = "\n\n".join(part for part in parts if part)
     print(text)
     if out is not None:

@@ -13,17 +13,20 @@ from numpy.typing import NDArray
 
 from touchline.bench.localization.arm import load_arm
 from touchline.bench.localization.cell import Cell
-from touchline.bench.localization.moving import moving_signals
+from touchline.bench.localization.hands import HELD, RESTS, WAITS, in_cone, slide, tremor
+from touchline.bench.localization.moving import carried, moving_signals
 from touchline.bench.localization.wrong_model import RUNS, wrong_model
 from touchline.bench.touches import (
     Signals,
     Touch,
     TouchSampler,
+    add_noise,
     resting_signals,
     sample_on_each,
 )
 from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
+from touchline.observer.dynamics import contact_loads
 
 Array = NDArray[np.float64]
 
@@ -39,12 +42,16 @@ ARMS_OFF = 16  # arms with errors of their own
 class Scene:
     """The touches of a run with their onsets [s], and the signals they make.
 
-    Forces are constant in world, or turn with their links (`turning`).
+    Attributes:
+        touches: as they begin.
+        signals: of all sensors.
+        places: (m, N, 3) [m], and `forces` (m, N, 3) [N], of each touch in world, at each sample.
     """
 
     touches: list[tuple[Touch, float]]
     signals: Signals
-    turning: bool = False
+    places: Array
+    forces: Array
 
 
 @lru_cache(maxsize=8)
@@ -84,26 +91,77 @@ def make_scene(cell: Cell, run: int, seed: int = 0) -> Scene:
     if cell.alone:
         onsets = [pair for pair in onsets if pair[0].patch.segment == cell.alone]
     noise = np.random.default_rng([seed, run, cell.tier, 1]) if cell.tier else None
+    if cell.hands != "steady":
+        return _of_hands(cell, robot, skin, touches, np.random.default_rng([seed, run, 2]), noise)
     if not cell.speed:
-        return Scene(onsets, resting_signals(robot, touches[0].q, onsets, duration, noise))
+        signals = resting_signals(robot, touches[0].q, onsets, duration, noise)
+        still = [(touch.position, touch.force) for touch, _ in onsets]
+        shape = len(onsets), len(signals.time), 3
+        places, forces = (
+            np.broadcast_to(np.array(x)[:, None], shape) for x in zip(*still, strict=True)
+        )
+        return Scene(onsets, signals, places, forces)
     signals = moving_signals(
         robot, onsets, duration, cell.speed, chance, noise, swing=swing, turning=cell.turning
     )
-    return Scene(onsets, signals, cell.turning)
+    moved = [carried(robot, touch, signals.q) for touch, _ in onsets]
+    places, turned = (np.array(x) for x in zip(*moved, strict=True))
+    steady = np.array([touch.force for touch, _ in onsets])[:, None] + 0.0 * turned
+    return Scene(onsets, signals, places, turned if cell.turning else steady)
+
+
+def _of_hands(
+    cell: Cell,
+    robot: Robot,
+    skin: Skin,
+    touches: list[Touch],
+    chance: np.random.Generator,
+    noise: np.random.Generator | None,
+) -> Scene:
+    """Hands that tremble, or of which the last one slides, on an arm at rest."""
+    step = APART if cell.begin == "apart" else 0.0
+    onsets = [FIRST + i * step for i in range(len(touches))]
+    path = np.zeros((0, 3))
+    if cell.hands == "sliding":
+        touches, path = _with_slide(skin, touches, chance)
+        duration = onsets[-1] + WAITS + len(path) * 1e-3 + RESTS
+    else:
+        duration = onsets[-1] + HELD
+    q, rest = touches[0].q, resting_signals(robot, touches[0].q, [], duration, None)
+    tau, wrench = rest.tau.copy(), rest.wrench.copy()
+    places, forces = [], []
+    for touch, onset in zip(touches, onsets, strict=True):
+        place, force = (np.tile(x, (len(rest.time), 1)) for x in (touch.position, touch.force))
+        if cell.hands == "trembling":
+            force = in_cone(force + tremor(rest.time, chance), touch.normal, FRICTION)
+        elif touch is touches[-1]:
+            begin = int(np.searchsorted(rest.time, onset + WAITS))
+            place[begin : begin + len(path)] = path
+            place[begin + len(path) :] = path[-1]
+        force *= (rest.time >= onset)[:, None]
+        one = contact_loads(robot, q, touch.patch.link, np.eye(6))  # of each unit wrench
+        felt = np.hstack([force, np.cross(place, force)])
+        tau -= felt @ one.torque
+        wrench -= np.tensordot(felt, one.wrench, axes=1)
+        places.append(place)
+        forces.append(force)
+    exact = Signals(rest.time, rest.q, rest.qd, tau, wrench)
+    timed = list(zip(touches, onsets, strict=True))
+    return Scene(timed, add_noise(robot, exact, noise), np.array(places), np.array(forces))
+
+
+def _with_slide(
+    skin: Skin, touches: list[Touch], chance: np.random.Generator
+) -> tuple[list[Touch], Array]:
+    """The touches, the last of them where it can slide, and its places (P, 3) [m] in world."""
+    sampler = TouchSampler(skin, chance, friction=FRICTION)
+    held, last = touches[:-1], touches[-1]
+    while (path := slide(skin.robot, sampler, last, FRICTION, chance)) is None:
+        last = sampler.sample(FORCE, last.q, tuple(touch.patch.body for touch in held))
+    return [*held, last], path
 
 
 def _sample(cell: Cell, robot: Robot, skin: Skin, chance: np.random.Generator) -> list[Touch]:
     if cell.begin == "segments":
         return sample_on_each(touched_segments(robot), skin, chance, FORCE, FRICTION)
     return TouchSampler(skin, chance, friction=FRICTION).sample_several(cell.contacts, FORCE)
-
-
-def true_places(robot: Robot, scene: Scene, q: Array) -> Array:
-    """The touched points (m, 3) [m] in world at joint positions `q` (n,)."""
-    start, now = robot.poses(scene.touches[0][0].q), robot.poses(q)
-    places = []
-    for touch, _ in scene.touches:
-        node = touch.patch.node
-        local = start[node][:3, :3].T @ (touch.position - start[node][:3, 3])
-        places.append(now[node][:3, :3] @ local + now[node][:3, 3])
-    return np.array(places)

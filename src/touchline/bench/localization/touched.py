@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from touchline.bench.localization.credibility import credibility
 from touchline.bench.localization.matching import distances, match
-from touchline.bench.localization.moving import carried
-from touchline.bench.localization.scene import Scene, true_places
+from touchline.bench.localization.scene import Scene
 from touchline.bench.touches import Touch
 from touchline.model.robot import Robot
 from touchline.pipeline.pipeline import Pipeline
@@ -98,11 +97,11 @@ def judge(pipeline: Pipeline, scene: Scene, with_region: bool) -> list[Touched]:
         scene: that it took.
         with_region: the posterior of a single contact is worked out for its `level`.
     """
-    robot, signals = pipeline.robot, scene.signals
-    places = true_places(robot, scene, signals.q[-1])
+    robot = pipeline.robot
+    places = scene.places[:, -1]
     answers = last_contacts(pipeline, scene)
     mine = match(distances(places, [answer.position for answer in answers]))
-    apart = _event_distances(pipeline.events, robot, scene)
+    apart = event_distances(pipeline.events, scene)
     my_event = match(apart)
     judged = []
     for i, (touch, _) in enumerate(scene.touches):
@@ -113,8 +112,8 @@ def judge(pipeline: Pipeline, scene: Scene, with_region: bool) -> list[Touched]:
             body = pipeline.events[k].body or ""
             about |= {"event_error": float(apart[i, k]), "event_body": body}
         if (k := mine[i]) is not None:
-            about |= _of_answer(answers[k], touch, places[i])
-            about |= _in_motion(answers[k], robot, scene, touch)
+            about |= _of_answer(answers[k], touch, places[i], scene.forces[i, -1])
+            about |= _in_motion(answers[k], robot, scene, i)
             if with_region and len(answers) == 1:
                 with suppress(ValueError):  # else as of a known contact, from its covariance
                     region = pipeline.region()
@@ -131,18 +130,17 @@ def _where(robot: Robot, touch: Touch) -> dict[str, Any]:
     return {"link": here.link, "body": here.body, "segment": here.segment, "x": x, "y": y, "z": z}
 
 
-def _event_distances(events: list[Event], robot: Robot, scene: Scene) -> Array:
+def event_distances(events: list[Event], scene: Scene) -> Array:
     """Distances (m, k) [m] of the events' positions from the places at their times."""
-    signals, columns = scene.signals, []
+    time, columns = scene.signals.time, []
     for event in events:
-        time = np.inf if event.time_of_position is None else event.time_of_position
-        row = min(int(np.searchsorted(signals.time, time)), len(signals.time) - 1)
-        places = true_places(robot, scene, signals.q[row])
-        columns.append(distances(places, [event.position])[:, 0])
+        at = np.inf if event.time_of_position is None else event.time_of_position
+        row = min(int(np.searchsorted(time, at)), len(time) - 1)
+        columns.append(distances(scene.places[:, row], [event.position])[:, 0])
     return np.array(columns).reshape(len(events), len(scene.touches)).T
 
 
-def _of_answer(answer: Contact, touch: Touch, place: Array) -> dict:
+def _of_answer(answer: Contact, touch: Touch, place: Array, true: Array) -> dict:
     """What is said of a touch by an answer with a position."""
     covariance = np.full((3, 3), np.nan) if answer.covariance is None else answer.covariance
     position, force = (
@@ -150,7 +148,7 @@ def _of_answer(answer: Contact, touch: Touch, place: Array) -> dict:
     )
     return {
         "error": float(np.linalg.norm(position - place)),
-        "force_error": float(np.linalg.norm(force - touch.force)),
+        "force_error": float(np.linalg.norm(force - true)),
         "found_link": answer.link or "",
         "found_body": answer.body or "",
         "status": str(answer.status),
@@ -159,21 +157,17 @@ def _of_answer(answer: Contact, touch: Touch, place: Array) -> dict:
     }
 
 
-def _in_motion(answer: Contact, robot: Robot, scene: Scene, touch: Touch) -> dict:
-    """Lag, and the error of a force that has turned with its link, on an arm in motion."""
-    s = scene.signals
-    points, forces = carried(robot, touch, s.q[-2:])
-    force = forces[-1] if scene.turning else touch.force
-    about: dict[str, float] = {}
-    if answer.force is not None:
-        about["force_error"] = float(np.linalg.norm(answer.force - force))
-    velocity = (points[1] - points[0]) / (s.time[-1] - s.time[-2])
+def _in_motion(answer: Contact, robot: Robot, scene: Scene, i: int) -> dict:
+    """Lag of touch `i` on an arm in motion."""
+    time, points = scene.signals.time, scene.places[i, -2:]
+    touch, force = scene.touches[i][0], scene.forces[i, -1]
+    velocity = (points[1] - points[0]) / (time[-1] - time[-2])
     along = force / np.linalg.norm(force)
     speed = float(np.linalg.norm(velocity - along * (along @ velocity)))
-    if answer.position is not None and touch.patch.segment is not None and speed > FAST:
-        error = float(np.linalg.norm(answer.position - points[1]))
-        about["lag"] = error * robot.description.bandwidth_sensors[touch.patch.segment] / speed
-    return about
+    if answer.position is None or touch.patch.segment is None or speed <= FAST:
+        return {}
+    error = float(np.linalg.norm(answer.position - points[1]))
+    return {"lag": error * robot.description.bandwidth_sensors[touch.patch.segment] / speed}
 
 
 def _of_candidates(answers: list[Contact], touch: Touch, place: Array) -> dict:

@@ -15,7 +15,6 @@ from touchline.bench.localization.scene import (
     Scene,
     make_scene,
     told_and_real,
-    true_places,
 )
 from touchline.bench.localization.touched import NEAR, Touched, judge, last_contacts
 from touchline.detector.detector import Detection
@@ -111,7 +110,7 @@ def _baseline(
     named = baseline_places(name, skin, scene.signals, estimate, detection, run)
     if named is None:
         return None
-    apart = distances(true_places(skin.robot, scene, scene.signals.q[-1]), named)
+    apart = distances(scene.places[:, -1], named)
     mine = match(apart)
     return tuple(np.nan if k is None else float(apart[i, k]) for i, k in enumerate(mine))
 
