@@ -17,6 +17,7 @@
 #include "localizer_bindings.hpp"
 #include "mesh_bindings.hpp"
 #include "pipeline_bindings.hpp"
+#include "ros_bindings.hpp"
 #include "samples.hpp"
 #include "touchline/detail/observer/observer.hpp"
 #include "touchline/version.hpp"
@@ -237,6 +238,7 @@ NB_MODULE(TOUCHLINE_MODULE, m) {
         nb::sig("def view(rows: " TOUCHLINE_ARRAY ", first: int, count: int, columns: int) -> "
                 TOUCHLINE_ARRAY));
   live::bind(m);
+  live::bind_ros(m);
   nb::class_<Observer>(m, "Observer")
       .def("__init__",
            [](Observer* self, std::vector<tl::Node> nodes, const std::vector<double>& gravity,

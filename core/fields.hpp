@@ -58,11 +58,14 @@ nb::list table() {
   return rows;
 }
 
+// In the order of `touchline::Status`.
+constexpr const char* kStatuses[] = {"none", "located", "ambiguous", "not_separable", "wrench_only"};
+
 inline void bind(nb::module_& m) {
   m.attr("CONTACT_FIELDS") = nb::tuple(table<tl::Contact>());
   m.attr("EVENT_FIELDS") = nb::tuple(table<tl::Event>());
   m.attr("CANDIDATE_WIDTH") = tl::FieldNumbers::kOfCandidate;
-  m.attr("STATUSES") = nb::make_tuple("none", "located", "ambiguous", "not_separable", "wrench_only");
+  m.attr("STATUSES") = nb::make_tuple(kStatuses[0], kStatuses[1], kStatuses[2], kStatuses[3], kStatuses[4]);
   m.attr("CONTACT_LEVELS") = nb::make_tuple("contact", "collision");
   m.attr("ZONES") = nb::make_tuple("structure", "end_effector", "handle", "open");
 }

@@ -87,6 +87,7 @@ class Runner {
     const std::lock_guard<std::mutex> turn(pipeline_.turn);  // no interpreter is held here
     const tl::Sample sample = arrived.sample(joints_);
     const tl::Result result = pipeline_.value->update(sample);
+    if (pipeline_.told) pipeline_.told(sample, result);
     pipelines::keep_ended(pipeline_, result);
     std::vector<double>* out = results_.vacant();
     if (out == nullptr) {

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <iterator>
 #include <memory>
 #include <optional>
@@ -45,6 +46,8 @@ struct Pipeline {
   std::vector<double> closed;      // of changes that a restart made, for the next sample to tell
   std::vector<double> unmeasured;  // NaN for each torque and wrench
   std::vector<double> snapshot;    // of the last sample, on its way to Python
+  // Told of each sample that is felt one at a time, before Python sees it; empty: nobody is.
+  std::function<void(const tl::Sample&, const tl::Result&)> told;
 };
 
 // Where the parts of a snapshot stand: the observer's row with the health of the pipeline, what the
@@ -159,6 +162,7 @@ inline nb::object update(Pipeline& p, double time, nb::handle q, nb::handle qd, 
     const guard::Turn turn(p.turn);
     const tl::Result result = p.value->update(
         sample, [&p](const std::vector<int>& lost) { prepare(p, lost, true); });
+    if (p.told) p.told(sample, result);
     keep_ended(p, result);
     take_snapshot(p, sample, result, p.snapshot);
     numbers.swap(p.snapshot);

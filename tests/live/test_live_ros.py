@@ -7,14 +7,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from live_arms import write_arm
 from live_support import assert_same, watch
 
-from touchline.errors import InputError
-from touchline.live.ros import Merge
-from touchline.logs.naming import parse_naming
 from touchline.model.robot import load_robot
 
 HERE = Path(__file__).parent
@@ -107,63 +103,3 @@ def test_missing_topics_and_names_are_one_clear_line(tmp_path):
     )
     assert done.returncode == 2 and "nobody publishes" in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
-
-
-# The merging of unsynchronised messages, without ROS.
-
-
-@pytest.fixture
-def merge(tmp_path):
-    robot = load_robot(
-        write_arm(
-            tmp_path,
-            2,
-            extra="log:\n  joint_names: {joint1: a1}\n  tau: {column: 'x.{joint}', factor: 0.001}\n"
-            "  sensors: {wrist: {fx: {column: w, factor: -1.0}}}\n",
-        )
-    )
-    return Merge(robot.description, parse_naming(robot.description))
-
-
-def state(merge, at, names=("joint2", "spare", "a1"), arrival=None):
-    signals = ([2.0, 9.0, 1.0], [0.2, 0.9, 0.1], [2e3, 9e3, 1e3])
-    return merge.joints(at, names, signals, at if arrival is None else arrival)
-
-
-def test_names_and_factors_are_those_of_the_description(merge):
-    merge.wrench(0, 0.9995, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], 0.9995)
-    sample = state(merge, 1.0)
-    assert sample.q.tolist() == [1.0, 2.0] and sample.qd.tolist() == [0.1, 0.2]
-    assert np.allclose(sample.tau, [1.0, 2.0])
-    assert sample.wrench[0].tolist() == [-1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
-    assert sample.ages[0] == pytest.approx(0.0005) and sample.sequence == 0
-
-
-def test_the_last_wrench_counts_until_it_is_too_old(merge):
-    for i in range(10):
-        merge.wrench(0, 0.002 * i, [1.0] * 6, 0.002 * i)
-        sample = state(merge, 0.002 * i + 0.001)
-        assert np.isfinite(sample.wrench).all()
-    assert np.isfinite(state(merge, 0.018 + 0.009).wrench).all()
-    assert np.isnan(state(merge, 0.018 + 0.011).wrench).all()
-
-
-def test_a_wrench_that_comes_late_does_not_replace_a_newer_one(merge):
-    merge.wrench(0, 1.000, [1.0] * 6, 1.000)
-    merge.wrench(0, 0.998, [2.0] * 6, 1.001)
-    assert state(merge, 1.001).wrench[0, 1] == 1.0
-
-
-def test_a_state_without_all_joints_makes_no_sample(merge):
-    assert state(merge, 1.0, ("joint2", "spare", "b")) is None
-    assert state(merge, 1.1) is not None
-    for i in range(100):  # a gripper on the same topic
-        assert state(merge, 1.2 + i, ("f1", "f2", "f3")) is None
-
-
-def test_joints_that_never_come_are_named(tmp_path):
-    robot = load_robot(write_arm(tmp_path, 2))
-    merge = Merge(robot.description, parse_naming(robot.description))
-    with pytest.raises(InputError, match="no joint 'joint1'.*joint_names"):
-        for i in range(100):
-            state(merge, 0.1 * i)

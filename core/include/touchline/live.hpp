@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A running robot: samples go from the thread that receives them to a pipeline in a thread of its
-// own. The receiver never waits, allocates or locks; what other threads do costs no sample.
+// own. The receiver neither waits for the pipeline nor allocates; what others do costs no sample.
 #pragma once
 
 #include <atomic>
@@ -130,14 +130,14 @@ class Runner {
     }
     fill(*slot);
     ring_.publish();
-    wake_.notify_one();
+    wake();
     return true;
   }
 
   // Takes what still waits, and ends the thread.
   void stop() {
     stopping_.store(true);
-    wake_.notify_one();
+    wake();
     if (thread_.joinable()) thread_.join();
   }
 
@@ -147,14 +147,27 @@ class Runner {
   double longest_gap() { return longest_gap_.exchange(0.0); }
 
  private:
-  // A wake-up that comes between a look at the ring and the wait is made up for after so long.
-  static constexpr std::chrono::microseconds kNap{200};
-
   static Arrived blank(std::size_t signals, std::size_t sensors) {
     Arrived made;
     made.signals.assign(signals, 0.0);
     made.ages.assign(sensors, 0.0);
     return made;
+  }
+
+  // Only a runner that sleeps, or is about to, has to be woken.
+  void wake() {
+    std::atomic_thread_fence(std::memory_order_seq_cst);
+    if (!asleep_.load(std::memory_order_relaxed)) return;
+    { const std::lock_guard<std::mutex> nobody_between_look_and_wait(napping_); }
+    wake_.notify_one();
+  }
+
+  void sleep() {
+    std::unique_lock<std::mutex> lock(napping_);
+    asleep_.store(true, std::memory_order_relaxed);
+    std::atomic_thread_fence(std::memory_order_seq_cst);
+    wake_.wait(lock, [this] { return !ring_.empty() || stopping_.load(); });
+    asleep_.store(false, std::memory_order_relaxed);
   }
 
   void work() {
@@ -170,15 +183,14 @@ class Runner {
       } else if (stopping_.load()) {
         return;
       } else {
-        std::unique_lock<std::mutex> lock(napping_);
-        wake_.wait_for(lock, kNap);
+        sleep();
       }
     }
   }
 
   Ring<Arrived> ring_;
   Take take_;
-  std::atomic<bool> stopping_{false};
+  std::atomic<bool> stopping_{false}, asleep_{false};
   std::atomic<std::size_t> overrun_{0}, taken_{0};
   std::atomic<double> longest_gap_{0.0};
   std::mutex napping_;

@@ -90,13 +90,16 @@ class Connection:
         """
         try:
             self.notes = self.source.open()
+            self._open = True
+            self._wait_for_first()
         except LinkLost as error:
-            self.source.close()
+            self.close()
             raise InputError(f"{self.source.name}: {error}") from None
         except BaseException:
-            self.source.close()
+            self.close()
             raise
-        self._open = True
+
+    def _wait_for_first(self) -> None:
         end = time.monotonic() + FIRST_SAMPLE
         while not self._ready and not self._ended:
             if time.monotonic() > end:

@@ -9,27 +9,31 @@ our own would have to be built on every machine that listens. Markers and wrench
 
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.live.rcl import Rcl
 from touchline.live.sample import Sample, whole_nanoseconds
 from touchline.live.session import Session
 from touchline.live.streams import Stream, StreamState
 from touchline.model.robot import Robot
+from touchline.native import core
 from touchline.pipeline.pipeline import Result
 from touchline.result.contact import Contact
 from touchline.touch.touch import TouchEvent
 
 Array = NDArray[np.float64]
+TopicWriter = core.TopicWriter
 
 METRES_PER_NEWTON = 0.01  # length of arrows
 SHAFT, HEAD, POINT = 0.008, 0.02, 0.02  # m
 SIGMAS = 2.0  # of the region that is drawn
 FELT, BLOW = (0.84, 0.37, 0.0, 0.9), (0.8, 0.1, 0.1, 0.9)  # colours: red, green, blue, opacity
 REGION = (0.84, 0.37, 0.0, 0.25)
+TORQUES, CONTACTS = "~/external_joint_torques", "~/contacts"
 TOUCH = "~/touch"  # presses, values, strokes and gestures, where the robot has an `interface`
 SHOWN = 0.5  # s for which a marker is shown that is not renewed
 
@@ -56,28 +60,40 @@ class Messages:
         self._forces = [name for name in robot.segment_names if name != "root"]
         self._drawn = 0
 
+    def writer(self, core_robot: core.Robot, rcl: Rcl, publishers: Mapping[str, Any]) -> TopicWriter:
+        """What publishes contacts, torques and wrenches from the thread that feels.
+
+        Args:
+            core_robot: of the pipeline.
+            rcl: functions that publish.
+            publishers: topic -> rclpy's publisher, for all of `kinds`.
+        """
+        pointers = {name: publisher.handle.pointer for name, publisher in publishers.items()}
+        segments = enumerate(self._robot.segment_names)
+        return TopicWriter(
+            core_robot,
+            self._frame,
+            rcl.publish,
+            pointers[CONTACTS],
+            pointers[TORQUES],
+            [(pointers[wrench_topic(n)], k) for k, n in segments if n in self._forces],
+        )
+
     def kinds(self) -> dict[str, Any]:
         """Topic -> type of message."""
         return {
-            "~/external_joint_torques": self._state,
+            TORQUES: self._state,
             **{wrench_topic(name): self._wrench for name in self._forces},
-            "~/contacts": self._text,
+            CONTACTS: self._text,
             **({TOUCH: self._text} if self._robot.description.interface else {}),
             "~/collision": self._flag,
             "~/markers": self._markers,
             "/diagnostics": self._array,
         }
 
-    def of(self, sample: Sample, result: Result) -> Iterator[tuple[str, Any]]:
-        """Topic and message of what is published of a sample, each as soon as it is made."""
-        yield "~/external_joint_torques", self._torques(sample, result)
-        yield "~/contacts", self._text(data=contacts_json(sample.time, result))
-        for segment, name in enumerate(self._robot.segment_names):
-            if name in self._forces:
-                wrench = result.estimate.segment_wrench[segment]
-                yield wrench_topic(name), self._segment(sample, wrench)
-        if result.contacts or self._drawn:
-            yield "~/markers", self._draw(sample, result.contacts)
+    def markers(self, sample: Sample, result: Result) -> Any:
+        """What is drawn of a sample; None where nothing is and nothing was."""
+        return self._draw(sample, result.contacts) if result.contacts or self._drawn else None
 
     def collision(self, collision: bool) -> Any:
         """Whether there was one since the last reset."""
@@ -90,19 +106,6 @@ class Messages:
     def _head(self, header: Any, sample: Sample, frame: str) -> None:
         seconds, rest = divmod(whole_nanoseconds(sample.time), 10**9)
         header.stamp.sec, header.stamp.nanosec, header.frame_id = seconds, rest, frame
-
-    def _torques(self, sample: Sample, result: Result) -> Any:
-        message = self._state(name=list(self._robot.joint_names))
-        self._head(message.header, sample, "")
-        message.effort = [float(x) for x in result.estimate.tau_ext]
-        return message
-
-    def _segment(self, sample: Sample, wrench: Array) -> Any:
-        message = self._wrench()
-        self._head(message.header, sample, self._frame)
-        force, torque = message.wrench.force, message.wrench.torque
-        force.x, force.y, force.z, torque.x, torque.y, torque.z = (float(x) for x in wrench)
-        return message
 
     def _draw(self, sample: Sample, contacts: list[Contact]) -> Any:
         """An arrow to each contact that is located, its region, and points that may be touched."""
@@ -222,31 +225,3 @@ def wrench_topic(segment: str) -> str:
     plain = "".join(c if c.isalnum() and c.isascii() else "_" for c in segment)
     return f"~/{plain if not plain[:1].isdigit() else '_' + plain}/wrench"
 
-
-def contacts_json(at: float, result: Result) -> str:
-    """Contacts of one instant as text."""
-    rows = [
-        {
-            "event": contact.event,
-            "segment": contact.segment,
-            "level": contact.level,
-            "status": contact.status,
-            "link": contact.link,
-            "body": contact.body,
-            "body_probability": contact.body_probability,
-            "position": _plain(contact.position),
-            "position_std": contact.position_std,
-            "covariance": _plain(contact.covariance),
-            "force": _plain(contact.force),
-            "candidates": [
-                {"link": c.link, "probability": c.probability, "position": _plain(c.position)}
-                for c in contact.candidates
-            ],
-        }
-        for contact in result.contacts
-    ]
-    return json.dumps({"time": at, "health": int(result.health), "contacts": rows})
-
-
-def _plain(values: Array | None) -> list[Any] | None:
-    return None if values is None else values.tolist()

@@ -20,6 +20,7 @@ from touchline.live.aside import settle
 from touchline.live.connection import Connection
 from touchline.live.loopback import keep_local
 from touchline.live.messages import TOUCH, Messages
+from touchline.live.rcl import find_rcl
 from touchline.live.session import EventNews, Session
 from touchline.live.sources import make_source
 from touchline.live.streams import StreamState
@@ -28,7 +29,7 @@ from touchline.model.robot import load_robot
 DIAGNOSTICS = 1.0  # s between two of them
 IDLE = 0.05  # s that an inactive node waits for requests
 REQUESTS = 0.05  # s between two looks of an active one: each costs as much as a sample
-BURST = 2.0  # periods of publish_rate that may be made up for: samples come with a jitter
+MARKERS = 0.03  # s between two looks of a viewer
 MISSING = "ROS 2 is not there ({}): source a ROS 2 installation, or pip install 'touchline[ros2]'"
 
 
@@ -90,7 +91,8 @@ class TouchlineNode:
         self._news: Iterator[EventNews] | None = None
         self._publishers: dict[str, Any] = {}
         self._collision: bool | None = None
-        self._told, self._due, self._asked = 0.0, 0.0, 0.0
+        self._told, self._drawn, self._asked = 0.0, 0.0, 0.0
+        self._writer: Any = None
         self._declare()
         self._executor = self._rclpy.executors.SingleThreadedExecutor(context=context)
         self._executor.add_node(self.node)
@@ -160,6 +162,14 @@ class TouchlineNode:
             make = self.node.create_lifecycle_publisher
             self._publishers[name] = make(kind, name, own)
 
+    def _write(self, session: Session) -> None:
+        """From now on the thread that feels publishes, behind the samples of the start."""
+        assert session.pipeline is not None
+        self._writer = session.pipeline.writer(
+            lambda robot: self._messages.writer(robot, find_rcl(), self._publishers)
+        )
+        self._writer.set_rate(self._value("publish_rate"))
+
     def _make_services(self) -> None:
         from std_srvs.srv import Trigger
 
@@ -216,6 +226,9 @@ class TouchlineNode:
         if self._news is not None:
             self._news.close()  # type: ignore[attr-defined]
             self._news = None
+        if self.session is not None and self.session.pipeline is not None:
+            self.session.pipeline.writer(None)  # its publishers may end before its thread does
+        self._writer = None
         if self.session is not None:
             self.session.close()
             self.session = None
@@ -247,6 +260,8 @@ class TouchlineNode:
             self.node.get_logger().info("the source has ended")
             self._end()
             return
+        if self._writer is None:
+            self._write(self.session)
         self._publish(self.session, news)
 
     def _publish(self, session: Session, news: EventNews) -> None:
@@ -265,14 +280,15 @@ class TouchlineNode:
             self._diagnose()
         if result is None or sample is None:
             return
-        if now < self._due and not (news.began or news.ended):
-            return
-        period = 1.0 / self._value("publish_rate")
-        self._due = max(self._due, now - BURST * period) + period
         if any(contact.level == "collision" for contact in result.contacts):
             self._publish_collision(True)
-        for name, message in self._messages.of(sample, result):
-            self._publishers[name].publish(message)
+        if now - self._drawn < MARKERS and not (news.began or news.ended):
+            return
+        self._drawn = now
+        self._writer.set_rate(self._value("publish_rate"))
+        markers = self._messages.markers(sample, result)
+        if markers is not None:
+            self._publishers["~/markers"].publish(markers)
 
     def _publish_collision(self, collision: bool) -> None:
         if collision != self._collision and "~/collision" in self._publishers:

@@ -1,19 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 # pyright: reportMissingImports=false
-"""`ros2://`: topics of joint states and wrenches, unsynchronised, matched by name."""
+"""`ros2://`: topics of joint states and wrenches, unsynchronised, matched by name.
 
+rclpy finds the topics and subscribes. A native thread takes the messages, past Python.
+"""
+
+import atexit
 import os
 import time
-from collections import deque
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from touchline.errors import InputError
 from touchline.live.loopback import RANGE, keep_local
-from touchline.live.sample import Sample, stamp
+from touchline.live.rcl import Rcl, find_rcl
+from touchline.live.runner import SLOTS, Felt
+from touchline.live.sample import Sample
 from touchline.live.source import Address
 from touchline.live.streams import Stream
 from touchline.logs.cdr import JOINT_STATE, WRENCH_STAMPED
@@ -21,20 +24,15 @@ from touchline.logs.naming import Naming, parse_naming
 from touchline.logs.topics import choose_topics
 from touchline.model.description import AXES, RobotDescription
 from touchline.model.robot import Robot
+from touchline.native import core
+from touchline.pipeline.pipeline import Pipeline
 from touchline.suggest import did_you_mean, listing
-
-Array = NDArray[np.float64]
 
 DISCOVERY = 8.0  # s in which the topics have to appear: drivers start beside this program
 SETTLE = 0.2  # s between two looks at the topics
 DEPTH = 2000  # messages that wait for this program: two seconds at 1 kHz
-MOST = 256  # messages of a topic that are taken at once
-WRENCH_REACH = 3.0  # periods of a wrench's topic after which its last value is none any more
-LONGEST_REACH = 0.1  # s of the same
-AHEAD = 4096  # wrenches that wait for their joint state
 INCOMPLETE = 20  # joint states without a joint, before the first whole one: it is not there
 FELT = "/external_joint_torques"  # what Touchline's node publishes, as joint states too
-CLOCK = 1.0  # s by which two topics' stamps may differ on one clock
 
 
 class RosTopics:
@@ -63,35 +61,42 @@ class RosTopics:
         self._ros = _Ros(address.text)
         self._naming = parse_naming(robot.description)
         self.period: float | None = None
-        self._merge = Merge(robot.description, self._naming)
-        self.streams = self._merge.streams
+        self.streams = (Stream("joints"), *(Stream(name) for name in robot.sensor_names))
         self._node: Any = None
-        self._subscriptions: list[tuple[Any, Callable[[Any], None]]] = []
-        self._states: list[tuple[float, Sequence[str], Sequence[Any], float]] = []
         self._context: Any = None
+        self._reader: core.TopicReader | None = None
+        self._felt: Felt | None = None
+        self._complete = False  # a joint state has named all joints
 
     def open(self) -> list[str]:
         """Joins the graph, looks for the topics and subscribes."""
         ros, local = self._ros, keep_local()
         self._context = ros.rclpy.Context()
-        ros.rclpy.init(context=self._context)
-        self._node = ros.rclpy.create_node("touchline_live", context=self._context)
-        self._executor = ros.executors.SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
+        # Ctrl-C is for the program that reads.
+        ros.rclpy.init(context=self._context, signal_handler_options=ros.no_signals)
+        self._node = ros.rclpy.create_node(
+            "touchline_live", context=self._context, start_parameter_services=False
+        )
         joints, wrenches = self._topics()
         names = {joints: "joints"} | {topic: sensor for sensor, topic in wrenches.items()}
         notes = [local] if local else []
         notes += [f"{names[topic]}: {topic}" for topic in names]
         notes += [w for topic in names for w in self._qos_warnings(topic)]
-        self._subscribe(ros.joint_state, joints, self._on_joints)
-        for k, sensor in enumerate(self._robot.sensor_names):
-            self._subscribe(ros.wrench, wrenches[sensor], self._wrench_of(k))
+        subscriptions = [
+            self._subscribe(ros.joint_state, joints),
+            *(self._subscribe(ros.wrench, wrenches[name]) for name in self._robot.sensor_names),
+        ]
+        self._reader = make_reader(
+            self._robot.description, self._naming, ros.rcl, [s.handle.pointer for s in subscriptions]
+        )
+        atexit.register(self.close)  # the native thread must not outlive what it reads
+        if self._felt is not None:
+            self._reader.attach(self._felt.runner)
         return notes
 
     def _topics(self) -> tuple[str, dict[str, str]]:
         end = time.monotonic() + self._discovery
         while True:
-            self._executor.spin_once(timeout_sec=0.05)
             known = {
                 name: kinds[0] for name, kinds in self._node.get_topic_names_and_types() if kinds
             }
@@ -128,7 +133,7 @@ class RosTopics:
             if self._reliable and info.qos_profile.reliability == best_effort
         ]
 
-    def _subscribe(self, kind: Any, topic: str, callback: Callable[[Any], None]) -> None:
+    def _subscribe(self, kind: Any, topic: str) -> Any:
         qos = self._ros.qos
         reliability = qos.ReliabilityPolicy
         profile = qos.QoSProfile(
@@ -136,64 +141,92 @@ class RosTopics:
             history=qos.HistoryPolicy.KEEP_LAST,
             reliability=reliability.RELIABLE if self._reliable else reliability.BEST_EFFORT,
         )
-        subscription = self._node.create_subscription(kind, topic, callback, profile)
-        self._subscriptions.append((subscription, callback))
+        return self._node.create_subscription(kind, topic, lambda message: None, profile)
 
-    def _on_joints(self, message: Any) -> None:
-        signals = (message.position, message.velocity, message.effort)
-        self._states.append((_stamp(message), message.name, signals, time.monotonic()))
-
-    def _wrench_of(self, k: int) -> Callable[[Any], None]:
-        def take(message: Any) -> None:
-            force, torque = message.wrench.force, message.wrench.torque
-            values = (force.x, force.y, force.z, torque.x, torque.y, torque.z)
-            self._merge.wrench(k, _stamp(message), values, time.monotonic())
-
-        return take
+    def attach(self, pipeline: Pipeline) -> None:
+        """From now on the pipeline runs in a native thread, behind the one that takes messages."""
+        self._felt = Felt(self._robot, pipeline)
+        if self._reader is not None:
+            self._reader.attach(self._felt.runner)
 
     def read(self, timeout: float) -> list[Sample]:
-        """The samples that have come."""
-        end = time.monotonic() + timeout
-        while True:
-            self._executor.spin_once(timeout_sec=max(end - time.monotonic(), 0.0))
-            # Joint states first: the wrenches that belong to them have come by then.
-            for subscription, callback in self._subscriptions:
-                self._drain(subscription, callback)
-            states, self._states = self._states, []
-            merged = (self._merge.joints(*state) for state in states)
-            found = [sample for sample in merged if sample is not None]
-            if found or time.monotonic() >= end:
-                return found
-
-    @staticmethod
-    def _drain(subscription: Any, callback: Callable[[Any], None]) -> None:
-        """Takes what waits, past the executor, which needs ten times as long for a message."""
-        with subscription.handle:
-            for _ in range(MOST):
-                taken = subscription.handle.take_message(subscription.msg_type, False)
-                if taken is None:
-                    return
-                callback(taken[0])
+        """The samples that have come; with results where a pipeline is attached."""
+        assert self._reader is not None
+        if self._felt is not None:
+            found = self._felt.read(timeout)
+            self.streams[0].refused = self._felt.runner.refused
+        else:
+            self._reader.wait(timeout)
+            found = [sample_of(numbers, self._robot) for numbers in self._reader.samples()]
+        for stream, *came in self._reader.notes():
+            self.streams[stream].receive(*came)
+        if not self._complete:
+            self._complete = self.streams[0].received > 0
+            count, seen = self._reader.incomplete()
+            if not self._complete and count >= INCOMPLETE:
+                raise InputError(missing_joints(self._naming, seen))
+        return found
 
     def close(self) -> None:
         """Leaves the graph."""
+        if self._reader is not None:
+            atexit.unregister(self.close)
+            self._reader.stop()
+            self._reader = None
         if self._node is not None:
-            self._executor.remove_node(self._node)
             self._node.destroy_node()
-            self._executor.shutdown()
-            self._subscriptions.clear()
             self._node = None
         if self._context is not None:
             self._ros.rclpy.shutdown(context=self._context)
             self._context = None
 
 
-def _stamp(message: Any) -> float:
-    """The header's stamp [s]; that of now where it is zero."""
-    at = message.header.stamp
-    if at.sec == 0 and at.nanosec == 0:
-        return stamp(time.time_ns())
-    return at.sec + at.nanosec * 1e-9
+def make_reader(
+    description: RobotDescription, naming: Naming, rcl: Rcl, subscriptions: list[int]
+) -> core.TopicReader:
+    """The native thread that takes messages of a robot and makes samples of them.
+
+    Args:
+        description: of the robot.
+        naming: its names and factors in the messages.
+        rcl: functions that take messages.
+        subscriptions: as `rcl` knows them: of the joint states, then of each sensor.
+    """
+    axes = np.full((len(description.sensors), 6), np.nan)
+    for k, sensor in enumerate(description.sensors):
+        for axis, column in naming.sensors[sensor.name].items():
+            axes[k, AXES.index(axis)] = column.factor
+    return core.TopicReader(
+        list(naming.joint_names),
+        [[column.factor for column in naming.joints[s]] for s in ("q", "qd", "tau")],
+        [joint.measured for joint in description.joints],
+        axes.tolist(),
+        rcl.take,
+        rcl.set_on_new,
+        subscriptions,
+        SLOTS,
+    )
+
+
+def sample_of(numbers: np.ndarray, robot: Robot) -> Sample:
+    """A sample of the numbers of the native thread."""
+    n, k = len(robot.joint_names), len(robot.sensor_names)
+    q, qd, tau, wrench, ages = np.split(numbers[3:], np.cumsum([n, n, n, 6 * k]))
+    arrival, sequence, at = float(numbers[0]), int(numbers[1]), float(numbers[2])
+    return Sample(at, q, qd, tau, wrench.reshape(k, 6), arrival, sequence, ages)
+
+
+def missing_joints(naming: Naming, seen: list[str]) -> str:
+    """What to say where no joint state names all joints; `seen` are the names in them."""
+    missing = [name for name in naming.joint_names if name not in seen]
+    if not missing:
+        names = listing(naming.joint_names)
+        return f"{naming.source}: no joint state names all of {names} at once"
+    return (
+        f"{naming.source}: the joint states have no joint '{missing[0]}'"
+        f"{did_you_mean(missing[0], seen)}; they have {listing(seen)}; other names go under "
+        "`log: joint_names`"
+    )
 
 
 class _Ros:
@@ -202,8 +235,8 @@ class _Ros:
     def __init__(self, source: str) -> None:
         try:
             import rclpy
-            import rclpy.executors
             import rclpy.qos
+            import rclpy.signals
             from geometry_msgs.msg import WrenchStamped
             from sensor_msgs.msg import JointState
         except (ModuleNotFoundError, ImportError) as error:
@@ -211,121 +244,7 @@ class _Ros:
                 f"{source}: ROS 2 is not there ({error.name}): source a ROS 2 installation, or "
                 "pip install 'touchline[ros2]'"
             ) from None
-        self.rclpy, self.executors, self.qos = rclpy, rclpy.executors, rclpy.qos
+        self.rclpy, self.qos = rclpy, rclpy.qos
+        self.no_signals = rclpy.signals.SignalHandlerOptions.NO
+        self.rcl = find_rcl()
         self.joint_state, self.wrench = JointState, WrenchStamped
-
-
-class Merge:
-    """Makes samples of joint states and wrenches that come one after the other, without ROS.
-
-    Args:
-        description: of the robot.
-        naming: its names and factors in the messages.
-
-    Attributes:
-        streams: the joint states, then one for each sensor.
-    """
-
-    def __init__(self, description: RobotDescription, naming: Naming) -> None:
-        self._names = naming.joint_names
-        self._order: dict[tuple[str, ...], list[int] | None] = {}
-        self._source = naming.source
-        signals = ("q", "qd", "tau")
-        self._factors = [np.array([c.factor for c in naming.joints[s]]) for s in signals]
-        self._unused = [j for j, x in enumerate(description.joints) if not x.measured]
-        self._axes = np.full((len(description.sensors), 6), np.nan)
-        for k, sensor in enumerate(description.sensors):
-            for axis, column in naming.sensors[sensor.name].items():
-                self._axes[k, AXES.index(axis)] = column.factor
-        self._wrenches = np.full_like(self._axes, np.nan)
-        self._stamps = np.full(len(description.sensors), -np.inf)
-        # Wrenches that are newer than the last joint state.
-        self._coming: list[deque[tuple[float, Array]]] = [
-            deque(maxlen=AHEAD) for _ in description.sensors
-        ]
-        self.streams = (Stream("joints"), *(Stream(s.name) for s in description.sensors))
-        self._sequence = -1
-        self._without = 0  # joint states that did not name all joints, before the first that did
-        self._seen: dict[str, None] = {}
-
-    def wrench(self, k: int, at: float, values: Sequence[float], arrival: float) -> None:
-        """A wrench of sensor `k` (6,), stamped `at` [s]."""
-        measured = np.array(values) * self._axes[k]
-        has = np.isfinite(self._axes[k])
-        self.streams[1 + k].receive(at, arrival, bool(np.isfinite(measured[has]).all()))
-        coming = self._coming[k]
-        last = coming[-1][0] if coming else self._stamps[k]
-        if at < last - CLOCK:  # the clock was set back
-            coming.clear()
-            self._stamps[k] = -np.inf
-        if at > last or at < last - CLOCK:
-            coming.append((at, measured))
-
-    def joints(
-        self, at: float, names: Sequence[str], signals: Sequence[Any], arrival: float
-    ) -> Sample | None:
-        """A joint state stamped `at` [s]; None where it does not name all joints.
-
-        Raises:
-            InputError: the first joint states together lack a joint.
-        """
-        order = self._order_of(tuple(names))
-        if order is None:
-            return None
-        q, qd, tau = (
-            self._picked(values, len(names), order) * factors
-            for values, factors in zip(signals, self._factors, strict=True)
-        )
-        tau[self._unused] = np.nan
-        self._sequence += 1
-        self.streams[0].receive(at, arrival, bool(np.isfinite(q).all()))
-        for k, coming in enumerate(self._coming):
-            if at < self._stamps[k] - CLOCK:
-                self._stamps[k] = -np.inf
-            while coming and coming[0][0] <= at:
-                self._stamps[k], self._wrenches[k] = coming.popleft()
-        ages = at - self._stamps
-        wrench = self._wrenches.copy()
-        wrench[~self._is_near(ages)] = np.nan
-        return Sample(at, q, qd, tau, wrench, arrival, self._sequence, ages)
-
-    def _is_near(self, ages: Array) -> NDArray[np.bool_]:
-        periods = np.array([stream.period or 0.0 for stream in self.streams[1:]])
-        reach = np.clip(WRENCH_REACH * np.maximum(periods, self._period), 0.01, LONGEST_REACH)
-        return np.abs(ages) <= reach
-
-    @property
-    def _period(self) -> float:
-        return self.streams[0].period or 0.0
-
-    @staticmethod
-    def _picked(values: Any, count: int, order: list[int]) -> Array:
-        if len(values) != count:
-            return np.full(len(order), np.nan)
-        return np.asarray(values, dtype=float)[order]
-
-    def _order_of(self, names: tuple[str, ...]) -> list[int] | None:
-        """Where the robot's joints stand in a message; None where one is missing."""
-        if names not in self._order:
-            if len(self._order) > 64:
-                self._order.clear()
-            whole = set(self._names) <= set(names)
-            self._order[names] = [names.index(n) for n in self._names] if whole else None
-            self._seen |= dict.fromkeys(names)
-        order = self._order[names]
-        if order is None and self._sequence < 0:
-            self._without += 1
-            if self._without >= INCOMPLETE:
-                raise InputError(self._missing())
-        return order
-
-    def _missing(self) -> str:
-        seen = list(self._seen)
-        missing = [name for name in self._names if name not in seen]
-        if not missing:
-            return f"{self._source}: no joint state names all of {listing(self._names)} at once"
-        return (
-            f"{self._source}: the joint states have no joint '{missing[0]}'"
-            f"{did_you_mean(missing[0], seen)}; they have {listing(seen)}; other names go under "
-            "`log: joint_names`"
-        )

@@ -51,17 +51,14 @@ SCHEMES: dict[str, tuple[str, Callable[[Address, Robot], Source]]] = {
 def make_source(source: str, robot: Robot) -> Source:
     """The source of an address, not opened yet.
 
-    What is read by Python code of others (ROS 2, Franka's library) is read in a process of its
-    own, so that nothing this program does costs a sample.
+    What is read by Python code of others (Franka's library) is read in a process of its own, so
+    that nothing this program does costs a sample.
 
     Raises:
         InputError: the address is of no known kind, or cannot be a source of this robot.
     """
-    address = _parsed(source)
-    if address.scheme == "ros2":
-        return ReadAside(source, robot, ("joints", *robot.sensor_names))
     own = own_source(source, robot)
-    if address.scheme == "franka":
+    if _parsed(source).scheme == "franka":
         return ReadAside(source, robot, tuple(s.name for s in own.streams), own.period)
     return own
 

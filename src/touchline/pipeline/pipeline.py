@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Observer, detection, localization, classification and the record of events in one object."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from weakref import ref
@@ -344,6 +345,18 @@ class Pipeline:
         for lost in [*([s] for s in sensors), list(sensors)]:
             self._core.prepare(lost)  # the thread has no time to make them
         return core.Runner(self._core, slots)
+
+    def writer(
+        self, make: Callable[[core.Robot], core.TopicWriter] | None
+    ) -> core.TopicWriter | None:
+        """Publishes what is felt from the thread that feels, before Python sees it.
+
+        Args:
+            make: what publishes, of the core's robot; None: nobody publishes any more.
+        """
+        made = None if make is None else make(self._made)
+        core.publish_with(self._core, made)
+        return made
 
     def result(self, numbers: Array) -> Result:
         """What one sample brought, of the numbers that a native thread left."""
