@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """From a topic's publication to what is felt, beside its bare delivery by rclpy, in one run.
 
-python benchmarks/live_latency.py [SECONDS] [RATE]
+python benchmarks/live_latency.py [SECONDS] [RATE] [wrenches | torques]
+
+With `wrenches` (the default) the arm has torques and three force-torque sensors, each a topic of
+its own; with `torques` it has joint torques alone, and each contact is searched for everywhere.
 
 Three processes on this machine: an arm that publishes a motion with touches, the node, and this
 listener. All times are from the stamp that the arm gives a joint state when it publishes it. Of
@@ -25,6 +28,7 @@ os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 ARM = """
 import sys, time
 import rclpy
+from geometry_msgs.msg import WrenchStamped
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 import touchline as tl
@@ -36,6 +40,11 @@ s = demo(robot, 20.0, Run(noise=SensorNoise(), rate=rate)).samples
 rclpy.init()
 node = rclpy.create_node("arm")
 out = node.create_publisher(JointState, "/joint_states", qos_profile_sensor_data)
+sensors = [
+    (node.create_publisher(WrenchStamped, f"/{name}/wrench", qos_profile_sensor_data), values)
+    for name, values in zip(robot.sensor_names, s.wrench.transpose(1, 0, 2).tolist())
+]
+load = WrenchStamped()
 message = JointState(name=list(robot.joint_names))
 rows = [[x.tolist() for x in row] for row in zip(s.q, s.qd, s.tau)]
 while out.get_subscription_count() < 2:  # the node and the listener
@@ -47,7 +56,12 @@ for i in range(int(rate * seconds)):
     while (wait := begin + i / rate - time.monotonic()) > 0:
         time.sleep(wait)
     seconds_, rest = divmod(time.time_ns(), 10**9)
+    load.header.stamp = message.header.stamp
     message.header.stamp.sec, message.header.stamp.nanosec = seconds_, rest
+    for publisher, values in sensors:
+        force, torque = load.wrench.force, load.wrench.torque
+        force.x, force.y, force.z, torque.x, torque.y, torque.z = values[i % len(rows)]
+        publisher.publish(load)
     out.publish(message)
 print(int(rate * seconds), flush=True)
 sys.stdin.read()
@@ -56,10 +70,13 @@ STAMP, ENCAPSULATION = struct.Struct("<iI"), 4  # of a message's header, behind 
 TIME, NOTHING = b'"time": ', b'"contacts": []'
 DRAIN = 3.0  # s in which what was published last is counted
 START = 1.0  # s: the samples of the start wait until the arm has been looked at
-ROBOT = """name: sara-joints
+TORQUES = """name: sara-joints
 model: {model}
 joints: [{joints}]
 """
+TOPICS = (
+    "log: {topics: {wrench: {base: /base/wrench, wrist: /wrist/wrench, handle: /handle/wrench}}}"
+)
 
 
 def main() -> None:
@@ -67,7 +84,7 @@ def main() -> None:
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 30.0
     rate = float(sys.argv[2]) if len(sys.argv) > 2 else 1000.0
     with tempfile.TemporaryDirectory() as folder:
-        robot = _robot(Path(folder))
+        robot = _robot(Path(folder), "torques" not in sys.argv[3:])
         arm = [sys.executable, "-c", ARM, str(robot), str(rate), str(seconds)]
         parameters = ["-p", f"robot:={robot}", "-p", "source:=ros2://?wait=60", "-p", "force:=true"]
         node = [sys.executable, "-m", "touchline.live.node", "--ros-args", *parameters]
@@ -98,13 +115,17 @@ def main() -> None:
     print(f"load of this machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
 
 
-def _robot(folder: Path) -> Path:
+def _robot(folder: Path, wrenches: bool) -> Path:
     import touchline as tl
 
-    sara = tl.load_robot("sara-full").description
-    joints = ", ".join(f"{{name: {joint.name}, torque: sensor}}" for joint in sara.joints)
     path = folder / "robot.yaml"
-    path.write_text(ROBOT.format(model=sara.model, joints=joints))
+    sara = tl.load_robot("sara-full").description
+    assert sara.path is not None
+    if wrenches:
+        path.write_text(sara.path.read_text() + TOPICS)
+        return path
+    joints = ", ".join(f"{{name: {joint.name}, torque: sensor}}" for joint in sara.joints)
+    path.write_text(TORQUES.format(model=sara.model, joints=joints))
     return path
 
 

@@ -48,9 +48,7 @@ TAKE = ctypes.CFUNCTYPE(
     ctypes.POINTER(Info),
     ctypes.c_void_p,
 )
-PUBLISH = ctypes.CFUNCTYPE(
-    ctypes.c_int, ctypes.c_void_p, ctypes.POINTER(Bytes), ctypes.c_void_p
-)
+PUBLISH = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.POINTER(Bytes), ctypes.c_void_p)
 
 
 class FakeRcl:

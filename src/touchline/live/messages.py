@@ -26,7 +26,6 @@ from touchline.result.contact import Contact
 from touchline.touch.touch import TouchEvent
 
 Array = NDArray[np.float64]
-TopicWriter = core.TopicWriter
 
 METRES_PER_NEWTON = 0.01  # length of arrows
 SHAFT, HEAD, POINT = 0.008, 0.02, 0.02  # m
@@ -60,7 +59,9 @@ class Messages:
         self._forces = [name for name in robot.segment_names if name != "root"]
         self._drawn = 0
 
-    def writer(self, core_robot: core.Robot, rcl: Rcl, publishers: Mapping[str, Any]) -> TopicWriter:
+    def writer(
+        self, core_robot: core.Robot, rcl: Rcl, publishers: Mapping[str, Any]
+    ) -> core.TopicWriter:
         """What publishes contacts, torques and wrenches from the thread that feels.
 
         Args:
@@ -70,7 +71,7 @@ class Messages:
         """
         pointers = {name: publisher.handle.pointer for name, publisher in publishers.items()}
         segments = enumerate(self._robot.segment_names)
-        return TopicWriter(
+        return core.TopicWriter(
             core_robot,
             self._frame,
             rcl.publish,
@@ -224,4 +225,3 @@ def wrench_topic(segment: str) -> str:
     """The topic of a segment's wrench; a name of ROS has letters, digits and underscores."""
     plain = "".join(c if c.isalnum() and c.isascii() else "_" for c in segment)
     return f"~/{plain if not plain[:1].isdigit() else '_' + plain}/wrench"
-

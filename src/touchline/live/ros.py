@@ -87,7 +87,10 @@ class RosTopics:
             *(self._subscribe(ros.wrench, wrenches[name]) for name in self._robot.sensor_names),
         ]
         self._reader = make_reader(
-            self._robot.description, self._naming, ros.rcl, [s.handle.pointer for s in subscriptions]
+            self._robot.description,
+            self._naming,
+            ros.rcl,
+            [s.handle.pointer for s in subscriptions],
         )
         atexit.register(self.close)  # the native thread must not outlive what it reads
         if self._felt is not None:
