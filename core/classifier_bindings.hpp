@@ -48,8 +48,7 @@ inline void bind(nb::module_& m) {
             new (self) tl::BlowLimits{onset, collision, std::move(joints)};
           },
           "onset"_a, "collision"_a, "joints"_a);
-  nb::class_<Classifier> classifier(m, "Classifier");
-  classifier
+  nb::class_<Classifier>(m, "Classifier")
       .def(
           "__init__",
           [](Classifier* self, const guard::Shared<tl::Observer>& observer,
@@ -58,8 +57,6 @@ inline void bind(nb::module_& m) {
           },
           "observer"_a, "limits"_a)
       .def("follow", &follow, "time"_a, "rows"_a, "levels"_a);
-  classifier.attr("WINDOW") = tl::ForceHistory::kWindow;
-  classifier.attr("LEVER") = tl::Classifier::kLever;
 }
 
 }  // namespace classification

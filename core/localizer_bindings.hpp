@@ -87,13 +87,6 @@ inline void bind(nb::module_& m) {
   nb::class_<tl::LocalizerSettings>(m, "LocalizerSettings")
       .def(nb::init<>())
       .def_rw("friction", &tl::LocalizerSettings::friction)
-      .def_rw("cone_softness", &tl::LocalizerSettings::cone_softness)
-      .def_rw("force_scale", &tl::LocalizerSettings::force_scale)
-      .def_rw("place_scale", &tl::LocalizerSettings::place_scale)
-      .def_rw("pitch_limit", &tl::LocalizerSettings::pitch_limit)
-      .def_rw("least_force", &tl::LocalizerSettings::least_force)
-      .def_rw("certain", &tl::LocalizerSettings::certain)
-      .def_rw("place_radius", &tl::LocalizerSettings::place_radius)
       .def_rw("finger", &tl::LocalizerSettings::finger)
       .def_rw("first_entry", &tl::LocalizerSettings::first_entry);
   nb::class_<tl::LinkSurface>(m, "LinkSurface")

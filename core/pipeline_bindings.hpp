@@ -14,6 +14,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -30,6 +31,27 @@ namespace pipelines {
 namespace nb = nanobind;
 namespace tl = touchline;
 using namespace nb::literals;
+
+// Each number of a tuning: its name with the module, its unit, and its value.
+inline nb::list numbers(const tl::Tuning& tuning) {
+  nb::list all;
+  tl::Tuning::visit(tuning, [&](const char* module, const char* name, const char* unit,
+      auto value) {
+    all.append(nb::make_tuple(std::string(module) + "." + name, unit, value));
+  });
+  return all;
+}
+
+// Sets one of them; false if there is none of that name.
+inline bool set_number(tl::Tuning& tuning, const std::string& wanted, double to) {
+  bool found = false;
+  tl::Tuning::visit(tuning, [&](const char* module, const char* name, const char*, auto& value) {
+    if (std::string(module) + "." + name != wanted) return;
+    value = static_cast<std::decay_t<decltype(value)>>(to);
+    found = true;
+  });
+  return found;
+}
 
 // The pipeline, and what a user of Python may ask for later: the events that have ended.
 struct Pipeline {
@@ -336,7 +358,9 @@ inline void bind(nb::module_& m) {
       .def(nb::init<>())
       .def_rw("method", &tl::Tuning::method)
       .def_rw("discretization", &tl::Tuning::discretization)
-      .def_rw("localizer", &tl::Tuning::localizer);
+      .def_rw("first_entry", &tl::Tuning::first_entry)
+      .def("numbers", &numbers, nb::sig("def numbers(self) -> list[tuple[str, str, float]]"))
+      .def("set_number", &set_number, "name"_a, "value"_a);
   nb::class_<tl::Pushes>(m, "Pushes")
       .def("__init__",
            [](tl::Pushes* self, double friction, double reach) {

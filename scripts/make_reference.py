@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes docs/reference from the code: robot.yaml, logs, results and the command line.
+"""Writes docs/reference from the code: robot.yaml, logs, results, commands and tuning.
 
     python scripts/make_reference.py [--check]
 
@@ -7,6 +7,7 @@ With --check nothing is written; the exit status is 1 if a page is old.
 """
 
 import inspect
+import json
 import re
 import sys
 from collections.abc import Iterable
@@ -21,8 +22,12 @@ from touchline.report.outputs import CONTACT_SCHEMA
 from touchline.result.contact import Candidate, Contact
 from touchline.result.event import Event
 from touchline.result.native import CONTACT
+from touchline.tuning import DEFAULTS
 
-FOLDER = Path(__file__).parents[1] / "docs" / "reference"
+REPOSITORY = Path(__file__).parents[1]
+FOLDER = REPOSITORY / "docs" / "reference"
+DETAIL = REPOSITORY / "core" / "include" / "touchline" / "detail"
+SENSITIVITY = REPOSITORY / "benchmarks" / "tuning.json"
 NOTE = "<!-- Written by scripts/make_reference.py; changes by hand are lost. -->\n\n"
 TYPES = {
     "f8": "number",
@@ -210,7 +215,10 @@ def results() -> str:
                     "`postures.parquet`",
                     "`time` [s] and joint positions [rad or m], 100 a second at most",
                 ],
-                ["`analysis.json`", "what the results were made from, for `touchline view`"],
+                [
+                    "`analysis.json`",
+                    "what the results were made from: robot, findings, tuning, for later",
+                ],
             ],
         )
     )
@@ -289,7 +297,87 @@ def _default(value: object) -> str:
     return str(value)
 
 
+MODULES = {  # in the order of a sample's way
+    "gates": "Is what a channel reports possible?",
+    "observer": "Wrenches of segments, torques of joints.",
+    "detector": "Is a segment touched?",
+    "place": "Where one force explains what is measured, and how sure that is.",
+    "localizer": "One or several contacts on a segment, over time.",
+    "classifier": "Contact or collision, clamped or free.",
+    "events": "From contacts to events.",
+}
+MEMBER = re.compile(r"^  (?:double|int) (\w+) = ([^;]+);$")
+
+
+def tuning_numbers(module: str) -> Iterable[tuple[str, str, str]]:
+    """Heading, name and comment of each member of a module's tuning."""
+    path = DETAIL / module / "tuning.hpp"
+    heading, comment, ended = "", "", True
+    for line in path.read_text().splitlines():
+        if match := re.match(r"^  // -+ (.+?) -+$", line):
+            heading, comment = match[1], ""
+        elif match := re.match(r"^  // (.+)$", line):
+            comment = match[1] if ended else f"{comment} {match[1]}"
+            ended = False
+        elif match := MEMBER.match(line):
+            yield heading, match[1], comment
+            ended = True
+
+
+def tuning() -> str:
+    """Every number that the estimation is tuned with."""
+    measured = json.loads(SENSITIVITY.read_text())["numbers"] if SENSITIVITY.exists() else {}
+    parts = [
+        "# Tuning\n\n"
+        + NOTE
+        + "Every number that is neither physics nor a robot's own is a member of "
+        "`touchline::Tuning`. `print(tl.Tuning())` lists all of them, `analysis.json` records "
+        "those in use, and `tl.Pipeline(robot, tuning={NAME: VALUE})` changes some. The defaults "
+        "serve all robots: a robot's own thresholds come from `touchline calibrate`.\n\n"
+        "The text says what is to be expected of half and of double. The last two columns say "
+        "what they did: see [below](#what-was-measured).\n"
+    ]
+    for module, about in MODULES.items():
+        parts.append(f"\n## {module}\n\n{about}\n")
+        rows: dict[str, list[list[str]]] = {}
+        before = ""
+        for heading, name, comment in tuning_numbers(module):
+            full = f"{module}.{name}"
+            unit = "" if DEFAULTS.unit(full) == "1" else DEFAULTS.unit(full)
+            effects = measured.get(full, {})
+            text = "as above" if comment == before else comment
+            before = comment
+            cells = [effects.get("half", "-"), effects.get("double", "-")]
+            rows.setdefault(heading, []).append(
+                [f"`{name}`", f"{DEFAULTS[full]:g}", unit, text, *cells]
+            )
+        for heading, lines in rows.items():
+            title = f"\n### {heading}\n\n" if heading else "\n"
+            parts.append(title + table("number|default|unit|meaning|half|double", lines))
+    return "".join(parts) + _measured()
+
+
+def _measured() -> str:
+    if not SENSITIVITY.exists():
+        return "\n## What was measured\n\nNothing yet: `touchline bench tuning`.\n"
+    found = json.loads(SENSITIVITY.read_text())
+    return (
+        "\n## What was measured\n\n"
+        "`touchline bench tuning --out benchmarks/tuning.json` has run these recordings with each "
+        "number halved and doubled, one at a time:\n\n"
+        + "".join(f"* {line}\n" for line in found["recordings"])
+        + "\nWith the defaults: "
+        + found["default"]
+        + ".\n\nThe columns tell what has become different of that. `=` means that not one event "
+        "has changed in any way. `~` means that events have changed, but none of these figures "
+        "by a step that counts. A small benchmark shows what is "
+        "touchy, not what is best: a number without an effect here may matter on a real robot, "
+        "for other layouts, or for faults that do not occur here.\n\n" + found["summary"] + "\n"
+    )
+
+
 PAGES = {
+    "tuning.md": tuning,
     "robot_yaml.md": robot_yaml,
     "logs.md": logs,
     "results.md": results,

@@ -25,6 +25,7 @@ from touchline.result.fault import ChannelFault, FaultChange
 from touchline.result.kinds import ContactLevel, Fault, Happened, Status, Watch, Zone
 from touchline.result.reset import Reset, ResetChange
 from touchline.result.standing import Standing
+from touchline.tuning import Tuning
 
 if TYPE_CHECKING:
     from touchline import live as live
@@ -63,6 +64,7 @@ __all__ = [
     "Robot",
     "Standing",
     "Status",
+    "Tuning",
     "Watch",
     "Zone",
     "load_robot",

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from touchline.bench.matching import match
 from touchline.bench.real.judged import Touched, judge_free, judge_touched
-from touchline.bench.real.matching import match
 from touchline.bench.real.recordings import Recording, at_rate
 from touchline.cli import main
 from touchline.model.robot import load_robot

@@ -31,16 +31,16 @@ class Pipeline {
   explicit Pipeline(Robot robot, const Tuning& tuning = {})
       : robot_(checked(std::move(robot))),
         tuning_(tuning),
-        observer_(Tree(robot_.nodes, robot_.gravity), robot_.joints, robot_.sensors, tuning.method,
-                  tuning.discretization),
-        detector_(observer_, robot_.rows, robot_.detection),
+        observer_(Tree(robot_.nodes, robot_.gravity), robot_.joints, robot_.sensors, tuning_.method,
+                  tuning_.discretization, tuning_.observer),
+        detector_(observer_, robot_.rows, robot_.detection, tuning_.detector),
         localizer_(observer_, robot_.rows, robot_.noise, std::move(robot_.surfaces),
-                   with_pushes(tuning.localizer, robot_.pushes)),
-        classifier_(observer_, robot_.blows),
+                   localizer_settings(tuning_, robot_.pushes)),
+        classifier_(observer_, robot_.blows, tuning_.classifier),
         recorder_(robot_, observer_, localizer_),
-        rest_(observer_.row_layout()),
+        rest_(observer_.row_layout(), tuning_.observer),
         resets_(observer_.row_layout()),
-        period_(robot_.noise.period),
+        period_(robot_.noise.period, tuning_.events),
         levels_(robot_.segment_names.size(), 0.0),
         watch_(levels_.size(), Watch::blind),
         contacts_(robot_.segment_names.size() * Reports::kMost) {}
@@ -106,7 +106,12 @@ class Pipeline {
   std::size_t rows() const { return robot_.rows.size(); }  // of the detector
 
  private:
-  static LocalizerSettings with_pushes(LocalizerSettings settings, const Pushes& pushes) {
+  static LocalizerSettings localizer_settings(const Tuning& tuning, const Pushes& pushes) {
+    LocalizerSettings settings;
+    static_cast<PlaceTuning&>(settings) = tuning.place;
+    static_cast<LocalizerTuning&>(settings) = tuning.localizer;
+    settings.first_entry = tuning.first_entry;
+    settings.gap_sigmas = tuning.detector.gap_sigmas;
     settings.friction = pushes.friction;
     settings.finger = pushes.reach;
     return settings;

@@ -42,8 +42,8 @@ class RedundantPipeline {
  public:
   explicit RedundantPipeline(Robot robot, const Tuning& tuning = {})
       : whole_(std::move(robot), tuning),
-        gates_(whole_.robot()),
-        parity_(whole_.robot(), whole_.observer()),
+        gates_(whole_.robot(), tuning.gates),
+        parity_(whole_.robot(), whole_.observer(), tuning.gates),
         resets_(whole_.row_layout()) {
     const Robot& own = whole_.robot();
     const std::size_t n = own.joints.size(), k = own.sensors.size();
@@ -201,7 +201,7 @@ class RedundantPipeline {
   // channel counts no more.
   void watch_parity(const Result& result, double time) {
     parity_.step(result, time, [&](std::size_t channel) {
-      until_[channel] = time + kContradicted;
+      until_[channel] = time + tuning().gates.contradicted;
       contradicted_ = true;
     });
   }
@@ -256,10 +256,6 @@ class RedundantPipeline {
     resets_.step(result.estimate.row().data(), [this](std::size_t i) { return restarts_[i]; });
     result.resets = resets();
   }
-
-  static constexpr double kContradicted = 2.0;  // [s] for which one that others contradict is out
-
-  static constexpr double kContinues = 0.05;  // [s] in which the next one feels what lasts, or not
 
   // An event under another number than the one its pipeline gave it; `before`: it goes on with an
   // event that had been detected then.
@@ -409,7 +405,7 @@ class RedundantPipeline {
     Result of_now = now_ != nullptr ? feed(*now_, sample) : of_whole;
     Second* const before = std::exchange(warming_, needed != now_ ? needed : nullptr);
     if (warming_ != nullptr && warming_ != before) teach(*warming_);
-    if (!waiting_.empty() && !(whole_.time() < handed_over_ + kContinues)) {
+    if (!waiting_.empty() && !(whole_.time() < handed_over_ + tuning().gates.continues)) {
       for (Event& event : waiting_) {
         event.cleared = handed_over_;
         tell(Happened::ended, event);

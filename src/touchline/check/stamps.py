@@ -5,10 +5,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.check.findings import Findings
+from touchline.tuning import DEFAULTS
 
 Array = NDArray[np.float64]
 
-GAP = 3.5  # periods; the observer starts anew after a longer step
+GAP = DEFAULTS["observer.gap_periods"]  # periods; the observer starts anew after a longer step
 FEW = 0.005
 JITTER = 0.3  # of the period, standard deviation
 SLOW, FAST = 0.5, 2e-5  # s; a robot is not sampled slower or faster

@@ -4,7 +4,7 @@
 What counts as a blow is said here; the native `classifier.hpp` follows the samples.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -16,6 +16,7 @@ from touchline.detector.thresholds import RowThreshold, Thresholds
 from touchline.model.robot import Robot
 from touchline.native import core
 from touchline.observer.observer import Estimate, Observer
+from touchline.tuning import DEFAULTS
 
 Array = NDArray[np.float64]
 
@@ -72,23 +73,26 @@ class Classifier:
         return Classes(*self.core.follow(stamps, estimate.rows, levels))
 
 
-def blow_limits(robot: Robot, thresholds: Thresholds, zones: Zones) -> list[core.BlowLimits]:
+def blow_limits(
+    robot: Robot, thresholds: Thresholds, zones: Zones, tuning: Mapping[str, float] = DEFAULTS
+) -> list[core.BlowLimits]:
     """From when on a touch is a blow, for each segment, in the words of the native core."""
     limits = []
     for g, segment in enumerate(robot.segment_names):
         rows = [row for row in thresholds.rows if row.segment == g]
-        onset, collision = _blow(rows)
+        onset, collision = _blow(rows, tuning)
         torques = [row.joint for row in rows if row.joint >= 0] if segment == "root" else []
         limits.append(core.BlowLimits(max(zones.onset(segment), onset), collision, torques))
     return limits
 
 
-def _blow(rows: Sequence[RowThreshold]) -> tuple[float, float]:
+def _blow(rows: Sequence[RowThreshold], tuning: Mapping[str, float]) -> tuple[float, float]:
     """The least rate [N/s] and force [N] of a blow that the rows of a segment let tell."""
     forces, unit = [row for row in rows if row.component in (0, 1, 2)], 1.0
     if not forces:
-        forces, unit = [row for row in rows if row.joint >= 0], 1.0 / core.Classifier.LEVER
+        forces, unit = [row for row in rows if row.joint >= 0], 1.0 / tuning["classifier.lever"]
     if not forces:
         return np.inf, np.inf
     noise = unit * max(row.contact for row in forces)
-    return NOISE_RATIO * noise / core.Classifier.WINDOW, unit * min(r.collision for r in forces)
+    onset = NOISE_RATIO * noise / tuning["classifier.rate_window"]
+    return onset, unit * min(row.collision for row in forces)

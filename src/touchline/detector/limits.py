@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 
 from touchline.detector.chi_square import chi_square_limit, normal_limit
 from touchline.model.description import DetectionDescription, TailDescription
+from touchline.tuning import DEFAULTS
 
 Array = NDArray[np.float64]
 
-CUSUM_SHIFT = 1.0  # as `kShift` in core/include/touchline/detail/detector/detection_row.hpp
+CUSUM_SHIFT = DEFAULTS["detector.cusum_shift"]
 
 
 def threshold(tail: TailDescription, rate: float) -> float:

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import inverse_dynamics
+from touchline.tuning import DEFAULTS
 
 Array = NDArray[np.float64]
 
 ARMS, POSES = 6, 32  # that are drawn
-WAY = 0.75  # rad; as `kFar` in the native `baseline_posture.hpp`
+WAY = DEFAULTS["detector.drift_way"]  # rad
 
 
 def guess_drift(robot: Robot, error: float) -> tuple[Array, Array]:

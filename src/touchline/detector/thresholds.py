@@ -17,12 +17,14 @@ from touchline.model.description import (
     Vector,
 )
 from touchline.model.robot import Robot
+from touchline.tuning import DEFAULTS
 
 Array = NDArray[np.float64]
 
 SIGMAS = 6.0  # contact thresholds lie this many standard deviations of the residual out
 FORCE_FLOOR, MOMENT_FLOOR, TORQUE_FLOOR = 0.5, 0.1, 0.1  # N, Nm, Nm: models are not better
-PERIOD_RATIO = 1.2  # a calibration holds for sample periods within this ratio of its own
+# A calibration holds for sample periods within this ratio of its own.
+PERIOD_RATIO = DEFAULTS["events.period_ratio"]
 COLLISION_RATIO = 4.0
 COLLISION_FORCE = 15.0  # N; below it nothing is called a collision unless the user says so
 COLLISION_EFFORT = 0.2  # of a joint's effort limit

@@ -13,10 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.tuning import DEFAULTS
+
 Array = NDArray[np.float64]
 
-LONGEST = 3.5  # periods; an interval longer than this is not integrated over
-SETTLING = 5.0  # time constants after a start
+LONGEST = DEFAULTS["observer.gap_periods"]  # longer intervals are not integrated over
+SETTLING = DEFAULTS["observer.settled_steps"]  # time constants after a start
 
 
 @dataclass(frozen=True)

@@ -25,14 +25,19 @@ TORQUE_ERROR = 0.02  # a joint's torque sensor is no better, and a touch is no p
 MODEL_ERROR = 0.02  # masses and inertias of a good model from CAD are no better
 
 
+def require_rule(rule: str) -> None:
+    """Raises ValueError for a rule that there is not."""
+    if rule not in RULES:
+        raise ValueError(f"rule is '{rule}', allowed: {', '.join(RULES)}")
+
+
 def localizer_settings(rule: str, pushes: PushDescription) -> core.LocalizerSettings:
     """In the words of the native core.
 
     Raises:
         ValueError: for an unknown rule.
     """
-    if rule not in RULES:
-        raise ValueError(f"rule is '{rule}', allowed: {', '.join(RULES)}")
+    require_rule(rule)
     settings = core.LocalizerSettings()
     settings.friction, settings.finger = pushes.friction, pushes.reach
     settings.first_entry = rule == "paper"

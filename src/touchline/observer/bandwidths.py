@@ -2,8 +2,9 @@
 """Bandwidths in use, beside the sample rate."""
 
 from touchline.model.robot import Robot
+from touchline.tuning import DEFAULTS
 
-TUSTIN_LIMIT, RINGING = 0.5, 1.0  # of bandwidth times period
+TUSTIN_LIMIT, RINGING = DEFAULTS["observer.tustin_steps"], 1.0  # of bandwidth times period
 SUGGESTED = 1 / 3
 
 

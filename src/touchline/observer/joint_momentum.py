@@ -21,13 +21,16 @@ from touchline.observer.dynamics import (
 )
 from touchline.observer.observer import DISCRETIZATIONS
 from touchline.observer.readings import read_torque
+from touchline.tuning import DEFAULTS
 
 Array = NDArray[np.float64]
 
-TUSTIN_LIMIT = 0.5  # K dt up to which `automatic` takes Tustin's rule
-# As the extended observer (`tuning.hpp`): steps of up to so many median ones are no gap; a gap is
-# integrated over up to so many time constants, but not beyond so much time [s].
-GAP_PERIODS, BRIDGED_STEPS, LONGEST_BRIDGE = 3.5, 2.0, 0.1
+TUSTIN_LIMIT = DEFAULTS["observer.tustin_steps"]  # K dt up to which `automatic` takes Tustin's rule
+# As the extended observer: steps of up to so many median ones are no gap; a gap is integrated over
+# up to so many time constants, but not beyond so much time [s].
+GAP_PERIODS = DEFAULTS["observer.gap_periods"]
+BRIDGED_STEPS = DEFAULTS["observer.bridged_steps"]
+LONGEST_BRIDGE = DEFAULTS["observer.longest_bridge"]
 BLOCK = 4096  # samples whose matrices are held at a time
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A robot with its surfaces and thresholds in the words of the native core, and as a file of it."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from touchline.classifier.classifier import blow_limits
@@ -25,6 +26,7 @@ def native_robot(
     wrench_error: float,
     torque_error: float,
     pushes: PushDescription,
+    tuning: Mapping[str, float],
 ) -> core.Robot:
     """All that the native pipeline has to know of a robot; arguments as of `Pipeline`."""
     zones = Zones(robot)
@@ -40,7 +42,7 @@ def native_robot(
     native.rows = native_rows(thresholds)
     native.detection = native_settings(robot, thresholds, period)
     native.noise = native_noise(robot, period, wrench_error, torque_error)
-    native.blows = blow_limits(robot, thresholds, zones)
+    native.blows = blow_limits(robot, thresholds, zones, tuning)
     native.segment_zones = [_zone(zones.of(segment)) for segment in robot.segment_names]
     native.surfaces = native_surfaces(robot, skin)
     native.pushes = core.Pushes(pushes.friction, pushes.reach)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Observer, detection, localization, classification and the record of events in one object."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from weakref import ref
@@ -15,7 +15,7 @@ from touchline.localizer.localizer import (
     MODEL_ERROR,
     TORQUE_ERROR,
     expected_pushes,
-    localizer_settings,
+    require_rule,
 )
 from touchline.localizer.region import Region
 from touchline.localizer.skin import Skin
@@ -34,10 +34,11 @@ from touchline.result.native import Names
 from touchline.result.reset import ResetChange, estimate_names, resets_in
 from touchline.result.standing import Standing
 from touchline.suggest import unknown
+from touchline.tuning import DEFAULTS, Tuning, native_tuning
 
 Array = NDArray[np.float64]
 
-REST = 0.5  # s that an arm must have stood still before a tare: the mean of so long
+REST = DEFAULTS["observer.rest_window"]  # s that an arm must have stood still before a tare
 
 
 @dataclass(frozen=True)
@@ -76,11 +77,13 @@ class Pipeline:
         model_error: 1 sigma of the relative error of the model's masses and inertias, for the
             localizer's weights where the robot is not calibrated; 0: the model is right.
         thresholds: of the detector; default: those of the robot's description.
+        tuning: the numbers that the estimation is tuned with, if some shall not be the default.
 
     Attributes:
         robot: the robot.
         thresholds: of the detector.
         skin: the robot's surfaces.
+        tuning: all numbers that the estimation is tuned with.
         contacts: of the last `run`, a row for each contact and sample.
         watch: (N, m) of the last `run`: can a touch of each segment be felt (`tl.Watch`, by number:
             0 watched, 1 degraded, 2 blind)?
@@ -104,6 +107,7 @@ class Pipeline:
         friction: float | None = None,
         model_error: float = MODEL_ERROR,
         thresholds: Thresholds | None = None,
+        tuning: Mapping[str, float] | None = None,
     ) -> None:
         if not (np.isfinite(period) and period > 0.0):
             raise ValueError(f"period is {period}, but must be a positive number [s]")
@@ -115,12 +119,13 @@ class Pipeline:
         self.thresholds = thresholds
         self.skin = skin or Skin(robot)
         self.skin.check_robot(robot)
-        tuning = core.Tuning()
-        tuning.method = getattr(core.Method, method)
+        require_rule(rule)
+        self.tuning = Tuning(tuning)
+        native = native_tuning(self.tuning, rule)
+        native.method = getattr(core.Method, method)
         pushes = expected_pushes(robot, friction)
-        tuning.localizer = localizer_settings(rule, pushes)
         self._method = method
-        self._weights = period, bandwidth, wrench_error, torque_error, pushes
+        self._weights = period, bandwidth, wrench_error, torque_error, pushes, self.tuning
         self._model_error = model_error
         own = ref(self)  # the native pipeline must not keep this one alive
 
@@ -129,7 +134,7 @@ class Pipeline:
             return pipeline._stand_in(lost) if pipeline is not None else None
 
         self._made = self._native()
-        self._core = core.Pipeline(self._made, tuning, build)
+        self._core = core.Pipeline(self._made, native, build)
         self._update = self._core.update
         names = Names.of(
             robot.segment_names,

@@ -164,6 +164,7 @@ def analyze(
             where = origin or str(log.resolve())
             facts = _origin(analysis) | {"findings": found}
             facts |= {"standing": [s.to_dict() for s in unlike_told(analysis.standing)]}
+            facts |= {"tuning": dict(pipeline.tuning)}
             write_origin(folder.draft / ANALYSIS, where, source, facts)
             if report != "none":
                 from touchline.report.page import page_text

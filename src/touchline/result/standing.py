@@ -5,7 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-NOISIER = 1.5  # times told; noise figures are no better than this, as in the core
+from touchline.tuning import DEFAULTS
+
+NOISIER = DEFAULTS["detector.noisier"]  # times told
 MOST = 4  # of signals that a line names; the largest come first
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.bench.real.matching import match
+from touchline.bench.matching import match
 from touchline.bench.real.recordings import Recording
 from touchline.pipeline.pipeline import Pipeline
 from touchline.result.event import Event

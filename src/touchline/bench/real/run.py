@@ -8,6 +8,7 @@ log's columns, all else is what a new robot starts with.
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from touchline.bench.matching import MARGIN
 from touchline.bench.real.judged import (
     Free,
     Touched,
@@ -15,7 +16,6 @@ from touchline.bench.real.judged import (
     judge_free,
     judge_touched,
 )
-from touchline.bench.real.matching import MARGIN
 from touchline.bench.real.recordings import at_rate, read_free, read_touched, touched_files
 from touchline.bench.tables import Row, aligned
 from touchline.errors import InputError

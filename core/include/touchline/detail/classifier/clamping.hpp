@@ -2,34 +2,34 @@
 // Clamped or free: do forces on two sides oppose each other? That is two forces of comparable size
 // in opposite directions: of two segments, which is always seen, or of two contacts on one segment,
 // where they can be told apart. No allocation per sample.
+// Theory: docs/theory.md, section 7.2.
 #pragma once
 
 #include <algorithm>
 #include <limits>
 #include <vector>
 
+#include "touchline/detail/classifier/tuning.hpp"
 #include "touchline/detail/localizer/reports.hpp"
 
 namespace touchline {
 
 // Two forces of comparable size against each other.
-inline bool opposed(const Vec3& a, const Vec3& b) {
-  constexpr double kLeastForce = 5.0;            // N
-  constexpr double kRatio = 0.3, kCosine = -0.5;  // of the smaller to the larger, of their angle
+inline bool opposed(const Vec3& a, const Vec3& b, const ClassifierTuning& t) {
   const double x = norm(a), y = norm(b);
-  return x > kLeastForce && y > kLeastForce && std::min(x, y) > kRatio * std::max(x, y) &&
-         dot(a, b) < kCosine * (x * y);
+  return x > t.opposed_force && y > t.opposed_force &&
+         std::min(x, y) > t.opposed_ratio * std::max(x, y) &&
+         dot(a, b) < t.opposed_cosine * (x * y);
 }
 
 // Since when something has held without a break.
 class Lasting {
  public:
-  static constexpr double kLeast = 0.02;  // for so long it must hold [s]
-
-  void follow(bool holds, double time) {
+  // `least`: for so long it must hold [s].
+  void follow(bool holds, double time, double least) {
     if (!holds) since_ = kNever;
     if (holds && since_ == kNever) since_ = time;
-    is_ = holds && time - since_ >= kLeast;
+    is_ = holds && time - since_ >= least;
   }
   bool is() const { return is_; }
 
@@ -41,7 +41,8 @@ class Lasting {
 
 class Clamping {
  public:
-  explicit Clamping(std::size_t segments) : forces_(segments), between_(segments), sides_(segments) {}
+  Clamping(std::size_t segments, const ClassifierTuning& tuning)  // which stays the caller's
+      : tuning_(tuning), forces_(segments), between_(segments), sides_(segments) {}
 
   // A sample: the segments' wrenches [N, Nm], what is not known NaN, and their levels.
   void step(double time, const double* wrenches, const double* levels) {
@@ -54,7 +55,7 @@ class Clamping {
       const bool against = std::any_of(forces_.begin(), forces_.end(), [&](const Vec3& other) {
         return opposed(forces_[g], other);
       });
-      between_[g].follow(against, time);
+      between_[g].follow(against, time, tuning_.opposed_time);
     }
   }
 
@@ -72,7 +73,7 @@ class Clamping {
       bool against = false;
       for (int i = 0; i < reports.count(); ++i)
         against = against || opposed(reports[k].answer, reports[i].answer);
-      side.lasting.follow(against, time_);
+      side.lasting.follow(against, time_, tuning_.opposed_time);
     }
   }
 
@@ -91,11 +92,12 @@ class Clamping {
   };
 
   static double known(double x) { return x == x ? x : 0.0; }
-  static bool opposed(const Vec3& a, const Vec3& b) { return touchline::opposed(a, b); }
-  static bool opposed(const Answer& a, const Answer& b) {
-    return placed(a) && placed(b) && touchline::opposed(a.force, b.force);
+  bool opposed(const Vec3& a, const Vec3& b) const { return touchline::opposed(a, b, tuning_); }
+  bool opposed(const Answer& a, const Answer& b) const {
+    return placed(a) && placed(b) && opposed(a.force, b.force);
   }
 
+  const ClassifierTuning& tuning_;
   std::vector<Vec3> forces_;
   std::vector<Lasting> between_;
   std::vector<Sides> sides_;

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Contact or collision, and clamped or free: what kind of touch each segment feels. A collision
 // begins fast: the force grows by more than `onset` to more than `collision`. What has not begun so
-// within kPatience is a contact; a later blow makes it a collision. Forces have passed the
-// observer's low-pass, which shows a step of F as a rate of at most 0.63 F / kWindow (K = 100).
+// within `decide_within` is a contact; a later blow makes it a collision. Forces have passed the
+// observer's low-pass, which shows a step of F as a rate of at most 0.63 F / `rate_window` (K = 100).
 // No allocation per sample.
+// Theory: docs/theory.md, section 7.1.
 #pragma once
 
 #include <algorithm>
@@ -15,6 +16,7 @@
 
 #include "touchline/detail/classifier/clamping.hpp"
 #include "touchline/detail/classifier/force_history.hpp"
+#include "touchline/detail/classifier/tuning.hpp"
 #include "touchline/detail/observer/observer.hpp"
 
 namespace touchline {
@@ -30,18 +32,16 @@ struct BlowLimits {
 
 class Classifier {
  public:
-  static constexpr double kPatience = 0.05;  // after detection, for a collision to show [s]
-  static constexpr double kLever = 0.5;      // joint torques count as forces at this distance [m]
-  static constexpr double kLeading = 0.5;    // of a segment's load: a blow is this contact's
-
-  Classifier(const Observer& observer, std::vector<BlowLimits> limits)
-      : row_(observer.row_layout()),
+  Classifier(const Observer& observer, std::vector<BlowLimits> limits,
+             const ClassifierTuning& tuning = {})
+      : tuning_(tuning),
+        row_(observer.row_layout()),
         limits_(std::move(limits)),
         bandwidths_(limits_.size()),
         sizes_(limits_.size()),
         touches_(limits_.size()),
-        history_(limits_.size()),
-        clamping_(limits_.size()) {
+        history_(limits_.size(), tuning_.rate_window),
+        clamping_(limits_.size(), tuning_) {
     bool good = limits_.size() == static_cast<std::size_t>(row_.segments);
     for (const BlowLimits& of_segment : limits_) {
       for (const int joint : of_segment.joints) good = good && joint >= 0 && joint < row_.joints;
@@ -55,6 +55,9 @@ class Classifier {
       }
     }
   }
+
+  Classifier(const Classifier&) = delete;
+  Classifier& operator=(const Classifier&) = delete;
 
   std::size_t width() const { return static_cast<std::size_t>(row_.width()); }
   std::size_t segments() const { return limits_.size(); }
@@ -74,7 +77,7 @@ class Classifier {
   Kind kind(int g) const { return touches_[g].kind; }
   // Of a contact that carries this share of the load on segment g.
   Kind kind(int g, double share) const {
-    return share >= kLeading ? kind(g) : std::min(kind(g), Kind::contact);
+    return share >= tuning_.leading_share ? kind(g) : std::min(kind(g), Kind::contact);
   }
   // Contact k on segment g.
   bool clamped(int g, int k) const { return clamping_(g, k); }
@@ -96,7 +99,7 @@ class Classifier {
     double most = 0.0;
     for (const int joint : limits_[g].joints)
       most = std::fmax(most, std::fabs(row[row_.segment_torque() + joint]));
-    return most / kLever;
+    return most / tuning_.lever;
   }
 
   void decide(int g, bool touched) {
@@ -111,11 +114,12 @@ class Classifier {
     const bool strong = sizes_[g] + touch.rate / bandwidths_[g] > limits.collision;
     if (touch.rate > limits.onset && strong) {
       touch.kind = Kind::collision;
-    } else if (touch.kind == Kind::undecided && time_ >= touch.begin + kPatience) {
+    } else if (touch.kind == Kind::undecided && time_ >= touch.begin + tuning_.decide_within) {
       touch.kind = Kind::contact;
     }
   }
 
+  ClassifierTuning tuning_;
   RowLayout row_;
   std::vector<BlowLimits> limits_;
   std::vector<double> bandwidths_, sizes_;  // of the segments' wrenches [rad/s], forces [N]

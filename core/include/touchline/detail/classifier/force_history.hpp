@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // How large the force on each segment was over the last moments, and how fast it grows. No
 // allocation per sample.
+// Theory: docs/theory.md, section 7.1.
 #pragma once
 
 #include <algorithm>
@@ -13,10 +14,9 @@ namespace touchline {
 
 class ForceHistory {
  public:
-  static constexpr double kWindow = 0.01;  // over which the rate of a force is taken [s]
-
-  explicit ForceHistory(std::size_t segments)
-      : segments_(segments), times_(kMost), sizes_(kMost * segments) {}
+  // `window`: over which the rate of a force is taken [s].
+  ForceHistory(std::size_t segments, double window)
+      : segments_(segments), window_(window), times_(kMost), sizes_(kMost * segments) {}
 
   // The sizes [N] of the forces on all segments; `time` [s] must not go back.
   void add(double time, const double* sizes) {
@@ -24,7 +24,7 @@ class ForceHistory {
     const std::size_t at = index(count_++);
     times_[at] = time;
     std::copy(sizes, sizes + segments_, sizes_.data() + at * segments_);
-    while (count_ > 1 && times_[index(1)] <= time - kWindow) drop();
+    while (count_ > 1 && times_[index(1)] <= time - window_) drop();
   }
 
   // How fast the force on segment g grew over the window, or since the beginning [N/s].
@@ -35,7 +35,7 @@ class ForceHistory {
   }
 
  private:
-  static constexpr std::size_t kMost = 512;  // samples: at more than 51 kHz the window is shorter
+  static constexpr std::size_t kMost = 512;  // room for samples: 10 ms at 51 kHz
 
   std::size_t index(std::size_t i) const { return (first_ + i) % kMost; }
   double size(std::size_t at, int g) const { return sizes_[at * segments_ + g]; }
@@ -45,6 +45,7 @@ class ForceHistory {
   }
 
   std::size_t segments_, first_ = 0, count_ = 0;
+  double window_;
   std::vector<double> times_, sizes_;
 };
 

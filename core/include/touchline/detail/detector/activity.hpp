@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Speed and acceleration of a robot from its noisy velocities.
+// Theory: docs/theory.md, section 4.6.
 #pragma once
 
 #include <algorithm>
@@ -12,11 +13,12 @@ namespace touchline {
 
 class ActivityMeter {
  public:
-  explicit ActivityMeter(std::size_t joints) : speed_(joints, 0.0) {}
+  // `time`: the time constant [s].
+  ActivityMeter(std::size_t joints, double time) : time_(time), speed_(joints, 0.0) {}
 
-  // Both are low-passed over `kTime`, so that a collision does not raise its own threshold.
+  // Both are low-passed, so that a collision does not raise its own threshold.
   void add(const double* qd, double dt) {
-    const double gain = started_ ? std::min(1.0, dt / kTime) : 1.0;
+    const double gain = started_ ? std::min(1.0, dt / time_) : 1.0;
     double speed2 = 0.0, acceleration2 = 0.0;
     for (std::size_t j = 0; j < speed_.size(); ++j) {
       const double off = started_ ? qd[j] - speed_[j] : 0.0;
@@ -25,14 +27,13 @@ class ActivityMeter {
       acceleration2 += off * off;
     }
     started_ = true;
-    activity_ = {speed2, std::sqrt(acceleration2) / kTime};
+    activity_ = {speed2, std::sqrt(acceleration2) / time_};
   }
 
   const Activity& activity() const { return activity_; }
 
  private:
-  static constexpr double kTime = 0.05;  // [s]
-
+  double time_;
   std::vector<double> speed_;
   Activity activity_;
   bool started_ = false;

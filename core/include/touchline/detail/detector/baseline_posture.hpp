@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // How far the arm has come from where the baseline of a segment was averaged: an error of the model
 // that the baseline has taken out comes back as the arm moves on. No allocation per sample.
+// Theory: docs/theory.md, section 4.6.
 #pragma once
 
 #include <algorithm>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "touchline/detail/detector/detection_row.hpp"
+#include "touchline/detail/detector/tuning.hpp"
 
 namespace touchline {
 
@@ -37,13 +39,13 @@ class BaselinePosture {
 
 // Variance of what the model's errors have added to a row since its baseline, `way2` [rad2] away.
 // The constant part is what an arm leaves on its way through ordinary motion. Weight changes with the
-// pose, about in proportion to the way as far as `kFarthest`. In a joint's own torque there is
+// pose, about in proportion to the way as far as `drift_farthest`. In a joint's own torque there is
 // friction, too, all of which comes with motion.
-inline double drifted(const DetectionRow& row, const Activity& activity, double way2) {
-  constexpr double kFar = 0.75, kFarthest = 2.0, kMoving = 0.1;  // [rad], [rad], [rad/s]
-  double share = std::min(way2, kFarthest * kFarthest) / (kFar * kFar);
+inline double drifted(const DetectionRow& row, const Activity& activity, double way2,
+                      const DetectorTuning& t) {
+  double share = std::min(way2, t.drift_farthest * t.drift_farthest) / (t.drift_way * t.drift_way);
   if (row.component < 0)
-    share = std::max(share, std::min(1.0, activity.speed2 / (kMoving * kMoving)));
+    share = std::max(share, std::min(1.0, activity.speed2 / (t.drift_speed * t.drift_speed)));
   const double constant = row.drift.constant;
   return row.drift.variance(activity) + (share - 1.0) * constant * constant;
 }

@@ -3,6 +3,7 @@
 // passes a median of three first. One odd velocity, or one packet that is logged twice and then
 // replaced, is a blow and a counterblow for the filter and decays for 1 / K; a force lasts. The
 // median lags by one sample. No allocation.
+// Theory: docs/theory.md, section 4.7.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a detector tests, and what it is told of each row.
+// Theory: docs/theory.md, section 4.1.
 #pragma once
 
 #include <vector>
@@ -39,7 +40,7 @@ struct DetectionRow {
   int joint;
   double contact, collision;  // thresholds [N or Nm]
   double baseline_limit;      // how far the baseline may go from where it began [N or Nm]
-  ModelError slow, quick;     // against the baseline and against the reference of `kReference`
+  ModelError slow, quick;     // against the baseline and against the reference
   ModelError drift;           // against the baseline, while a contact lasts
   double seen = 0.0;          // sigmas of the noise, told and seen, that `contact` is kept above
 };
@@ -70,14 +71,5 @@ struct DetectionSettings {
   NoiseFigures noise;
   std::vector<double> windows;  // of the GLRT [s]
 };
-
-constexpr double kReference = 0.2;  // time constant of what GLRT takes for offset [s]
-// What a gap may have left counts this many times, for thresholds and for weights: it is no noise
-// that scatters about zero but the size of one error, which lasts for some 1/K. With one, 3 of 250
-// gaps in three held pushes begin a false contact beside them; with three, one; with five, none,
-// but new contacts are felt later.
-constexpr double kGapSigmas = 3.0;
-constexpr double kShift = 1.0;      // of the mean, that CUSUM is made for [sigma per sample]
-constexpr double kRefresh = 0.01;   // covariances follow the posture this often [s]
 
 }  // namespace touchline

@@ -2,6 +2,7 @@
 // Tells contact from noise, per segment: one or several tests at a time, each with a threshold,
 // with hysteresis, a minimum duration, and a slow baseline that follows constant offsets while
 // nothing touches. No allocation, lock, exception or output in `step`.
+// Theory: docs/theory.md, section 4.7.
 #pragma once
 
 #include <algorithm>
@@ -20,6 +21,7 @@
 #include "touchline/detail/detector/row_covariance.hpp"
 #include "touchline/detail/detector/segment_tests.hpp"
 #include "touchline/detail/detector/standing.hpp"
+#include "touchline/detail/detector/tuning.hpp"
 #include "touchline/detail/model/posture.hpp"
 #include "touchline/detail/observer/observer.hpp"
 
@@ -27,13 +29,15 @@ namespace touchline {
 
 class Detector {
  public:
-  Detector(const Observer& observer, std::vector<DetectionRow> rows, DetectionSettings settings)
-      : observer_(observer),
+  Detector(const Observer& observer, std::vector<DetectionRow> rows, DetectionSettings settings,
+           const DetectorTuning& tuning = {})
+      : tuning_(tuning),
+        observer_(observer),
         posture_(observer.tree(), observer.row_layout().joints),
         rows_(std::move(rows)),
         settings_(std::move(settings)),
         told_(observer, rows_, settings_.noise),
-        activity_(observer.row_layout().joints),
+        activity_(observer.row_layout().joints, tuning_.activity_time),
         baseline_posture_(settings_.sum_limits.size(), observer.row_layout().joints),
         states_(rows_.size()),
         spreads_(rows_.size()),
@@ -50,7 +54,8 @@ class Detector {
         levels_(segments_.size(), 0),
         quiet_(segments_.size(), 0.0),
         statistics_(segments_.size() * settings_.tests.size(), 0.0),
-        fires_(segments_.size(), 0) {
+        fires_(segments_.size(), 0),
+        still_(tuning_.pause) {
     for (const TestSetting& setting : settings_.tests)
       for (std::size_t g = 0; g < segments_.size(); ++g) fires_[g] |= std::isfinite(setting.limits[g]);
     for (std::size_t g = 0; g < segments_.size(); ++g) {
@@ -59,18 +64,21 @@ class Detector {
         if (row.segment == static_cast<int>(g)) own.push_back(row);
       }
       first_[g + 1] = first_[g] + own.size();
-      tests_.emplace_back(observer, own, settings_);
+      tests_.emplace_back(observer, own, settings_, tuning_);
       joint_tests_ = joint_tests_ || tests_.back().used();
     }
     for (const DetectionRow& row : rows_) {
       const double least = row.contact / std::max(row.seen, 1.0);
       meters_.emplace_back(bandwidth(row), least);
-      trend_meters_.emplace_back(bandwidth(row) / kTrend, least);
+      trend_meters_.emplace_back(bandwidth(row) / tuning_.trend, least);
     }
     slowest_.assign(segments_.size(), kAbsurd);
     for (const DetectionRow& row : rows_)
       slowest_[row.segment] = std::min(slowest_[row.segment], bandwidth(row));
   }
+
+  Detector(const Detector&) = delete;
+  Detector& operator=(const Detector&) = delete;
 
   // To be called after each step of the observer, with the row it wrote and the sample it took.
   void step(const double* output, const double* q, const double* qd) {
@@ -197,29 +205,6 @@ class Detector {
     bool pending = false, pending_collision = false;
     bool off = false;  // has the arm shown that it is not as told?
   };
-  static constexpr double kStanding = 0.02;  // [rad/s]; a hand that pushes an arm moves it, too
-  static constexpr double kConfirm = 8.0; // times 1 / K: settling leaves nothing of what it began with
-  static constexpr double kStart = 3.0;    // times 1 / K: what begins sooner was there before
-  static constexpr double kStartSamples = 3.0;  // more, where the filter forgets from one to the next
-  static constexpr double kAlike = 3.0;    // a factor within which an offset is still the same one
-  static constexpr double kLittle = 0.5;  // of an event's peak: what may rest after it
-  static constexpr double kTrace = 0.25;  // of an event's peak: what two contacts hardly leave
-  static constexpr double kBarely = 1.5;  // limits: models of arms in motion are not better
-  static constexpr double kSpike = 5.0;    // samples of calm that one of noise takes away
-  static constexpr double kFro = 0.5;     // limits: half of what noise is to exceed hardly ever
-  static constexpr double kMemory = 8.0;  // times 1 / K: for how long turns to and fro count
-  static constexpr double kTurns = 3.0;   // at K = 100 a hand that trembles at 10 Hz makes 1.6 of them
-  static constexpr double kTrend = 2.0;   // times 1 / K: time constant of the mean of the last moments
-  static constexpr double kRest = 5.0;    // times 1 / K: how long rests what has come to rest
-  static constexpr double kLeft = 0.15;   // and at least so long while the arm moves [s]
-  static constexpr double kMoving = 0.1;  // [rad/s]; slower is an arm that a hand pushes aside
-  static constexpr double kPause = 0.3;   // an arm that stops for less goes on moving [s]
-  static constexpr double kSlow = 0.2;    // [rad/s]; a joint that is about to turn, or just has
-  static constexpr double kCreep = 0.25;  // of what was there before: a push adds more in 2 / K
-  static constexpr double kHand = 2.0;    // a push on an arm in motion rarely lasts longer [s]
-  static constexpr double kAlone = 4.0;  // thresholds: a sample that no noise makes needs no other
-  static constexpr double kUnseen = 10.0;  // thresholds: noise that has yet to be seen is below it
-  static constexpr double kMost = 1.5;  // thresholds that a sum can grow to while all is felt
 
   void follow_motion(const double* q, const double* qd, double dt) {
     double sum = 0.0;
@@ -227,9 +212,9 @@ class Detector {
     sound_ = sum < kAbsurd;
     if (!sound_) return;
     activity_.add(qd, dt);
-    still_ = activity().speed2 > kMoving * kMoving ? 0.0 : still_ + dt;
+    still_ = activity().speed2 > tuning_.moving * tuning_.moving ? 0.0 : still_ + dt;
     since_ += dt;
-    if (placed_ && since_ < kRefresh) return;
+    if (placed_ && since_ < tuning_.refresh) return;
     posture_.set(q, nullptr);
     tell_noise();
     if (joint_tests_)
@@ -246,11 +231,11 @@ class Detector {
       const std::size_t at = i * (rows_.size() + 1);
       const double K = bandwidth(rows_[i]), kept = std::min(1.0, 0.5 * K * settings_.noise.period);
       const double readings = kept * told_.reading()[at], velocities = K * K * told_.momentum()[at];
-      meters_[i].tell(readings, velocities);
+      meters_[i].tell(readings, velocities, tuning_);
       first_looks_[i].tell(readings, velocities, K, settings_.noise.period);
-      trend_meters_[i].tell((readings + kept * velocities) / (1.0 + kTrend), 0.0);
-      excess_[i] = meters_[i].excess();
-      if (!meters_[i].contradicts() || excess_[i] == 1.0) continue;  // it does not matter
+      trend_meters_[i].tell((readings + kept * velocities) / (1.0 + tuning_.trend), 0.0, tuning_);
+      excess_[i] = meters_[i].excess(tuning_);
+      if (!meters_[i].contradicts(tuning_) || excess_[i] == 1.0) continue;  // it does not matter
       noisy_ = true;
       if (excess_[i] > standing_[i].ratio) {
         standing_[i].ratio = excess_[i];
@@ -280,7 +265,8 @@ class Detector {
         s.gap_std = row_[layout.segment_gap_std() + 2 * g + (row.component < 3 ? 0 : 1)];
       }
       s.known = s.known && std::isfinite(s.residual);
-      segments_[g].off |= fires_[g] && (states_[i].shown > row.contact || meters_[i].contradicts());
+      segments_[g].off |= fires_[g] &&
+          (states_[i].shown > row.contact || meters_[i].contradicts(tuning_));
       if (!std::isfinite(s.innovation)) s.innovation = s.residual;  // samples were lost
     }
   }
@@ -327,7 +313,7 @@ class Detector {
     segment.slow = std::max(segment.slow, slow_share(i));
     const double borne = (borne_out_[i].value() - s.baseline) / (row.contact * limits_[i]);
     segment.borne = std::max(segment.borne, std::fabs(borne));
-    if (!(learns(i) && spreads_[i].limit() > row.contact)) {
+    if (!(learns(i) && spreads_[i].limit(tuning_) > row.contact)) {
       segment.sum += x * x;
       segment.borne_sum += borne * borne;
     }
@@ -342,10 +328,12 @@ class Detector {
   double slow_share(std::size_t i) const {
     const DetectionRow& row = rows_[i];
     const RowState& s = states_[i];
-    if (row.seen <= 0.0 || !fires_[row.segment] || still_ < kPause || samples_[i].gap_std > 0.0) return 0.0;
+    if (row.seen <= 0.0 || !fires_[row.segment] || still_ < tuning_.pause ||
+        samples_[i].gap_std > 0.0) return 0.0;
     const double now = samples_[i].residual - s.baseline, mean = s.trend - s.baseline;
     if (now * mean <= 0.0) return 0.0;
-    const double limit = std::max(row.contact, trend_meters_[i].limit(row.seen, first_looks_[i].ratio()));
+    const double limit = std::max(row.contact, trend_meters_[i].limit(row.seen,
+        first_looks_[i].ratio(), tuning_));
     return std::min(std::fabs(now), std::fabs(mean)) / limit;
   }
 
@@ -356,19 +344,19 @@ class Detector {
     const DetectionRow& row = rows_[i];
     double most = row.contact;
     if (row.seen > 0.0) {
-      const double noise = meters_[i].limit(row.seen, first_looks_[i].ratio());
+      const double noise = meters_[i].limit(row.seen, first_looks_[i].ratio(), tuning_);
       const double variance = row.slow.moving_variance(activity());
       const double error = variance > 0.0 ? row.seen * std::sqrt(variance) : 0.0;
       most = std::max(most, error > 0.0 ? std::hypot(noise, error) : noise);
     }
-    if (learns(i)) most = std::max(most, spreads_[i].limit());
+    if (learns(i)) most = std::max(most, spreads_[i].limit(tuning_));
     const double gap = samples_[i].gap_std;
-    return gap > 0.0 ? std::hypot(most, kGapSigmas * gap) : most;
+    return gap > 0.0 ? std::hypot(most, tuning_.gap_sigmas * gap) : most;
   }
 
   // Does what is seen of a row in motion count: is the arm not as told, and moves?
   bool learns(std::size_t i) const {
-    return rows_[i].seen > 0.0 && segments_[rows_[i].segment].off && still_ < kPause;
+    return rows_[i].seen > 0.0 && segments_[rows_[i].segment].off && still_ < tuning_.pause;
   }
 
   // May offsets be followed: is nothing felt, or only by what has been an offset since?
@@ -382,7 +370,7 @@ class Detector {
     if (joint_tests_ && placed_) {
       double most = std::numeric_limits<double>::infinity();
       for (const TestSetting& setting : settings_.tests) {
-        if (setting.test == Test::cusum) most = kMost * setting.limits[g];
+        if (setting.test == Test::cusum) most = tuning_.cusum_most * setting.limits[g];
       }
       tests_[g].step(samples_.data() + first_[g], dt, gap_, adapts(g), activity_.activity(), most);
     }
@@ -416,17 +404,18 @@ class Detector {
     if (lasts(g, s.pending_collision, s.above_collision, s.collision, s.borne_collision)) levels_[g] = 2;
     if (levels_[g] == 0) {
       s.top = s.rest = s.back = s.below = s.lasted = 0.0;
-      s.in_motion = still_ < kPause;
+      s.in_motion = still_ < tuning_.pause;
       return;
     }
     s.lasted += dt;
     s.top = std::max(s.top, lately(g));
     s.rest = lasting(may_rest(g) && steady(g), dt, s.rest);
     if (s.below >= settings_.times.hold) levels_[g] = 0;
-    const double least = kRest / slowest_[g];
-    if (levels_[g] > 0 && s.rest >= (stands() ? least : std::max(least, kLeft))) come_to_rest(g);
+    const double least = tuning_.rest / slowest_[g];
+    if (levels_[g] > 0 &&
+        s.rest >= (stands() ? least : std::max(least, tuning_.rest_moving))) come_to_rest(g);
     s.back = lasting(stands() && is_back(g) && steady(g), dt, s.back);
-    if (levels_[g] > 0 && s.back >= std::max(least, kLeft)) go_back(g);
+    if (levels_[g] > 0 && s.back >= std::max(least, tuning_.rest_moving)) go_back(g);
   }
 
   // Has a test held for long enough, not by one sample alone, and not by noise that has yet to be
@@ -435,27 +424,28 @@ class Detector {
     if (!pending || duration < settings_.times.min_duration) return false;
     if (settings_.times.min_duration <= 0.0) return true;
     const Segment& s = segments_[g];
-    const bool barely = s.highest < kBarely && s.off && still_ < kPause;
-    if (barely && duration < kTrend / slowest_[g]) return false;  // an error of the model passes
-    if (young(g)) return score > (looked_at(g) ? kAlone : kUnseen);
-    return score > kAlone || borne > 1.0;
+    const bool barely = s.highest < tuning_.barely && s.off && still_ < tuning_.pause;
+    if (barely &&
+        duration < tuning_.trend / slowest_[g]) return false;  // an error of the model passes
+    if (young(g)) return score > (looked_at(g) ? tuning_.alone : tuning_.unseen);
+    return score > tuning_.alone || borne > 1.0;
   }
 
   // Is too little seen of a segment to know its noise?
   bool young(std::size_t g) const {
-    return segments_[g].age < kConfirm / slowest_[g] || !looked_at(g);
+    return segments_[g].age < tuning_.confirm / slowest_[g] || !looked_at(g);
   }
 
   // Have the first moments shown whether there is more noise in a segment than is told?
   bool looked_at(std::size_t g) const {
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i)
-      if (samples_[i].known && !first_looks_[i].ready()) return false;
+      if (samples_[i].known && !first_looks_[i].ready(tuning_)) return false;
     return true;
   }
 
   // For how long something has held, but for single samples of noise.
-  static double lasting(bool holds, double dt, double duration) {
-    return holds ? duration + dt : std::max(0.0, duration - kSpike * dt);
+  double lasting(bool holds, double dt, double duration) const {
+    return holds ? duration + dt : std::max(0.0, duration - tuning_.spike * dt);
   }
 
   bool known(std::size_t g) const {
@@ -466,15 +456,17 @@ class Detector {
 
   // What an event that begins now would have begun with.
   Origin origin(std::size_t g, double dt) const {
-    if (segments_[g].age < kStart / slowest_[g] + kStartSamples * dt) return Origin::start;
+    if (segments_[g].age < tuning_.start / slowest_[g] +
+        tuning_.start_samples * dt) return Origin::start;
     bool slow = true, creeps = true;
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
       const double share = std::fabs(normalized_[i]) / limits_[i];
       if (share < std::min(1.0, segments_[g].peak)) continue;
       const RowState& s = states_[i];
       const double quick = samples_[i].residual - s.trend, before = s.trend - s.baseline;
-      slow = slow && rows_[i].component < 0 && std::fabs(qd_[rows_[i].joint]) < kSlow;
-      creeps = creeps && std::fabs(quick) < kCreep * std::fabs(before);
+      slow = slow && rows_[i].component < 0 &&
+          std::fabs(qd_[rows_[i].joint]) < tuning_.reversal_speed;
+      creeps = creeps && std::fabs(quick) < tuning_.creep_share * std::fabs(before);
     }
     return slow ? Origin::reversal : creeps ? Origin::creep : Origin::push;
   }
@@ -486,7 +478,7 @@ class Detector {
       if (rows_[i].component < 0 || std::fabs(normalized_[i]) < limits_[i]) continue;
       const RowState& s = states_[i];
       const double quick = samples_[i].residual - s.trend, before = s.trend - s.baseline;
-      if (std::fabs(quick) >= kCreep * std::fabs(before)) return true;
+      if (std::fabs(quick) >= tuning_.creep_share * std::fabs(before)) return true;
     }
     return false;
   }
@@ -494,7 +486,7 @@ class Detector {
   // Is what is felt of a segment most likely the arm's own doing: an error of its model in motion?
   bool own_doing(std::size_t g) const {
     const Segment& s = segments_[g];
-    return s.off && still_ < kPause && (s.origin != Origin::push || s.lasted > kHand);
+    return s.off && still_ < tuning_.pause && (s.origin != Origin::push || s.lasted > tuning_.hand);
   }
 
   // May what the last moments have of a contact be friction or an error of the model? Only if it is
@@ -503,12 +495,12 @@ class Detector {
   // against each other leave more.
   bool may_rest(std::size_t g) const {
     const Segment& s = segments_[g];
-    const bool little = s.origin == Origin::start || lately(g) < kLittle * s.top;
+    const bool little = s.origin == Origin::start || lately(g) < tuning_.little * s.top;
     if (!little || !(s.off || s.in_motion)) return false;
-    return stands() ? s.off : lately(g) < std::max(kBarely, kTrace * s.top);
+    return stands() ? s.off : lately(g) < std::max(tuning_.barely, tuning_.trace * s.top);
   }
 
-  bool stands() const { return activity().speed2 < kStanding * kStanding; }
+  bool stands() const { return activity().speed2 < tuning_.standing * tuning_.standing; }
 
   // The mean of the last moments, in limits: the largest of a segment's rows.
   double lately(std::size_t g) const {
@@ -535,7 +527,7 @@ class Detector {
     RowState& s = states_[i];
     s.baseline = s.anchor = s.reference = s.trend;
     s.shown = std::max(s.shown, std::fabs(s.anchor));
-    s.age = s.referred = kTrend / bandwidth(rows_[i]);
+    s.age = s.referred = tuning_.trend / bandwidth(rows_[i]);
   }
 
   // What is left of a contact and does not change rests there: an offset from now on. What stood
@@ -573,7 +565,7 @@ class Detector {
   }
 
   void end_event(std::size_t g) {
-    quiet_[g] = kTrend / slowest_[g];
+    quiet_[g] = tuning_.trend / slowest_[g];
     levels_[g] = 0;
     Segment& s = segments_[g];
     s.pending = s.pending_collision = false;
@@ -596,18 +588,19 @@ class Detector {
     const DetectionRow& row = rows_[i];
     const double value = samples_[i].residual;
     if (!samples_[i].known) return;
-    s.trend += (value - s.trend) * std::min(1.0, dt * bandwidth(row) / kTrend);
+    s.trend += (value - s.trend) * std::min(1.0, dt * bandwidth(row) / tuning_.trend);
     confirm_start(i, dt);
     if (learns(i) && dt > 0.0) {
       const bool touched = levels_[row.segment] > 0;
-      if (!touched || own_doing(row.segment)) spreads_[i].add(value - s.baseline, dt, touched);
+      if (!touched ||
+          own_doing(row.segment)) spreads_[i].add(value - s.baseline, dt, touched, tuning_);
     }
     // Running means first, low-passes once they have seen enough.
     if (adapts(row.segment)) {
-      s.referred = std::min(s.referred + dt, kReference);
+      s.referred = std::min(s.referred + dt, tuning_.reference);
       if (s.referred > 0.0) s.reference += (value - s.reference) * std::min(1.0, dt / s.referred);
     }
-    const bool stopped = still_ >= kPause && still_ - dt < kPause;
+    const bool stopped = still_ >= tuning_.pause && still_ - dt < tuning_.pause;
     const bool felt = levels_[row.segment] > 0;
     meter_noise(i, felt || segments_[row.segment].pending, dt);
     if (felt) return;
@@ -615,15 +608,17 @@ class Detector {
     // In the first moments what noise beyond the told one can bring is averaged, too: one sample of
     // it is no baseline.
     const Segment& segment = segments_[row.segment];
-    const bool noise = first_looks_[i].ratio() > 1.0 && young(row.segment) && segment.score < kUnseen;
+    const bool noise = first_looks_[i].ratio() > 1.0 && young(row.segment) &&
+        segment.score < tuning_.unseen;
     if (segment.pending && !noise) return;
     quiet_[row.segment] = s.age += dt;
     const double tau = std::min(s.age, settings_.times.baseline);
     if (tau <= 0.0) return;
     const double next = s.baseline + (value - s.baseline) * std::min(1.0, dt / tau);
-    const double most = learns(i) ? std::max(row.baseline_limit, spreads_[i].limit()) : row.baseline_limit;
+    const double most = learns(i)
+        ? std::max(row.baseline_limit, spreads_[i].limit(tuning_)) : row.baseline_limit;
     s.baseline = std::clamp(next, s.anchor - most, s.anchor + most);
-    if (s.age < kTrend / bandwidth(row)) s.anchor = s.baseline;
+    if (s.age < tuning_.trend / bandwidth(row)) s.anchor = s.baseline;
   }
 
   // Noise is measured while nothing is felt, and of what is felt where it goes to and fro more often
@@ -631,26 +626,27 @@ class Detector {
   void meter_noise(std::size_t i, bool felt, double dt) {
     if (dt <= 0.0) return;
     RowState& s = states_[i];
-    const double off = samples_[i].residual - s.trend, most = kFro * limits_[i] * rows_[i].contact;
-    s.turns *= std::max(0.0, 1.0 - dt * bandwidth(rows_[i]) / kMemory);
+    const double off = samples_[i].residual - s.trend,
+        most = tuning_.fro * limits_[i] * rows_[i].contact;
+    s.turns *= std::max(0.0, 1.0 - dt * bandwidth(rows_[i]) / tuning_.fro_memory);
     if (off * s.side < -most) s.turns += 1.0;
     if (std::fabs(off) > most) s.side = off > 0.0 ? 1.0 : -1.0;
-    const bool counts = !felt || s.turns > kTurns;
-    first_looks_[i].add(samples_[i].residual);
-    meters_[i].add(samples_[i].residual, dt, counts);
-    trend_meters_[i].add(s.trend, dt, counts);
+    const bool counts = !felt || s.turns > tuning_.fro_turns;
+    first_looks_[i].add(samples_[i].residual, tuning_);
+    meters_[i].add(samples_[i].residual, dt, counts, tuning_);
+    trend_meters_[i].add(s.trend, dt, counts, tuning_);
   }
 
   // What stood there at the first sample may be a rest of settling, or of an arm that is set going.
   // It shows that the arm is not as told only if it still stands there a while later.
   void confirm_start(std::size_t i, double dt) {
     RowState& s = states_[i];
-    const double end = kConfirm / bandwidth(rows_[i]), before = s.seconds;
+    const double end = tuning_.confirm / bandwidth(rows_[i]), before = s.seconds;
     s.seconds += dt;
     if (before >= end || s.seconds < end) return;
     const double least = std::min(std::fabs(s.trend), std::fabs(s.anchor));
     const double most = std::max(std::fabs(s.trend), std::fabs(s.anchor));
-    if (!(s.trend * s.anchor > 0.0 && most < kAlike * least)) return;
+    if (!(s.trend * s.anchor > 0.0 && most < tuning_.alike * least)) return;
     s.shown = std::max(s.shown, least);
     if (least > rows_[i].contact) standing_[i].start = std::copysign(least, s.anchor);
   }
@@ -664,10 +660,11 @@ class Detector {
       }
       const double way2 = baseline_posture_.distance2(g, q);
       for (std::size_t i = first_[g]; i < first_[g + 1]; ++i)
-        drift_[i] = std::sqrt(drifted(rows_[i], activity(), way2));
+        drift_[i] = std::sqrt(drifted(rows_[i], activity(), way2, tuning_));
     }
   }
 
+  DetectorTuning tuning_;
   const Observer& observer_;
   Posture posture_;
   const double *row_ = nullptr, *qd_ = nullptr;
@@ -692,7 +689,7 @@ class Detector {
   std::vector<double> quiet_, statistics_;
   std::vector<char> fires_;  // per segment: can a test fire, or are statistics all that is asked for?
   double time_ = 0.0, since_ = 0.0;
-  double still_ = kPause;  // for how long the arm has stood [s]
+  double still_;  // for how long the arm has stood [s]
   bool timed_ = false, placed_ = false, gap_ = false, joint_tests_ = false, sound_ = false;
   bool offset_ = false, noisy_ = false;
 };

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // How noisy a row is in the first moments: by third differences of its residual, which neither hands
 // nor motion reach, so that a touch does not count as noise. No allocation.
+// Theory: docs/theory.md, section 4.2.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
+
+#include "touchline/detail/detector/tuning.hpp"
 
 namespace touchline {
 
@@ -22,10 +25,10 @@ class FirstLook {
     rough_ = std::sqrt(kept * of_readings + kWhite * of_velocities);
   }
 
-  bool ready() const { return count_ >= kFew; }
+  bool ready(const DetectorTuning& t) const { return count_ >= few(t); }
   bool over() const { return count_ == kMost; }
 
-  void add(double value) {
+  void add(double value, const DetectorTuning& t) {
     if (over()) return;
     const double third = value - 3.0 * (last_[0] - last_[1]) - last_[2];
     last_ = {value, last_[0], last_[1]};
@@ -33,7 +36,7 @@ class FirstLook {
       ++seen_;
     } else {
       sizes_[count_++] = std::fabs(third);
-      if (count_ % kOften == 0) ratio_ = measured();
+      if (count_ % static_cast<std::size_t>(t.first_often) == 0) ratio_ = measured(t);
     }
   }
 
@@ -42,21 +45,20 @@ class FirstLook {
   double ratio() const { return ratio_; }
 
  private:
-  double measured() const {
-    if (count_ < kFew || !(rough_ > 0.0)) return 1.0;
+  double measured(const DetectorTuning& t) const {
+    if (count_ < few(t) || !(rough_ > 0.0)) return 1.0;
     std::array<double, kMost> sizes = sizes_;
     const auto middle = sizes.begin() + count_ / 2;
     std::nth_element(sizes.begin(), middle, sizes.begin() + count_);
     const double ratio = *middle / (kMedian * rough_);
-    return ratio > kClearly ? ratio : 1.0;
+    return ratio > t.first_clearly ? ratio : 1.0;
   }
+
+  static std::size_t few(const DetectorTuning& t) { return static_cast<std::size_t>(t.first_few); }
 
   static constexpr double kWhite = 20.0;    // 1 + 9 + 9 + 1: of white noise
   static constexpr double kMedian = 0.6745;  // of the size of a normal variable, in sigmas
-  static constexpr std::size_t kFew = 16;   // third differences: their median is right by a third
-  static constexpr std::size_t kMost = 64;  // and here by a sixth; then the meter has seen more
-  static constexpr std::size_t kOften = 8;  // from one look at the median to the next
-  static constexpr double kClearly = 2.0;   // times told: what 16 of them hardly reach by chance
+  static constexpr std::size_t kMost = 64;  // room: the median is right by a sixth
 
   std::array<double, 3> last_{};
   std::array<double, kMost> sizes_{};

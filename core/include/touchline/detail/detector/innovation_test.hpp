@@ -5,6 +5,7 @@
 // noises are diagonal every row is a filter of its own, with gains in closed form: those of the
 // second-order moving average that its second differences are. The innovations are white with unit
 // variance; a two-sided CUSUM watches each. No allocation in `weigh`, `add` and `statistic`.
+// Theory: docs/theory.md, section 4.5.
 #pragma once
 
 #include <algorithm>
@@ -14,6 +15,7 @@
 #include <vector>
 
 #include "touchline/detail/detector/detection_row.hpp"
+#include "touchline/detail/detector/tuning.hpp"
 #include "touchline/detail/model/dense.hpp"
 
 namespace touchline {
@@ -41,7 +43,9 @@ inline SteadyGains steady_gains(double r, double q) {
 
 class InnovationTest {
  public:
-  InnovationTest(std::size_t rows, double period) : period_(period) {
+  // `tuning` stays the caller's.
+  InnovationTest(std::size_t rows, double period, const DetectorTuning& tuning)
+      : tuning_(tuning), period_(period) {
     for (auto* m : {&to_white_, &from_white_, &factor_, &turned_, &scratch_, &vectors_})
       m->assign(rows * rows, 0.0);
     for (auto* v : {&load_, &gap_, &white_, &up_, &down_}) v->assign(rows, 0.0);
@@ -60,7 +64,7 @@ class InnovationTest {
   }
 
   // Covariances (size, size) of one sample; `model` (size): variances of the model's errors over
-  // `kReference`.
+  // the quick baseline.
   void weigh(const double* momentum, const double* reading, const double* model) {
     const int n = static_cast<int>(size_);
     for (std::size_t i = 0; i < size_ * size_; ++i) factor_[i] = period_ * period_ * reading[i];
@@ -88,8 +92,8 @@ class InnovationTest {
     for (int i = 0; i < n; ++i) {
       double drift = 0.0;
       for (int k = 0; k < n; ++k) drift += square(to_white_[i * n + k]) * model[k];
-      // A random walk that scatters by `model` about its low-pass of time constant kReference.
-      const double q = drift * (2.0 / kReference) * period_ * period_ * period_;
+      // A random walk that scatters by `model` about its low-pass of time constant `reference`.
+      const double q = drift * (2.0 / tuning_.reference) * period_ * period_ * period_;
       gains_[i] = steady_gains(std::max(turned_[i * n + i], 1e-6), std::max(q, 1e-12));
     }
   }
@@ -117,10 +121,10 @@ class InnovationTest {
       double nu = 0.0;
       for (std::size_t k = 0; k < n; ++k) nu += to_white_[i * n + k] * gap_[k];
       white_[i] = nu;
-      if (age_ < kWarm) continue;
+      if (age_ < tuning_.cusum_warm_up) continue;
       const double z = nu / (gains_[i].sigma * (mean > gains_[i].level ? wider : 1.0));
-      up_[i] = std::clamp(up_[i] + z - 0.5 * kShift, 0.0, most);
-      down_[i] = std::clamp(down_[i] - z - 0.5 * kShift, 0.0, most);
+      up_[i] = std::clamp(up_[i] + z - 0.5 * tuning_.cusum_shift, 0.0, most);
+      down_[i] = std::clamp(down_[i] - z - 0.5 * tuning_.cusum_shift, 0.0, most);
     }
     for (std::size_t i = 0; i < n; ++i) {
       double level = 0.0, slope = 0.0;
@@ -175,9 +179,9 @@ class InnovationTest {
   }
 
   std::size_t size_ = 0;
-  static constexpr double kWarm = 0.1;  // nothing is summed up before [s]
   static constexpr double kNoGap = std::numeric_limits<double>::infinity();  // samples since one
 
+  const DetectorTuning& tuning_;
   double period_, count_ = 0.0, age_ = 0.0;  // samples and time since the beginning
   double since_gap_ = kNoGap;
   bool usable_ = false, turned_before_ = false;

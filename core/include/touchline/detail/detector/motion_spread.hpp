@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // How far a row goes from its baseline while the arm moves: friction and errors of the model, which
 // no noise figure tells. No allocation.
+// Theory: docs/theory.md, section 4.6.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
+
+#include "touchline/detail/detector/tuning.hpp"
 
 namespace touchline {
 
@@ -12,21 +15,19 @@ class MotionSpread {
  public:
   // A residual less its baseline [N or Nm], for a time dt [s] of motion. While it is taken for a
   // contact (`touched`) it counts for more: an error that begins with motion ends as an event soon.
-  void add(double off, double dt, bool touched) {
-    const double news = touched ? kTouched * dt : dt;
-    time_ = std::min(time_ + news, kTime);
+  void add(double off, double dt, bool touched, const DetectorTuning& tuning) {
+    const double news = touched ? tuning.motion_touched * dt : dt;
+    time_ = std::min(time_ + news, tuning.motion_memory);
     if (time_ > 0.0) square_ += (off * off - square_) * std::min(1.0, news / time_);
   }
 
   // What motion alone hardly exceeds [N or Nm]. A friction that changes sign exceeds its own root
   // mean square twofold, against a baseline from before; an error that grows steadily 1.7-fold.
-  double limit() const { return kSigmas * std::sqrt(square_); }
+  double limit(const DetectorTuning& tuning) const {
+    return tuning.motion_sigmas * std::sqrt(square_);
+  }
 
  private:
-  static constexpr double kTime = 10.0;   // of motion that is remembered [s]
-  static constexpr double kTouched = 20.0;  // so many times: an error fills the memory in 0.5 s
-  static constexpr double kSigmas = 3.0;  // as is usual where a scatter is not normal
-
   double time_ = 0.0, square_ = 0.0;
 };
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // How noisy the signals are.
+// Theory: docs/theory.md, section 4.2.
 #pragma once
 
 #include <vector>

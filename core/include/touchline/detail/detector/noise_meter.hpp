@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // How noisy a row is, as seen: the scatter of its residual about its own short mean, while nothing
 // touches. No allocation.
+// Theory: docs/theory.md, section 4.2.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
+
+#include "touchline/detail/detector/tuning.hpp"
 
 namespace touchline {
 
@@ -18,30 +21,31 @@ class NoiseMeter {
 
   // The variance that noise as told has in the row now: of readings, which lasts for 1 / K, and of
   // velocities, which is nearly white.
-  void tell(double of_readings, double of_velocities) {
+  void tell(double of_readings, double of_velocities, const DetectorTuning& t) {
     const double sum = of_readings + of_velocities;
     bare_ = std::sqrt(sum);
     told_ = std::max(least_, bare_);
-    passed_ = sum > 0.0 ? (of_readings * kMean / (1.0 + kMean) + of_velocities) / sum : 1.0;
+    passed_ = sum > 0.0
+        ? (of_readings * t.noise_mean / (1.0 + t.noise_mean) + of_velocities) / sum : 1.0;
   }
 
   // The next residual [N or Nm], `dt` [s] after the one before; `counts` unless it may be a contact's.
-  void add(double value, double dt, bool counts) {
+  void add(double value, double dt, bool counts, const DetectorTuning& t) {
     if (!running_) {
       running_ = true;
       mean_ = value;
       return;
     }
     const double off = value - mean_;
-    mean_ += off * std::min(1.0, dt * bandwidth_ / kMean);
+    mean_ += off * std::min(1.0, dt * bandwidth_ / t.noise_mean);
     if (!counts) return;
     double square = off * off / passed_;  // of what lasts the mean takes a part
     double news = news_after(dt);
-    const double most = kFar * kFar * std::max(variance_, told_ * told_);
+    const double most = t.noise_far * t.noise_far * std::max(variance_, told_ * told_);
     const bool far = square > most;
     square = std::min(square, most);
-    if (far) news *= kDoubted;
-    count_ += news * (1.0 - count_ / kMost);
+    if (far) news *= t.noise_doubted;
+    count_ += news * (1.0 - count_ / t.noise_most);
     variance_ += (square - variance_) * std::min(1.0, news / count_);
   }
 
@@ -50,41 +54,32 @@ class NoiseMeter {
 
   // Does what is seen speak against what is told? A variance of `count_` values has the relative
   // standard deviation sqrt(2 / count_).
-  bool contradicts() const { return exceeds(told_); }
+  bool contradicts(const DetectorTuning& t) const { return exceeds(told_, t); }
 
   // How many times as large as told it is; 1 where that is not certain, or no more than noise figures
   // err by.
-  double excess() const {
-    const double ratio = bare_ > 0.0 && exceeds(bare_) ? sigma() / bare_ : 1.0;
-    return ratio > kNoisier ? ratio : 1.0;
+  double excess(const DetectorTuning& t) const {
+    const double ratio = bare_ > 0.0 && exceeds(bare_, t) ? sigma() / bare_ : 1.0;
+    return ratio > t.noisier ? ratio : 1.0;
   }
 
   // What noise exceeds as rarely as a normal variable exceeds `sigmas` of its true sigma. Where
   // seen noise speaks against the told one that is the quantile of Student's t for so many
   // independent values (Wallace 1959): few values tell little.
   // Until then noise may be `first` times as large as told.
-  double limit(double sigmas, double first) const {
-    const double least = count_ < kEnough ? std::max(told_, first * bare_) : told_;
-    if (!contradicts()) return sigmas * least;
+  double limit(double sigmas, double first, const DetectorTuning& t) const {
+    const double least = count_ < t.noise_enough ? std::max(told_, first * bare_) : told_;
+    if (!contradicts(t)) return sigmas * least;
     const double n = count_, z = sigmas * (8.0 * n + 3.0) / (8.0 * n + 1.0);
     return std::max(sigmas * least, sigma() * std::sqrt(n * std::expm1(z * z / n)));
   }
 
  private:
-  static constexpr double kNoisier = 1.5;  // times told: noise figures are no better than this
-
-  bool exceeds(double told) const {
+  bool exceeds(double told, const DetectorTuning& t) const {
     if (!(variance_ > told * told)) return false;  // as nearly always: the root is dear
-    return count_ > kFew && variance_ > told * told * (1.0 + kSure * std::sqrt(2.0 / count_));
+    return count_ > t.noise_few &&
+        variance_ > told * told * (1.0 + t.noise_sure * std::sqrt(2.0 / count_));
   }
-
-  static constexpr double kEnough = 20.0;  // values: a sigma of so many is right by a sixth
-  static constexpr double kMean = 2.0;     // times 1 / K: the mean that the scatter is about
-  static constexpr double kMost = 500.0;   // values that are remembered: 5 s at K = 100
-  static constexpr double kFar = 3.0;      // sigmas: an outlier is further off
-  static constexpr double kDoubted = 0.1;  // of a value: as what an outlier counts
-  static constexpr double kSure = 4.0;     // sigmas of a variance, against what is told
-  static constexpr double kFew = 5.0;      // values: fewer may be the beginning of a contact
 
   // How much of a value is new after dt [s]: squares of filtered noise are like each other for
   // 1 / 2K. The stamps of a steady clock differ by two numbers that take turns, as they are rounded:

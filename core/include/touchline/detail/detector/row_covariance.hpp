@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // How the noise of the signals enters the rows that a segment is tested by: velocity noise through
 // the momentum, noise of torques and wrenches directly. No allocation per sample.
+// Theory: docs/theory.md, section 4.2.
 #pragma once
 
 #include <algorithm>

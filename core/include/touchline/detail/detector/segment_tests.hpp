@@ -3,6 +3,7 @@
 // are left out; when that changes, what looks back begins anew. `scaled` and `chi2` look at
 // residuals that are low-passed once more: what velocity noise leaves in a residual is nearly
 // white, so that a second pole takes off most of it. No allocation in `step`.
+// Theory: docs/theory.md, section 4.3.
 #pragma once
 
 #include <algorithm>
@@ -12,6 +13,7 @@
 #include "touchline/detail/detector/detection_row.hpp"
 #include "touchline/detail/detector/innovation_test.hpp"
 #include "touchline/detail/detector/row_covariance.hpp"
+#include "touchline/detail/detector/tuning.hpp"
 #include "touchline/detail/detector/window_test.hpp"
 #include "touchline/detail/model/dense.hpp"
 #include "touchline/detail/observer/filter.hpp"
@@ -31,12 +33,14 @@ struct RowSample {
 
 class SegmentTests {
  public:
+  // `tuning` stays the caller's.
   SegmentTests(const Observer& observer, std::vector<DetectionRow> rows,
-               const DetectionSettings& settings)
-      : rows_(std::move(rows)),
+               const DetectionSettings& settings, const DetectorTuning& tuning)
+      : tuning_(tuning),
+        rows_(std::move(rows)),
         covariance_(observer, rows_, settings.noise),
         windows_(rows_.size(), settings.windows, settings.noise.period),
-        innovations_(rows_.size(), settings.noise.period) {
+        innovations_(rows_.size(), settings.noise.period, tuning) {
     const std::size_t n = rows_.size();
     for (const TestSetting& setting : settings.tests) {
       uses_chi2_ |= setting.test == Test::chi2;
@@ -125,7 +129,7 @@ class SegmentTests {
     bool any = false;
     for (std::size_t i = 0; i < rows_.size(); ++i) {
       any |= doubt_[i] > 0.0 || samples[i].gap_std > 0.0;
-      doubt_[i] = kGapSigmas * samples[i].gap_std * kGapSigmas * samples[i].gap_std;
+      doubt_[i] = tuning_.gap_sigmas * samples[i].gap_std * tuning_.gap_sigmas * samples[i].gap_std;
     }
     return any;
   }
@@ -153,7 +157,7 @@ class SegmentTests {
       if (changed) active_.push_back(i);
       difference_[k] = smooth_slow_[i];
       offset_[k] = samples[i].reference;
-      referred_ = referred_ && samples[i].referred >= kReference;
+      referred_ = referred_ && samples[i].referred >= tuning_.reference;
       if (changed) load_[k] = samples[i].residual;
       ++k;
     }
@@ -204,6 +208,7 @@ class SegmentTests {
         squared_norm(whitener_.data(), difference_.data(), static_cast<int>(active_.size())));
   }
 
+  const DetectorTuning& tuning_;
   std::vector<DetectionRow> rows_;
   RowCovariance covariance_;
   WindowTest windows_;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // How far an arm has shown that it is not as told.
+// Theory: docs/theory.md, section 4.7.
 #pragma once
 
 namespace touchline {

@@ -5,6 +5,7 @@
 // momentum, B of the readings and C of the model's errors. Of several N the largest ratio counts.
 // Over lost samples S_N spans more than N periods: its covariance is taken to grow with the square
 // of the time, as that of C does. No allocation in `add` and `statistic`.
+// Theory: docs/theory.md, section 4.4.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // From what the localizer says to a contact for the user.
+// Theory: docs/theory.md, section 7.3.
 #pragma once
 
 #include <algorithm>

@@ -2,6 +2,7 @@
 // From contacts, sample by sample, to events. As many events may last at a time as a segment can
 // have contacts; where there is no room for one more, the oldest on that segment is ended. No
 // allocation per sample.
+// Theory: docs/theory.md, section 7.3.
 #pragma once
 
 #include <algorithm>
@@ -39,7 +40,8 @@ class EventRecorder {
  public:
   // Robot, observer and localizer stay the caller's.
   EventRecorder(const Robot& robot, const Observer& observer, Localizer& localizer)
-      : robot_(robot),
+      : strong_share_(localizer.settings().strong_share),
+        robot_(robot),
         observer_(observer),
         localizer_(localizer),
         state_(observer.tree().make_state<double>()),
@@ -126,8 +128,6 @@ class EventRecorder {
   }
 
  private:
-  static constexpr double kStrong = 0.5;  // samples above this part of the peak speak for the event
-
   LastingEvent& lasting(int serial, int segment, double time) {
     LastingEvent *room = nullptr, *oldest = nullptr;
     for (LastingEvent& e : events_) {
@@ -196,12 +196,12 @@ class EventRecorder {
       if (robot_.rows[i].segment == e.segment) largest = std::max(largest, std::fabs(normalized[i]));
     }
     const double strength = share * largest;
-    if (kStrong * strength > e.strength) {  // all that came before was weak
+    if (strong_share_ * strength > e.strength) {  // all that came before was weak
       std::fill(e.sum.begin(), e.sum.end(), 0.0);
       e.count = 0;
     }
     e.strength = std::max(e.strength, strength);
-    if (strength < kStrong * e.strength) return;
+    if (strength < strong_share_ * e.strength) return;
     const std::size_t rows = normalized.size();
     for (std::size_t i = 0; i < rows; ++i) e.sum[i] += normalized[i];
     for (std::size_t i = 0; i < 3; ++i) e.sum[rows + i] += known(wrench[i]);
@@ -336,6 +336,7 @@ class EventRecorder {
     return -1;
   }
 
+  double strong_share_;
   const Robot& robot_;
   const Observer& observer_;
   Localizer& localizer_;

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // Do samples come as often as the noise figures, which are per sample, suppose?
+// Theory: docs/theory.md, section 2.3.
 #pragma once
+
+#include "touchline/detail/events/tuning.hpp"
 
 namespace touchline {
 
 class PeriodWatch {
  public:
   // `period`: that is supposed [s].
-  explicit PeriodWatch(double period) : period_(period) {}
+  PeriodWatch(double period, const EventsTuning& tuning)
+      : steps_most_(tuning.period_steps), ratio_most_(tuning.period_ratio), period_(period) {}
 
   // The time of the last accepted sample [s]; steps beyond `max_gap` [s] are gaps, not periods.
   void take(double time, double max_gap) {
@@ -19,21 +23,19 @@ class PeriodWatch {
       return;
     }
     sum_ += step;
-    if (++steps_ < kSteps) return;
+    if (++steps_ < steps_most_) return;
     const double ratio = sum_ / (steps_ * period_);
-    differs_ = ratio > kRatio || ratio * kRatio < 1.0;
+    differs_ = ratio > ratio_most_ || ratio * ratio_most_ < 1.0;
     sum_ = 0.0;
     steps_ = 0;
   }
 
-  // Did the last kSteps steps have another mean?
+  // Did the last `period_steps` steps have another mean?
   bool differs() const { return differs_; }
 
  private:
-  static constexpr int kSteps = 64;      // whose mean is taken: jitter of half a period is gone
-  static constexpr double kRatio = 1.2;  // uncertainties err by its root, a tenth
-
-  double period_, time_ = 0.0, sum_ = 0.0;
+  int steps_most_;
+  double ratio_most_, period_, time_ = 0.0, sum_ = 0.0;
   int steps_ = 0;
   bool running_ = false, differs_ = false;
 };

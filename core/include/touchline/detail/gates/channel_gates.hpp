@@ -18,6 +18,7 @@
 // while; a speed is what positions show, low-passed.
 //
 // Limits follow from what this arm has shown, and from physics where it has shown nothing yet.
+// Theory: docs/theory.md, sections 3.1, 3.2 and 3.3.
 #pragma once
 
 #include <algorithm>
@@ -27,6 +28,7 @@
 #include <vector>
 
 #include "touchline/detail/gates/fault.hpp"
+#include "touchline/detail/gates/tuning.hpp"
 #include "touchline/detail/observer/layout.hpp"
 #include "touchline/robot.hpp"
 #include "touchline/sample.hpp"
@@ -36,8 +38,9 @@ namespace touchline {
 class ChannelGates {
  public:
   // Of a robot whose parts fit.
-  explicit ChannelGates(const Robot& robot)
-      : at_{robot.joints.size(), robot.sensors.size()},
+  explicit ChannelGates(const Robot& robot, const GatesTuning& tuning = {})
+      : tuning_(tuning),
+        at_{robot.joints.size(), robot.sensors.size()},
         period_(std::max(robot.noise.period, kShortest)),
         floor_(at_.count(), std::numeric_limits<double>::infinity()),
         witness_(at_.count(), -1),
@@ -68,14 +71,15 @@ class ChannelGates {
         calm_(at_.count()),
         fault_(at_.count(), Fault::none) {
     set_floors(robot);
-    memory_ = std::min(1.0, period_ / kMemory);
-    warm_up_ = samples(kWarmUp, kLeastSeen);
-    held_most_ = std::min(samples(kHeld, kSure + 1), kHeldMost);
-    silent_ = samples(kSilent, kLeastSilent);
-    return_ = samples(kReturn, kGood);
-    dwell_ = samples(kDwell, kLeastDwell);
-    kept_ = std::exp(-period_ / std::max(kWindow, kWindowSamples * period_));
-    const double pole = std::exp(-std::min(kTracking, 0.5 / period_) * period_), off = 1.0 - pole;
+    memory_ = std::min(1.0, period_ / tuning_.memory);
+    warm_up_ = samples(tuning_.warm_up, tuning_.least_seen);
+    held_most_ = std::min(samples(tuning_.held, tuning_.sure + 1), tuning_.held_most);
+    silent_ = samples(tuning_.silent, tuning_.least_silent);
+    return_ = samples(tuning_.returns, tuning_.good);
+    dwell_ = samples(tuning_.dwell, tuning_.least_dwell);
+    kept_ = std::exp(-period_ / compared_over());
+    const double pole = std::exp(-std::min(tuning_.tracking, 0.5 / period_) * period_),
+        off = 1.0 - pole;
     follows_[0] = 1.0 - pole * pole * pole;
     follows_[1] = 1.5 * off * off * (1.0 + pole) / period_;
     follows_[2] = off * off * off / (period_ * period_);
@@ -91,7 +95,7 @@ class ChannelGates {
     refusals_ = 0;
     time_ = sample.time;
     gather(sample);
-    const bool gap = !(dt < kGapPeriods * period_);
+    const bool gap = !(dt < tuning_.step_periods * period_);
     if (!measure(dt) || !all_sound_ || absurd_ || gap) settle(dt, gap);
     learn();
     track(dt, gap);
@@ -111,54 +115,6 @@ class ChannelGates {
  private:
   static constexpr double kNever = std::numeric_limits<double>::quiet_NaN();
   static constexpr double kShortest = 1e-6;    // [s] of a period
-  static constexpr double kGapPeriods = 5.0;   // a longer step in time is no step of a channel
-  static constexpr int kPatience = 16;         // stamps that do not advance before a new beginning
-  static constexpr double kMemory = 1.0;       // [s] over which steps are averaged
-  static constexpr double kWarmUp = 0.05;      // [s] of samples before a channel is judged,
-  static constexpr int kLeastSeen = 20;        // and so many samples
-
-  // A step this many times the mean one is a jump, this many times one that moves at all. Of white
-  // noise, 20 means are 16 sigmas of a step and 6 are 4.8, which one step in a million passes.
-  static constexpr double kJump = 20.0, kMoves = 6.0;
-  static constexpr double kFastest = 10.0;      // [rad/s, m/s] no joint moves faster
-  static constexpr double kLeastTravel = 0.01;  // [rad, m] that gravity hardly notices
-  static constexpr double kSpeedStep = 0.05;    // [rad/s, m/s] of one sample,
-  static constexpr double kHardest = 50.0;      // and [rad/s2, m/s2] times its period
-  static constexpr double kLeastForce = 1.0, kLeastTorque = 0.2;  // [N, Nm] no contact is less
-  static constexpr double kEqual = 0.05;        // of its ratio that another channel must have too
-  static constexpr double kBorneOut = 0.3;      // of a step of speed that positions show
-  static constexpr double kReach = 2.0;         // [m] farther from a sensor no link is
-  static constexpr double kPitch = 0.2;         // of one force: its moment along it, as a part
-  static constexpr double kHeld = 0.01;         // [s] for which a reading is held, at most,
-  static constexpr int kHeldMost = 5;           // and so many samples
-  static constexpr int kSure = 3;               // samples at a new level that make it one
-  static constexpr int kGood = 10;              // steps that bring a wild channel back
-  static constexpr double kReturn = 2.0;        // [s] and what is elsewhere for good
-  static constexpr double kTracking = 200.0;    // [rad/s] at which speeds follow from positions
-  static constexpr double kWayBlind = 2.0;      // [s] for which a way follows from its speed
-
-  static constexpr double kMoving = 0.02;     // [rad/s, m/s] of any joint: the arm moves
-  static constexpr double kSilent = 0.02;     // [s] without a change before a channel is stuck,
-  static constexpr int kLeastSilent = 5;      // and so many samples
-  static constexpr double kEvidence = 40.0;   // [nats] against chance
-  // At the largest or the smallest value that the channel has ever shown: clipped.
-  static constexpr double kEvidenceAtEnd = 12.0;
-  static constexpr int kLeastAtEnd = 4;
-  static constexpr double kRuns = 3.0;        // times the longest run that the channel has shown
-  static constexpr double kRunMemory = 20.0;  // [s] over which that is forgotten
-  static constexpr double kLively = 0.5;      // of samples with a change: not the same twice
-  static constexpr int kChanges = 3;          // of value that bring a stuck channel back
-
-  static constexpr double kWindow = 0.01;         // [s] over which speeds are compared,
-  static constexpr double kWindowSamples = 3.0;   // and so many samples
-  static constexpr double kSpeedError = 0.1;      // [rad/s, m/s] that a speed may be wrong by
-  static constexpr double kDisagrees = 10.0;      // times the mean difference
-  static constexpr double kStands = 5.0;          // samples: so long does no joint that moves stand
-  static constexpr double kSurely = 0.99;         // of samples with another velocity than before
-  static constexpr double kStale = 5.0;           // times what one that never changes counts
-  static constexpr double kDwell = 0.01;          // [s] for which it lasts,
-  static constexpr int kLeastDwell = 3;           // and so many samples
-
   int samples(double seconds, int least) const {
     return std::max(least, static_cast<int>(std::lround(std::min(seconds / period_, 1e6))));
   }
@@ -177,12 +133,12 @@ class ChannelGates {
     }
     for (std::size_t j = 0; j < at_.joints; ++j) {
       const JointRow& joint = robot.joints[j];
-      floor_[at_.q() + j] = std::max(kLeastTravel, kFastest * period_);
-      floor_[at_.qd() + j] = kSpeedStep + kHardest * period_;
+      floor_[at_.q() + j] = std::max(tuning_.least_travel, tuning_.fastest * period_);
+      floor_[at_.qd() + j] = tuning_.speed_step + tuning_.hardest * period_;
       wraps_[j] = robot.nodes[joint.nodes[0]].kind == NodeKind::revolute;
       if (!layout.inboard_sensors[j].empty())
         witness_[at_.tau() + j] = layout.inboard_sensors[j][0].sensor;
-      const double least = std::max(contact[at_.tau() + j], kLeastTorque);
+      const double least = std::max(contact[at_.tau() + j], tuning_.least_step_torque);
       if (joint.measured())
         floor_[at_.tau() + j] = least / share(joint.bandwidth) / std::fabs(joint.gain);
     }
@@ -196,10 +152,10 @@ class ChannelGates {
         if (inboard && robot.sensors[t].six_axis())
           std::fill_n(witness_.begin() + c, 3, static_cast<int>(t));
       }
+      const double smallest = axis == 0 ? tuning_.least_step_force : tuning_.least_step_torque;
       for (int i = 0; i < 3; ++i) {
         if (sensor.axes[axis + i])
-          floor_[c + i] = std::max(least, axis == 0 ? kLeastForce : kLeastTorque) /
-                          share(sensor.bandwidth);
+          floor_[c + i] = std::max(least, smallest) / share(sensor.bandwidth);
       }
     }
   }
@@ -218,7 +174,7 @@ class ChannelGates {
   // it, unless the clock was set back.
   Sample refused(const Sample& sample) {
     const bool first = time_ != time_ && std::isfinite(sample.time);
-    if (first || ++refusals_ > kPatience) {
+    if (first || ++refusals_ > tuning_.refusals) {
       time_ = sample.time;
       refusals_ = 0;
       gather(sample);
@@ -242,9 +198,10 @@ class ChannelGates {
     for (std::size_t c = n; c < count; ++c) step[c] = std::fabs(now[c] - last[c]);
     for (std::size_t j = 0; j < n; ++j)
       step[j] = std::fabs(now[j] - last[j] - 0.5 * dt * (now[n + j] + last[n + j]));
+    const double jump = tuning_.jump;
     double worst = 0.0, all = 0.0;
     for (std::size_t c = 0; c < count; ++c) {
-      const double usual = kJump * mean[c];
+      const double usual = jump * mean[c];
       ratio[c] = step[c] / (usual > floor[c] ? usual : floor[c]);
       worst = ratio[c] > worst ? ratio[c] : worst;
     }
@@ -280,7 +237,7 @@ class ChannelGates {
     all_sound_ = std::all_of(fault_.begin(), fault_.end(), [](Fault f) { return f == Fault::none; });
   }
 
-  double gate(std::size_t c) const { return std::max(floor_[c], kJump * mean_[c]); }
+  double gate(std::size_t c) const { return std::max(floor_[c], tuning_.jump * mean_[c]); }
 
   void judge(std::size_t c, double dt) {
     const double x = now_[c];
@@ -302,10 +259,10 @@ class ChannelGates {
       case Fault::wild: return wait_for_calm(c);
       case Fault::absent: return near(c) ? take(c) : leave(c, Fault::wild);
       case Fault::stuck:
-        if (now_[c] == last_[c] || ++since_[c] < kChanges) return;
+        if (now_[c] == last_[c] || ++since_[c] < tuning_.changes) return;
         return c >= at_.tau() || near(c) ? take(c) : leave(c, Fault::wild);
       case Fault::step:
-        calm_[c] = ratio_[c] > 1.0 ? kSure : std::max(calm_[c] - 1, 0);
+        calm_[c] = ratio_[c] > 1.0 ? tuning_.sure : std::max(calm_[c] - 1, 0);
         if (calm_[c] == 1 || ++since_[c] >= return_) take(c);
         return;
       case Fault::disagrees: return;  // see `compare_speeds`
@@ -353,7 +310,8 @@ class ChannelGates {
     const std::size_t n = at_.joints;
     if (!all_sound_ || gap) {
       for (std::size_t j = 0; j < n; ++j) {
-        const bool lost = !usable(j), jumped = std::fabs(now_[j] - tracked_[j]) > gate(j) + dt * kFastest;
+        const bool lost = !usable(j),
+            jumped = std::fabs(now_[j] - tracked_[j]) > gate(j) + dt * tuning_.fastest;
         if (gap || lost || jumped) begin_tracking(j);
         else track_one(j, dt);
       }
@@ -381,7 +339,7 @@ class ChannelGates {
     if (ratio_[c] <= 1.0) return take(c);
     const bool stays = std::fabs(x - candidate_[c]) <= gate(c);
     calm_[c] = stays && lives(c, candidate_[c]) ? calm_[c] + 1 : 0;
-    if (calm_[c] >= kSure && c >= at_.tau()) {  // a step that lasts
+    if (calm_[c] >= tuning_.sure && c >= at_.tau()) {  // a step that lasts
       if (!witnessed(c)) return take(c);
       fault_[c] = Fault::step;
       since_[c] = calm_[c] = 0;
@@ -406,11 +364,11 @@ class ChannelGates {
     }
     if (!calm && c < at_.tau()) drift_[c - at_.qd()] = 0.0;
     since_[c] = calm && (c >= at_.tau() || near(c)) ? since_[c] + 1 : 0;
-    if (since_[c] >= kGood) take(c);
+    if (since_[c] >= tuning_.good) take(c);
   }
 
   bool lives(std::size_t c, double before) const {
-    return now_[c] != before || often_[c] < kLively;
+    return now_[c] != before || often_[c] < tuning_.lively;
   }
 
   // The reading counts again.
@@ -439,7 +397,7 @@ class ChannelGates {
     const std::size_t first = at_.wrench(), sensor = c < first ? 0 : (c - first) / 6;
     for (std::size_t other = at_.qd(); other < at_.count(); ++other) {
       const bool same = c == other || (c >= first && other >= first && (other - first) / 6 == sensor);
-      if (!same && moves(other) && ratio_[other] > kEqual * ratio_[c]) return true;
+      if (!same && moves(other) && ratio_[other] > tuning_.equal * ratio_[c]) return true;
     }
     return c >= first && !witnessed(c) && one_force(sensor);
   }
@@ -463,7 +421,8 @@ class ChannelGates {
   static constexpr double kTurn = 6.283185307179586;  // [rad]
 
   bool moves(std::size_t c) const {
-    return watched(c) && fault_[c] == Fault::none && step_[c] > kMoves * mean_[c] + kLeastMove;
+    return watched(c) && fault_[c] == Fault::none &&
+        step_[c] > tuning_.moves * mean_[c] + kLeastMove;
   }
   static constexpr double kLeastMove = 1e-9;  // of any unit: rounding
 
@@ -471,7 +430,7 @@ class ChannelGates {
   bool speed_borne_out(std::size_t j, double dt) const {
     const double before = last_[at_.qd() + j], jump = std::fabs(now_[at_.qd() + j] - before);
     const double shown = std::fabs((now_[j] - last_[j]) / dt - before);
-    return !(shown + kMoves * mean_[j] / dt < kBorneOut * jump);
+    return !(shown + tuning_.moves * mean_[j] / dt < tuning_.borne_out * jump);
   }
 
   // Is the step of a sensor that of one force on a link: no moment along it, none beyond reach,
@@ -490,7 +449,8 @@ class ChannelGates {
     const double* usual = mean_.data() + first;  // the arm's own motion adds to the step
     const double slack = force * std::hypot(usual[3], usual[4], usual[5]) +
                          moment * std::hypot(usual[0], usual[1], usual[2]);
-    return moving >= 2 && moment <= kReach * force && along <= kPitch * force * moment + slack;
+    return moving >= 2 && moment <= tuning_.reach * force &&
+        along <= tuning_.pitch * force * moment + slack;
   }
 
   // What this sample teaches of the steps of each channel.
@@ -499,9 +459,10 @@ class ChannelGates {
     seen_ += seen_ < kSeenMost ? 1 : 0;
     double* __restrict mean = mean_.data();
     const double* __restrict step = step_.data();
+    const double rate = rate_;
     for (std::size_t c = 0; c < mean_.size(); ++c) {
       const double off = step[c] - mean[c];
-      mean[c] += off == off ? rate_ * off : 0.0;
+      mean[c] += off == off ? rate * off : 0.0;
     }
   }
   static constexpr int kSeenMost = 1 << 20;  // samples: the mean has forgotten them long ago
@@ -513,35 +474,40 @@ class ChannelGates {
     const double* __restrict last = last_.data();
     double* __restrict drift = drift_.data();
     double* __restrict usual = usual_drift_.data();
-    const double silent = silent_;
+    const double silent = silent_, rate = rate_, kept = kept_;
+    const double stands = tuning_.stands, surely = tuning_.surely, stale = tuning_.stale;
+    const double disagrees = tuning_.disagrees;
     double* __restrict same = same_.data();
     double* __restrict often = often_.data();
     for (std::size_t c = 0; c < 2 * n; ++c) {
       const bool changes = !(now[c] == last[c]);
       same[c] = changes ? 0.0 : same[c] + 1.0;
-      often[c] += same[c] < kStands ? rate_ * ((changes ? 1.0 : 0.0) - often[c]) : 0.0;
+      often[c] += same[c] < stands ? rate * ((changes ? 1.0 : 0.0) - often[c]) : 0.0;
     }
     const double least = least_drift();
     double worst = 0.0;
     for (std::size_t j = 0; j < n; ++j) {
       const double off = now[j] - last[j] - 0.5 * dt * (now[n + j] + last[n + j]);
-      const double sum = kept_ * drift[j] + off, size = std::fabs(sum);
+      const double sum = kept * drift[j] + off, size = std::fabs(sum);
       drift[j] = sum == sum ? sum : 0.0;
-      const double most = kDisagrees * usual[j] > least ? kDisagrees * usual[j] : least;
+      const double most = disagrees * usual[j] > least ? disagrees * usual[j] : least;
       const double clipped = size < most ? size : most;
-      usual[j] += rate_ * (clipped - usual[j]);
-      const bool dead = same[n + j] >= kStands && often[n + j] > kSurely;
-      const double over = dead ? 2.0 : (same[n + j] < silent ? size : kStale * size) / most;
+      usual[j] += rate * (clipped - usual[j]);
+      const bool dead = same[n + j] >= stands && often[n + j] > surely;
+      const double over = dead ? 2.0 : (same[n + j] < silent ? size : stale * size) / most;
       worst = over > worst ? over : worst;
     }
     if (worst > 1.0 || any_far_) judge_speeds();
   }
-  double least_drift() const { return kSpeedError * std::max(kWindow, kWindowSamples * period_); }
+  double compared_over() const {  // [s]
+    return std::max(tuning_.speed_window, tuning_.speed_window_samples * period_);
+  }
+  double least_drift() const { return tuning_.speed_error * compared_over(); }
   // One that has not changed for so long needs little to be told from one that is right.
   bool stale(std::size_t c) const { return same_[c] >= silent_; }
   bool far(std::size_t j) const {
-    const double off = std::fabs(drift_[j]) * (stale(at_.qd() + j) ? kStale : 1.0);
-    return off > std::max(kDisagrees * usual_drift_[j], least_drift());
+    const double off = std::fabs(drift_[j]) * (stale(at_.qd() + j) ? tuning_.stale : 1.0);
+    return off > std::max(tuning_.disagrees * usual_drift_[j], least_drift());
   }
 
   void judge_speeds() {
@@ -555,7 +521,7 @@ class ChannelGates {
       } else {
         far_[j] = far(j) ? far_[j] + 1 : 0;
         const bool free = position == Fault::none && speed == Fault::none;
-        const bool stands = same_[j] >= kStands && same_[at_.qd() + j] < 1.0;
+        const bool stands = same_[j] >= tuning_.stands && same_[at_.qd() + j] < 1.0;
         if (!free || seen_ <= warm_up_) continue;
         if (dead(j)) leave(at_.qd() + j, Fault::stuck);
         else if (far_[j] >= dwell_ || (far_[j] > 0 && stands)) tell_one(j);
@@ -568,14 +534,14 @@ class ChannelGates {
   // Has a velocity that changes with each sample stopped to do so while its joint moves?
   bool dead(std::size_t j) const {
     const std::size_t v = at_.qd() + j;
-    const bool still = same_[v] >= kStands && often_[v] > kSurely;
-    return still && same_[j] < 1.0 && std::fabs(speed_[j]) > kMoving;
+    const bool still = same_[v] >= tuning_.stands && often_[v] > tuning_.surely;
+    return still && same_[j] < 1.0 && std::fabs(speed_[j]) > tuning_.stuck_speed;
   }
 
   // Position and velocity of a joint disagree: one that has stood still since is the wrong one.
   void tell_one(std::size_t j) {
     const std::size_t v = at_.qd() + j;
-    if (same_[j] >= kStands && same_[v] < 1.0) {
+    if (same_[j] >= tuning_.stands && same_[v] < 1.0) {
       leave(j, Fault::stuck);
       anchor_[j] = now_[j] + same_[j] * period_ * now_[v];  // what it has missed so far
       return;
@@ -591,7 +557,7 @@ class ChannelGates {
       const double v = std::fabs(qd[j]);
       speed = v > speed ? v : speed;
     }
-    return speed > kMoving;
+    return speed > tuning_.stuck_speed;
   }
 
   // How often torques and wrenches change, and since when one has not.
@@ -608,8 +574,9 @@ class ChannelGates {
     double changes = 0.0, most = 0.0;
     for (std::size_t c = 0; c < count; ++c) changes += std::fabs(now[c] - last[c]) > 0.0 ? 1.0 : 0.0;
     if (changes == 0.0) return;  // a sample that was held or came twice
-    const double kept = 1.0 - std::min(1.0, dt / kRunMemory);
+    const double kept = 1.0 - std::min(1.0, dt / tuning_.run_memory);
     const double silent = silent_, rate = rate_;
+    const double likely = tuning_.evidence, likely_at_end = tuning_.evidence_at_end;
     for (std::size_t c = first; c < count; ++c) {
       const double d = std::fabs(now[c] - last[c]);
       const double p = often[c], p2 = p * p, p8 = p2 * p2 * p2 * p2;
@@ -622,7 +589,7 @@ class ChannelGates {
       const bool edge = now[c] >= highest[c] || now[c] <= lowest[c];
       highest[c] = now[c] > highest[c] ? now[c] : highest[c];
       lowest[c] = now[c] < lowest[c] ? now[c] : lowest[c];
-      const double over = evidence[c] - (edge ? kEvidenceAtEnd : kEvidence);
+      const double over = evidence[c] - (edge ? likely_at_end : likely);
       most = over > most ? over : most;
     }
     if (most > 0.0 && seen_ > warm_up_) find_stuck();
@@ -630,10 +597,12 @@ class ChannelGates {
 
   void find_stuck() {
     for (std::size_t c = at_.tau(); c < at_.count(); ++c) {
-      if (!watched(c) || fault_[c] != Fault::none || run_[c] < kRuns * longest_[c]) continue;
+      if (!watched(c) || fault_[c] != Fault::none || run_[c] < tuning_.runs * longest_[c]) continue;
       const bool edge = now_[c] == highest_[c] || now_[c] == lowest_[c];
-      const bool stuck = run_[c] >= silent_ && evidence_[c] > kEvidence;
-      if (!stuck && !(edge && run_[c] >= kLeastAtEnd && evidence_[c] > kEvidenceAtEnd)) continue;
+      const bool stuck = run_[c] >= silent_ && evidence_[c] > tuning_.evidence;
+      const bool clipped = edge && run_[c] >= tuning_.least_at_end &&
+                           evidence_[c] > tuning_.evidence_at_end;
+      if (!stuck && !clipped) continue;
       fault_[c] = Fault::stuck;
       since_[c] = 0;
     }
@@ -646,13 +615,15 @@ class ChannelGates {
     for (std::size_t j = 0; j < at_.joints; ++j) {
       const std::size_t v = at_.qd() + j;
       const bool way = usable(j), speed = usable(v);
-      if (!way && speed && fault_[j] != Fault::none && blind_[j] < kWayBlind) out_[j] = anchor_[j];
+      if (!way && speed && fault_[j] != Fault::none &&
+          blind_[j] < tuning_.way_blind) out_[j] = anchor_[j];
       if (!speed && way && fault_[v] != Fault::none) out_[v] = speed_[j];
     }
     return {time, out_.data() + at_.q(), out_.data() + at_.qd(), out_.data() + at_.tau(),
             out_.data() + at_.wrench()};
   }
 
+  GatesTuning tuning_;
   ChannelLayout at_;
   double period_;
   std::vector<double> floor_;  // of steps that are judged; infinite: not a channel

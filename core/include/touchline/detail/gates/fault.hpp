@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What can be wrong with one channel, and where the channels of a robot stand.
+// Theory: docs/theory.md, section 3.
 #pragma once
 
 #include <cstddef>

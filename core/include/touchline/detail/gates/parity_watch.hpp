@@ -11,6 +11,7 @@
 //
 // What two quantities alone tell is not judged. A force at the innermost sensor that no joint feels
 // may be a push on the link that carries it, and a torque of one joint a hand that pinches it.
+// Theory: docs/theory.md, section 3.4.
 #pragma once
 
 #include <algorithm>
@@ -20,6 +21,7 @@
 #include <vector>
 
 #include "touchline/detail/gates/fault.hpp"
+#include "touchline/detail/gates/tuning.hpp"
 #include "touchline/detail/observer/observer.hpp"
 #include "touchline/result.hpp"
 #include "touchline/robot.hpp"
@@ -29,8 +31,9 @@ namespace touchline {
 class ParityWatch {
  public:
   // Of a robot whose parts fit.
-  ParityWatch(const Robot& robot, const Observer& observer)
-      : at_{robot.joints.size(), robot.sensors.size()},
+  ParityWatch(const Robot& robot, const Observer& observer, const GatesTuning& tuning = {})
+      : tuning_(tuning),
+        at_{robot.joints.size(), robot.sensors.size()},
         observer_(observer),
         rows_(robot.rows),
         period_(std::max(robot.noise.period, kShortest)),
@@ -61,7 +64,7 @@ class ParityWatch {
   void step(const Result& result, double time, Contradicted&& contradicted) {
     const double dt = time - time_;
     time_ = time;
-    const bool goes_on = dt > 0.0 && dt < kGapPeriods * period_;
+    const bool goes_on = dt > 0.0 && dt < tuning_.step_periods * period_;
     if (!goes_on || (result.health & kSettling) != 0) return begin_anew();
     for (const Pair& pair : pairs_) compare(pair, result, dt, contradicted);
     for (const int g : innermost_) compare_couple(g, result, dt, contradicted);
@@ -74,15 +77,7 @@ class ParityWatch {
   }
 
  private:
-  static constexpr double kShortest = 1e-6;   // [s] of a period
-  static constexpr double kGapPeriods = 5.0;  // a longer step in time begins anew
-  static constexpr double kDwell = 0.003;     // [s] for which a relation is broken,
-  static constexpr double kLeastDwell = 3.0;  // and so many samples
-  static constexpr double kClear = 1.2;       // thresholds of a contact: so much must be wrong,
-  static constexpr double kLeft = 0.3;       // of which the other one leaves so much at most,
-  static constexpr double kNoise = 0.4;       // and so many thresholds of its own
-  static constexpr double kAlone = 0.2;       // of a sensor's load: what another axis may have
-  static constexpr double kReach = 2.0;       // [m] farther from a sensor no link is
+  static constexpr double kShortest = 1e-6;  // [s] of a period: no division by zero
 
   struct Pair {
     int inner, outer;  // segments
@@ -93,7 +88,8 @@ class ParityWatch {
   // Has a relation been broken for long enough?
   bool broken(std::size_t channel, bool now, double dt) {
     since_[channel] = now ? since_[channel] + dt : 0.0;
-    if (since_[channel] < std::max(kDwell, (kLeastDwell - 0.5) * period_)) return false;
+    if (since_[channel] < std::max(tuning_.parity_dwell,
+        (tuning_.parity_least_dwell - 0.5) * period_)) return false;
     since_[channel] = 0.0;
     return true;
   }
@@ -120,7 +116,8 @@ class ParityWatch {
       most = std::max(most, std::fabs(own[i]));
       felt = std::max(felt, std::fabs(between[i]));
     }
-    bool now = most > 1.0 && felt > kNoise && result.estimate.segment_settled(pair.inner) &&
+    bool now = most > 1.0 && felt > tuning_.parity_noise &&
+        result.estimate.segment_settled(pair.inner) &&
                result.estimate.segment_settled(pair.outer);
     if (now) {
       double seen[6];
@@ -134,8 +131,9 @@ class ParityWatch {
         size2 += x * x;
         left2 += left * left;
       }
-      now = size2 > kClear * kClear &&
-            left2 < std::max(kLeft * kLeft * size2, kNoise * kNoise);
+      now = size2 > tuning_.parity_clear * tuning_.parity_clear &&
+            left2 < std::max(tuning_.parity_left * tuning_.parity_left * size2,
+                tuning_.parity_noise * tuning_.parity_noise);
     }
     const int axis = now ? only_axis(outer, own) : -1;
     if (broken(first, axis >= 0, dt)) contradicted(first + axis);
@@ -147,7 +145,8 @@ class ParityWatch {
     int most = 0;
     for (int i = 1; i < 6; ++i)
       if (std::fabs(shown[i]) > std::fabs(shown[most])) most = i;
-    const double little = std::max(kNoise, kAlone * std::fabs(shown[most]));
+    const double little = std::max(tuning_.parity_noise,
+        tuning_.parity_alone * std::fabs(shown[most]));
     for (int i = 0; i < 6; ++i)
       if (i != most && std::fabs(shown[i]) > little) return -1;
     return most;
@@ -158,12 +157,13 @@ class ParityWatch {
   void compare_couple(int g, const Result& result, double dt, Contradicted&& contradicted) {
     const double* x = result.normalized.data() + first_[g];
     bool now = result.estimate.segment_settled(g) &&
-               std::max({std::fabs(x[3]), std::fabs(x[4]), std::fabs(x[5])}) > kClear;
+               std::max({std::fabs(x[3]), std::fabs(x[4]), std::fabs(x[5])}) > tuning_.parity_clear;
     if (now) {
       const Spatial w = load_of(g, result);
       double unsure = 0.0;  // of its force [N]
-      for (int i = 0; i < 3; ++i) unsure = std::max(unsure, kNoise * rows_[first_[g] + i].contact);
-      now = norm(w.angular) > kReach * (norm(w.linear) + unsure);
+      for (int i = 0; i < 3; ++i) unsure = std::max(unsure,
+          tuning_.parity_noise * rows_[first_[g] + i].contact);
+      now = norm(w.angular) > tuning_.reach * (norm(w.linear) + unsure);
     }
     const int sensor = observer_.layout().segments[g].sensor;
     const std::size_t first = at_.wrench() + 6 * static_cast<std::size_t>(sensor);
@@ -171,6 +171,7 @@ class ParityWatch {
     if (broken(first, axis >= 0, dt)) contradicted(first + axis);
   }
 
+  GatesTuning tuning_;
   ChannelLayout at_;
   const Observer& observer_;
   std::vector<DetectionRow> rows_;

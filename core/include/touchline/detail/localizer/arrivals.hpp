@@ -3,6 +3,7 @@
 // all their forces have changed, or there is a new contact. That is located in what is left without
 // them, as they were known before it could be felt, and admitted once its place has been found for
 // a while. No allocation per sample.
+// Theory: docs/theory.md, section 6.4.
 #pragma once
 
 #include <algorithm>
@@ -46,9 +47,9 @@ class Arrivals {
   void follow(SegmentContacts& s, const SegmentSample& now, Read&& read) {
     now_ = now;
     JointEstimate& before = s.before.contacts;
-    before.creep(std::max(0.0, now.time - s.before.time), now.bandwidth);
+    before.creep(std::max(0.0, now.time - s.before.time), now.bandwidth, settings_);
     s.before.time = now.time;
-    before.age(now.bandwidth, now.time);
+    before.age(now.bandwidth, now.time, settings_);
     if (subsided(s)) return;
     switch (slides_.follow(s, now, read)) {
       case Slides::Outcome::none:
@@ -78,13 +79,13 @@ class Arrivals {
     if (found && !s.is_placed) s.placed = now_.time;
     s.is_placed = found;
     return found && now_.time - s.placed >= now_.brief() &&
-           now_.time - s.since >= SegmentContacts::kYoung * now_.brief() &&
+           now_.time - s.since >= settings_.young * now_.brief() &&
            s.contacts.count < SegmentContacts::kMost;
   }
 
   // It is reported beside the known ones, but not known yet.
   void suspect(SegmentContacts& s, Answer& a) {
-    const bool lasting = now_.time - s.since >= 2.0 * now_.brief();
+    const bool lasting = now_.time - s.since >= settings_.suspected * now_.brief();
     for (int c = 0; c < s.contacts.count; ++c) {
       reports_.add(s.before.contacts.known[c]);
       if (lasting && !placed(a)) reports_.doubt_last();
@@ -122,7 +123,7 @@ class Arrivals {
     const JointEstimate& before = s.before.contacts;
     for (int c = 0; c < before.count; ++c) {
       const KnownContact& k = before.known[c];
-      if (!takes_back(k, a, single_.surfaces(), settings_.place_radius)) continue;
+      if (!takes_back(k, a, single_.surfaces(), settings_)) continue;
       for (int i = 0; i < before.count; ++i) reports_.add(before.known[i]);
       reports_.change_force(c, k.force + a.force);
       s.is_placed = false;  // what was suspected ends when all is explained
@@ -153,7 +154,8 @@ class Arrivals {
   Answer& remainder(SegmentContacts& s) {
     const JointEstimate& known = s.before.contacts;
     fit_.take_out(known, Change::none(), measurement_);
-    new_lag_ = s.new_age.follow(measurement_.load(), now_.bandwidth, now_.time) * now_.brief();
+    new_lag_ = s.new_age.follow(measurement_.load(), now_.bandwidth, now_.time, settings_.oldest) *
+               now_.brief();
     freed_ = false;
     return answer_ = single_.locate(now_.segment, new_lag_, measurement_);
   }
@@ -195,7 +197,7 @@ class Arrivals {
     Change change;
     if (freed_) change = Change::of_forces(old, settings_.force_scale);
     s.contacts.add(found_contact(s.newcomer, a, single_.surfaces(), s.new_age, now_.brief()),
-                   settings_.force_scale);
+                   settings_);
     fit_.weigh(s.contacts, measurement_);
     fit_.begin(measurement_, s.contacts);
     fit_.accept(s.contacts, change, 1.0);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Points spread over the surfaces of a body, in its frame and, at a posture, in world.
+// Theory: docs/theory.md, section 6.5.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +13,7 @@ namespace touchline {
 
 class BodyStarts {
  public:
-  static constexpr int kMost = 40;
+  static constexpr int kMost = 40;  // room: points on a body
 
   // Shared out by the areas of the body's surfaces.
   BodyStarts(const LinkSurfaces& surfaces, const Body& body) {

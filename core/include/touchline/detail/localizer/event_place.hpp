@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where an event is, from all its strong samples: explanations that agree are one place, fixed on
 // its link, and the evidence for each place adds up. Bounded memory, no allocation per sample.
+// Theory: docs/theory.md, section 6.6.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "touchline/detail/localizer/settings.hpp"
 #include "touchline/detail/place/body_share.hpp"
 #include "touchline/detail/place/hypothesis.hpp"
 
@@ -24,20 +26,20 @@ struct Place {
 
 class EventPlace {
  public:
-  static constexpr int kPlaces = 12;
+  static constexpr int kPlaces = 12;  // room
 
   void restart() { *this = EventPlace{}; }
 
   // `independence`: how much of an independent sample each one is (K dt / 2 behind a filter).
   // Returns whether the sample is strong; if it is, its explanations are to be added.
-  bool begin_sample(double strength, double time, double independence) {
-    if (kStrong * strength > peak_) {  // all that came before was weak
+  bool begin_sample(double strength, double time, double independence, const LocalizerTuning& t) {
+    if (t.strong_share * strength > peak_) {  // all that came before was weak
       const double peak = strength;
       restart();
       peak_ = peak;
     }
     peak_ = std::max(peak_, strength);
-    if (strength < kStrong * peak_) return false;
+    if (strength < t.strong_share * peak_) return false;
     time_ = time;
     independence_ = std::min(1.0, independence);
     ++samples_;
@@ -57,9 +59,10 @@ class EventPlace {
     return true;
   }
 
-  void add(int surface, const Vec3& point, double probability, double variance, double radius) {
-    if (!(variance > 0.0) || probability < kFloor) return;
-    const double near = std::max(radius, 3.0 * std::sqrt(variance));
+  void add(int surface, const Vec3& point, double probability, double variance,
+           const LocalizerSettings& t) {
+    if (!(variance > 0.0) || probability < t.floor) return;
+    const double near = std::max(t.place_radius, t.agree_sigmas * std::sqrt(variance));
     Place* place = nullptr;
     double least = near;
     for (int i = 0; i < count_; ++i) {
@@ -70,17 +73,17 @@ class EventPlace {
       }
     }
     if (place == nullptr) place = fresh(surface);
-    const double weight = probability / (variance + kSmoothness);
+    const double weight = probability / (variance + t.smoothness);
     place->weight += weight;
     place->point = place->point + (weight / place->weight) * (point - place->point);
     place->last += probability;
   }
 
   // `variance` of the sample's best place, of which the part `lasting` is that of the next as well.
-  void close(double variance, double lasting) {
+  void close(double variance, double lasting, const LocalizerTuning& t) {
     for (int i = 0; i < count_; ++i)
-      places_[i].evidence += independence_ * std::log(std::clamp(places_[i].last, kFloor, 1.0));
-    missed_ += independence_ * std::log(kFloor);
+      places_[i].evidence += independence_ * std::log(std::clamp(places_[i].last, t.floor, 1.0));
+    missed_ += independence_ * std::log(t.floor);
     if (std::isfinite(variance)) {
       variance_ += (1.0 - lasting) * variance;
       lasting_ += lasting * variance;
@@ -91,9 +94,9 @@ class EventPlace {
   // Gives each place its probability and sorts them: the most probable body's best comes first,
   // the others by probability. `body(surface)` tells what is one body.
   template <class Body>
-  void conclude(Body&& body) {
+  void conclude(Body&& body, const LocalizerTuning& t) {
     // What errs in one sample, the model, errs in the next: they are not that many looks.
-    const double looks = missed_ < 0.0 ? std::min(1.0, kLooks * std::log(kFloor) / missed_) : 1.0;
+    const double looks = missed_ < 0.0 ? std::min(1.0, t.looks * std::log(t.floor) / missed_) : 1.0;
     double sum = 0.0, most = -1e300;
     for (int i = 0; i < count_; ++i) most = std::max(most, places_[i].evidence);
     for (int i = 0; i < count_; ++i) sum += std::exp(looks * (places_[i].evidence - most));
@@ -105,14 +108,14 @@ class EventPlace {
   // Gives each body the probability that the evidence for links gives it; where no sample has named
   // it, its best patch stands for it. `body(surface)` is the node of a surface.
   template <class Body>
-  void share_out(const std::vector<BodyShare>& shares, Body&& body) {
+  void share_out(const std::vector<BodyShare>& shares, Body&& body, const LocalizerTuning& t) {
     for (const BodyShare& of : shares) {
       double here = 0.0;
       for (int i = 0; i < count_; ++i) here += body(places_[i].surface) == of.node ? places_[i].share : 0.0;
       for (int i = 0; i < count_; ++i) {
         if (body(places_[i].surface) == of.node) places_[i].share *= of.share / here;
       }
-      if (here > 0.0 || of.share < kFloor) continue;
+      if (here > 0.0 || of.share < t.floor) continue;
       Place& place = count_ < kPlaces ? places_[count_++] : *least_likely();
       place = Place{};
       place.surface = of.surface;
@@ -138,11 +141,6 @@ class EventPlace {
   }
 
  private:
-  static constexpr double kStrong = 0.5;      // of the peak
-  static constexpr double kFloor = 1e-3;      // no sample rules a place out
-  static constexpr double kLooks = 3.0;       // that an event is worth at most
-  static constexpr double kSmoothness = 1e-8;  // m2; no mesh is smoother
-
   // Sorts by probability, but that the most probable body's best place comes first.
   template <class Body>
   void lead(Body&& body) {

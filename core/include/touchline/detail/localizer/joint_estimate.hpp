@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // The contacts on one segment whose places are known, and the joint covariance of all their forces
 // and places: where the wrench alone tells two contacts, what one gains the other loses.
+// Theory: docs/theory.md, sections 6.1 and 6.2.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 
 #include "touchline/detail/localizer/known_contact.hpp"
+#include "touchline/detail/localizer/settings.hpp"
 #include "touchline/detail/model/dense.hpp"
 #include "touchline/detail/place/hypothesis.hpp"
 
@@ -22,13 +24,13 @@ struct JointEstimate {
   int size() const { return kEach * count; }
 
   // A contact of which nothing is known but roughly its place and force.
-  void add(const KnownContact& contact, double force_sigma) {
+  void add(const KnownContact& contact, const LocalizerSettings& t) {
     const int old = size(), n = old + kEach;
     for (int i = old - 1; i >= 0; --i) {
       for (int j = old - 1; j >= 0; --j) covariance[i * n + j] = covariance[i * old + j];
     }
     known[count++] = contact;
-    forget(count - 1, force_sigma);
+    forget(count - 1, t);
   }
 
   void remove(int c) {
@@ -45,11 +47,11 @@ struct JointEstimate {
   }
 
   // Forgets all that is known of a contact.
-  void forget(int c, double force_sigma) {
+  void forget(int c, const LocalizerSettings& t) {
     const int n = size(), first = kEach * c;
     for (int i = first; i < first + kEach; ++i) {
       for (int j = 0; j < n; ++j) covariance[i * n + j] = covariance[j * n + i] = 0.0;
-      covariance[i * (n + 1)] = i < first + 3 ? force_sigma * force_sigma : kAnywhere;
+      covariance[i * (n + 1)] = i < first + 3 ? t.force_scale * t.force_scale : t.anywhere;
     }
   }
 
@@ -60,16 +62,16 @@ struct JointEstimate {
   }
 
   // How old that is which each force speaks of, at a time [s].
-  void age(double bandwidth, double time) {
+  void age(double bandwidth, double time, const LocalizerTuning& t) {
     for (int c = 0; c < count; ++c) {
       KnownContact& k = known[c];
-      k.lag = k.age.follow(k.force, bandwidth, time) / bandwidth;
+      k.lag = k.age.follow(k.force, bandwidth, time, t.oldest) / bandwidth;
     }
   }
 
   // What forces that are held and places that are kept do in a time [s]. A force of which the filter
   // does not show all yet will go on to change: along its own direction, and about as foreseen.
-  void creep(double passed, double bandwidth) {
+  void creep(double passed, double bandwidth, const LocalizerTuning& t) {
     const int n = size();
     for (int c = 0; c < count; ++c) {
       KnownContact& k = known[c];
@@ -79,22 +81,23 @@ struct JointEstimate {
       k.force = k.force + way * coming * (1.0 - std::exp(-bandwidth * passed)) * u;
       double* P = covariance + kEach * c * (n + 1);
       for (int i = 0; i < kEach; ++i)
-        P[i * (n + 1)] += passed * (i < 3 ? kTremor + kAcross * unrest : kCreep);
+        P[i * (n + 1)] += passed * (i < 3 ? t.tremor + t.doubt_across * unrest : t.place_creep);
       for (int i = 0; i < 3; ++i) {
         for (int j = 0; j < 3; ++j)
-          P[i * n + j] += passed * (kDoubt - kAcross) * unrest * component(u, i) * component(u, j);
+          P[i * n + j] += passed * (t.doubt - t.doubt_across) * unrest *
+                          component(u, i) * component(u, j);
       }
     }
   }
 
   // The places' own covariances, from the joint one; none is sharper than surfaces are, or than the
   // errors allow that the samples have in common.
-  void spread() {
+  void spread(const LocalizerTuning& t) {
     const int n = size();
     for (int c = 0; c < count; ++c) {
       double* P = covariance + (kEach * c + 3) * (n + 1);
-      P[0] = std::max(P[0], kSharpest);
-      P[n + 1] = std::max(P[n + 1], kSharpest);
+      P[0] = std::max(P[0], t.sharpest);
+      P[n + 1] = std::max(P[n + 1], t.sharpest);
       const Spread seen{P[0], P[1], P[n + 1]}, lasting = known[c].lasting;
       const double rest = std::max(0.0, lasting.trace() - seen.trace());
       known[c].place = rest > 0.0 ? seen + (rest / lasting.trace()) * lasting : seen;
@@ -129,13 +132,6 @@ struct JointEstimate {
   }
 
  private:
-  static constexpr double kAnywhere = 1e-2;  // variance of a place before it is known [m2]
-  static constexpr double kTremor = 3e-4;    // of forces that are held [N2/s]
-  // Doubt of how much a force changes, and of its direction, in parts of the variance foreseen.
-  static constexpr double kDoubt = 0.05, kAcross = 0.005;
-  static constexpr double kSharpest = 4e-10;  // variance of a place [m2]
-  static constexpr double kCreep = 2e-9;     // and of their places [m2/s]
-
   // `v` by the shortest turn that takes one unit vector to another (Rodrigues).
   static Vec3 turned(const Vec3& v, const Vec3& from, const Vec3& to) {
     const Vec3 w = cross(from, to);

@@ -5,6 +5,7 @@
 //   rows = sum of H_c (p_c) (f_c + df_c) + G_c dp_c + noise,   (df, dp) ~ (0, P),
 //
 // P is the joint covariance of the estimate at hand. No allocation after construction.
+// Theory: docs/theory.md, section 6.1.
 #pragma once
 
 #include <algorithm>
@@ -44,8 +45,10 @@ class JointFit {
  public:
   static constexpr int kMost = JointEstimate::kMost, kEach = JointEstimate::kEach;
 
-  JointFit(const Posture& posture, const LinkSurfaces& surfaces, std::size_t rows)
-      : posture_(posture), surfaces_(surfaces), rows_(rows * (kSize + 1)), loose_(rows * kSize) {}
+  JointFit(const Posture& posture, const LinkSurfaces& surfaces, const LocalizerSettings& settings,
+           std::size_t rows)
+      : posture_(posture), surfaces_(surfaces), settings_(settings), rows_(rows * (kSize + 1)),
+          loose_(rows * kSize) {}
 
   // Where a contact was at the time that its force speaks of [world].
   Vec3 earlier(const KnownContact& k, const Measurement& measurement) const {
@@ -60,7 +63,7 @@ class JointFit {
     for (int c = 0; c < estimate.count; ++c) {
       const KnownContact& k = estimate.known[c];
       const Vec3 way = surfaces_.to_world(k.point, k.node) - earlier(k, measurement);
-      moment += kUncertainWay * norm(way) * norm(k.force);
+      moment += settings_.uncertain_way * norm(way) * norm(k.force);
     }
     if (moment > 1e-6) measurement.loosen_moments(moment);
   }
@@ -151,7 +154,7 @@ class JointFit {
       estimate.known[c].force = estimate.known[c].force + Vec3{own[0], own[1], own[2]};
       shift(estimate, c, own[3], own[4]);
     }
-    estimate.spread();
+    estimate.spread(settings_);
   }
 
   // How much is known of an estimate that follows from this sample.
@@ -160,7 +163,7 @@ class JointFit {
     know(1.0, factor_);
     if (!invert(factor_, n_, work_)) return;
     std::copy(factor_, factor_ + n_ * n_, estimate.covariance);
-    estimate.spread();
+    estimate.spread(settings_);
   }
 
   // Takes the contacts of an estimate out of a measurement, with their uncertainty; false if
@@ -189,7 +192,7 @@ class JointFit {
 
  private:
   static constexpr int kSize = JointEstimate::kSize;
-  static constexpr double kUncertainWay = 0.1;  // of the way that a contact has come
+  static constexpr double kUnmoved = 1e-7;  // [m] less is rounding
 
   Spatial wrench(const KnownContact& k, const Measurement& m) const {
     const Vec3 p = earlier(k, m);
@@ -280,17 +283,19 @@ class JointFit {
 
   // Moves a place along its surface [m].
   void shift(JointEstimate& estimate, int c, double along, double across) const {
-    if (std::fabs(along) + std::fabs(across) < 1e-7) return;
+    if (std::fabs(along) + std::fabs(across) < kUnmoved) return;
     const KnownContact& k = estimate.known[c];
     Vec3 s, t;
     tangents(k.normal, s, t);
     const SurfacePoint p =
-        surfaces_[k.surface].mesh.nearest_to_point(k.point + along * s + across * t, 0.06);
+        surfaces_[k.surface].mesh.nearest_to_point(k.point + along * s + across * t,
+            settings_.surface_reach);
     if (p.face >= 0) estimate.move(c, p);
   }
 
   const Posture& posture_;
   const LinkSurfaces& surfaces_;
+  const LocalizerSettings& settings_;
   int n_ = 0;
   std::vector<double> rows_, loose_;
   double A_[kSize * kSize], b_[kSize], square_ = 0.0;  // of the sample

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // A contact whose place on its link is known, while its force may change. No allocation.
+// Theory: docs/theory.md, section 6.2.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 
+#include "touchline/detail/localizer/settings.hpp"
 #include "touchline/detail/place/answer.hpp"
 #include "touchline/detail/place/link_surfaces.hpp"
 
@@ -19,18 +21,17 @@ class Age {
     twice_ = {};
     time_ = time;
   }
-  // In parts of 1 / K.
-  double follow(const Vec3& force, double bandwidth, double time) {
+  // In parts of 1 / K, at most `oldest`.
+  double follow(const Vec3& force, double bandwidth, double time, double oldest) {
     const double size2 = dot(force, force);
     if (!(size2 > 0.0)) return 0.0;
     const double keep = std::exp(-bandwidth * std::max(0.0, time - time_));
     twice_ = keep * twice_ + (1.0 - keep) * force;
     time_ = time;
-    return std::clamp(dot(twice_, force) / size2, 0.0, kOldest);
+    return std::clamp(dot(twice_, force) / size2, 0.0, oldest);
   }
 
  private:
-  static constexpr double kOldest = 5.0;  // what is left of a force by then is hardly felt
   Vec3 twice_;
   double time_ = 0.0;
 };
@@ -165,41 +166,44 @@ inline bool placed(const Answer& a) {
   return a.status == Status::located || a.status == Status::ambiguous;
 }
 
-// Do the places of a contact that is known and of the answer at hand agree within their spread, or
-// within `least` [m]?
+// Do the places of a contact that is known and of the answer at hand agree within their spread?
 inline bool agrees(const KnownContact& known, const Answer& a, const LinkSurfaces& surfaces,
-                   double least) {
+                   const LocalizerTuning& t) {
   if (!placed(a)) return false;
   const Vec3 p = surfaces.to_world(known.point, known.node);
   for (int i = 0; i < a.count; ++i) {
     const Candidate& c = a.candidates[i];
     const double sigma = std::sqrt(c.along[0] + c.along[2] + known.place.trace());
-    if (c.surface == known.surface && norm(c.point - p) < std::max(least, 3.0 * sigma)) return true;
+    if (c.surface == known.surface &&
+        norm(c.point - p) < std::max(t.same_place, t.agree_sigmas * sigma))
+      return true;
   }
   return false;
 }
 
 // Can a contact that is known have slid `way` [m] at most to where it is found?
 inline bool within_reach(const KnownContact& known, const Answer& a, const LinkSurfaces& surfaces,
-                         double way) {
+                         double way, const LocalizerTuning& t) {
   if (!placed(a)) return false;
   const Candidate& best = a.candidates[0];
   const double sigma = std::sqrt(best.along[0] + best.along[2] + known.place.trace());
   return surfaces[best.surface].node == known.node &&
-         norm(best.point - surfaces.to_world(known.point, known.node)) < way + 3.0 * sigma;
+         norm(best.point - surfaces.to_world(known.point, known.node)) <
+             way + t.agree_sigmas * sigma;
 }
 
-// Does what is said beside a known contact take its force back, along its own line if it has one
-// (within `least` [m])? What would hold against a contact there, and no harder, cannot be told from
+// Does what is said beside a known contact take its force back, along its own line if it has one?
+// What would hold against a contact there, and no harder, cannot be told from
 // its letting go.
 inline bool takes_back(const KnownContact& known, const Answer& a, const LinkSurfaces& surfaces,
-                       double least) {
-  constexpr double kStraight = 0.95, kMost = 1.1;  // cosine, part of the known force
+                       const LocalizerSettings& t) {
   const double size = norm(known.force), back = norm(a.force);
-  if (!(dot(known.force, a.force) < -kStraight * size * back && back < kMost * size)) return false;
+  if (!(dot(known.force, a.force) < -t.back_straight * size * back &&
+      back < t.back_most * size)) return false;
   const Vec3 way = a.candidates[0].point - surfaces.to_world(known.point, known.node);
   const double along = dot(way, known.force) / size;
-  return !placed(a) || norm(way - (along / size) * known.force) < std::max(least, 3.0 * a.spread);
+  const double near = std::max(t.place_radius, t.agree_sigmas * a.spread);
+  return !placed(a) || norm(way - (along / size) * known.force) < near;
 }
 
 }  // namespace touchline

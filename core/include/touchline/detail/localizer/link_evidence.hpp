@@ -3,6 +3,7 @@
 // whole, and each link weighed over all of its surface. Friction and errors of the model are no white
 // noise that many samples take away: one step is one look. No allocation per sample; the walk over the
 // surfaces is spread over samples.
+// Theory: docs/theory.md, section 5.9.
 #pragma once
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 #include <limits>
 #include <vector>
 
+#include "touchline/detail/localizer/settings.hpp"
 #include "touchline/detail/place/approach.hpp"
 #include "touchline/detail/place/body_share.hpp"
 #include "touchline/detail/place/link_surfaces.hpp"
@@ -28,12 +30,12 @@ class LinkEvidence {
       : observer_(observer),
         surfaces_(surfaces),
         settings_(settings),
-        crosstalk_(kCrosstalk * torque_error),
+        crosstalk_(settings.crosstalk * torque_error),
         period_(period),
         segment_(torque_segment()),
         posture_(observer.tree(), observer.row_layout().joints),
         evidence_(settings_),
-        resting_(observer.row_layout().joints) {
+        resting_(observer.row_layout().joints, settings) {
     const std::size_t n = observer.row_layout().joints;
     for (std::vector<double>* v : {&mean_, &q_, &walked_, &step_}) v->resize(n);
     covariance_.resize(n * n);
@@ -52,7 +54,7 @@ class LinkEvidence {
           areas_[s] += 0.5 * norm(cross(t.ab, t.ac)) / std::max(count, 1);
       }
     }
-    const double samples = std::max(1.0, std::ceil(kWalk / period));
+    const double samples = std::max(1.0, std::ceil(settings.walk / period));
     each_ = static_cast<std::size_t>(std::ceil(static_cast<double>(patches_.size()) / samples));
   }
 
@@ -87,14 +89,6 @@ class LinkEvidence {
 
  private:
   static constexpr double kNone = -std::numeric_limits<double>::infinity();
-  // What any joint's torque shows of the largest load, in parts of the error of gains: a sensor is
-  // bent by all that its joint carries, and a hand is no point.
-  static constexpr double kCrosstalk = 1.5;
-  static constexpr double kWalk = 0.03;      // s: in which all patches are looked at
-  static constexpr double kMemory = 1.0;     // s: of the step
-  static constexpr double kTurned = 0.05;    // rad or m: an arm that has moved so far stands elsewhere
-  static constexpr double kChanged = 0.03;   // of the step: less is no other step
-  static constexpr double kNegligible = 12.0;  // of the log evidence, below the best
 
   struct Patch {
     int body, surface, sample;
@@ -114,7 +108,8 @@ class LinkEvidence {
       square += step_[j] * step_[j];
       if (weight_ > 0.0) way = std::max(way, std::fabs(q[j] - q_[j]));
     }
-    weight_ *= std::max(0.0, 1.0 - period_ / kMemory) * std::exp(-way / kTurned);
+    weight_ *= std::max(0.0, 1.0 - period_ / settings_.step_memory) *
+               std::exp(-way / settings_.turned);
     weight_ += square;
     const double part = weight_ > 0.0 ? square / weight_ : 1.0;
     for (std::size_t j = 0; j < mean_.size(); ++j) {
@@ -130,7 +125,7 @@ class LinkEvidence {
       change += (mean_[j] - walked_[j]) * (mean_[j] - walked_[j]);
       all += mean_[j] * mean_[j];
     }
-    return change > kChanged * kChanged * all;
+    return change > settings_.changed * settings_.changed * all;
   }
 
   void start(const Measurement& measurement) {
@@ -210,13 +205,13 @@ class LinkEvidence {
     const double scale = std::log(area);
     const SurfaceEvidence::Explained e =
         evidence_.at(quadratic_, X.R * sample.point + X.p, X.R * sample.normal, grasped, radius,
-                     best_ - kNegligible - scale);
+                     best_ - settings_.negligible_patch - scale);
     double value = e.log_evidence + scale;
-    if (!(value > best_ - kNegligible)) return;
+    if (!(value > best_ - settings_.negligible_patch)) return;
     const Vec3 force = transposed_times(X.R, e.force);
     if (!grasped) {  // as the arm stands now: other links may be in the way
       value += approach(surfaces_, surfaces_.to_world(sample.point, node),
-                        surfaces_.turn_to_world(force, node), settings_.finger);
+                        surfaces_.turn_to_world(force, node), settings_);
     }
     if (value > best_) {
       if (best_ > kNone) {

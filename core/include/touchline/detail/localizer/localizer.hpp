@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where each segment is touched, and where each event is, from all its samples. No allocation per
 // sample.
+// Theory: docs/theory.md, section 6.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +23,7 @@ class Localizer {
       : observer_(observer),
         settings_(settings),
         period_(noise.period),
-        measurement_(observer, std::move(tests), std::move(noise)),
+        measurement_(observer, std::move(tests), std::move(noise), settings_),
         single_(observer, measurement_.posture(), settings_, std::move(surfaces)),
         tracks_(single_, measurement_, settings_, measurement_.most_rows(),
                 observer.row_layout().segments, period_),
@@ -54,6 +55,7 @@ class Localizer {
     if (shared_) share_out(cells);
     return cells;
   }
+  const LocalizerSettings& settings() const { return settings_; }
   const Measurement& measurement() const { return measurement_; }
 
   // Sizes of what the methods below take.
@@ -154,8 +156,8 @@ class Localizer {
   // Weighs the places of an event, those of the most probable body first.
   void conclude(Memory& m) {
     const auto node = [this](int surface) { return surfaces()[surface].node; };
-    m.event.conclude(node);
-    if (m.revision >= 0) m.event.share_out(m.links, node);
+    m.event.conclude(node, settings_);
+    if (m.revision >= 0) m.event.share_out(m.links, node, settings_);
   }
 
   Status status(const Memory& m) const {
@@ -208,7 +210,7 @@ class Localizer {
       std::copy(links_.shares().begin(), links_.shares().end(), m.links.begin());
       m.revision = links_.revision();
     }
-    if (!m.event.begin_sample(strength, time, 0.5 * period_ * bandwidth(g))) return;
+    if (!m.event.begin_sample(strength, time, 0.5 * period_ * bandwidth(g), settings_)) return;
     std::copy(q, q + m.q.size(), m.q.begin());
     const bool explained =
         answer.status == Status::located || answer.status == Status::ambiguous;
@@ -217,9 +219,9 @@ class Localizer {
     for (int i = 0; i < answer.count; ++i) {
       const Candidate& k = answer.candidates[i];
       m.event.add(k.surface, single_.surfaces().to_node(k.point, surfaces()[k.surface].node),
-                  k.weight, k.along[0] + k.along[2], settings_.place_radius);
+                  k.weight, k.along[0] + k.along[2], settings_);
     }
-    m.event.close(explained ? answer.spread * answer.spread : kNaN, answer.lasting);
+    m.event.close(explained ? answer.spread * answer.spread : kNaN, answer.lasting, settings_);
   }
 
   // What the step of the joint torques says of each body.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Two known contacts on one body have come so near to each other that they are one place, and one
 // contact explains all that both did: the older goes on, with the force of both. No allocation.
+// Theory: docs/theory.md, section 6.4.
 #pragma once
 
 #include "touchline/detail/localizer/known_fit.hpp"
@@ -57,7 +58,7 @@ class Merging {
     if (p.face < 0) return false;
     one_.move(a, p);
     k.force = k.force + gone.force;
-    one_.forget(a, settings_.force_scale);
+    one_.forget(a, settings_);
     one_.remove(b);
     return known_.explain_calmly(one_);
   }

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Two contacts that explain one measurement.
+// Theory: docs/theory.md, section 6.5.
 #pragma once
 
 #include <limits>
 
+#include "touchline/detail/localizer/settings.hpp"
 #include "touchline/detail/model/spatial.hpp"
 
 namespace touchline {

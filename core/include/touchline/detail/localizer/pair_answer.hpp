@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is said of two contacts that began at the same instant: two places, or the parts of the
 // links that may be touched. No allocation.
+// Theory: docs/theory.md, section 6.5.
 #pragma once
 
 #include <algorithm>

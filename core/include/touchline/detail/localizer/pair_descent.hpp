@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Moves a pair of points over the surfaces to where it explains better. No allocation.
+// Theory: docs/theory.md, section 6.5.
 #pragma once
 
 #include <algorithm>

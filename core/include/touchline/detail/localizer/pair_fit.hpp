@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // How well two contacts at given points explain a measurement, and which way they would explain it
 // better. No allocation.
+// Theory: docs/theory.md, section 6.5.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +17,7 @@ namespace touchline {
 
 class PairFit {
  public:
-  static constexpr int kUnknowns = 10;
+  static constexpr int kUnknowns = 10;  // three of each force, two of each place
 
   PairFit(const PairView& view, const LocalizerSettings& settings)
       : view_(view), settings_(settings), cone_(std::atan(settings.friction)) {}
@@ -80,7 +81,7 @@ class PairFit {
   }
 
  private:
-  static constexpr int kTurns = 3;
+  static constexpr int kTurns = 3;  // of the cones, linearized anew: a bound on time
   static constexpr double kBeyond = 0.01;  // cost of the cones that is not worth a turn
 
   double prior(int i) const {

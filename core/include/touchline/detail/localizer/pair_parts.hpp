@@ -2,6 +2,7 @@
 // Where two contacts may be that cannot be told apart: a walk over the pairs of points that explain,
 // from wherever a search began, some steps in each sample. It works on the view of that search, so
 // that its outcome does not depend on how it is spread over samples. No allocation.
+// Theory: docs/theory.md, section 6.5.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +16,7 @@ namespace touchline {
 
 class PairParts {
  public:
-  static constexpr int kMost = 256;
+  static constexpr int kMost = 256;  // room: parts
 
   // A point that is one of a pair that explains, in the frame of its node.
   struct Part {
@@ -70,7 +71,7 @@ class PairParts {
   }
 
  private:
-  static constexpr int kWaiting = 4096, kSteps = 12;
+  static constexpr int kWaiting = 4096, kSteps = 12;  // room: pairs that wait; steps of each
   static constexpr double kHopeless = 100.0;  // cost after a third of the steps
   static constexpr double kWindow = 13.0;     // of cost: 99 % of chi2 with four degrees of freedom
   // Cost of the cones through which a walk goes on, and which still tells: faces are flat where

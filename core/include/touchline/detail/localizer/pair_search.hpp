@@ -4,6 +4,7 @@
 // apart follows from the volume that explains as well: where the equations do not suffice (theory:
 // 6 and one per instrumented joint between the two, of 10) it is large, and so is the weight of
 // such an explanation. No allocation per search.
+// Theory: docs/theory.md, section 6.5.
 #pragma once
 
 #include <algorithm>
@@ -110,7 +111,7 @@ class PairSearch {
         const PairEnd& e = s.ends[k];
         const double cosine = -dot(e.normal, e.force) / std::max(norm(e.force), 1e-9);
         s.weight += std::log(std::max(cosine, 0.02)) +
-                    approach(surfaces_, e.point, e.force, settings_.finger);
+                    approach(surfaces_, e.point, e.force, settings_);
         spread_of(H, 6 + 2 * k, s.ends[k].along);
       }
       s.rank = view_.rank(s.ends[0].body, s.ends[1].body);

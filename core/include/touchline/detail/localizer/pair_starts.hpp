@@ -2,6 +2,7 @@
 // Where the search for two contacts begins: all pairs of points spread over the links of a segment,
 // with forces in closed form. Each point stands for its neighbourhood: an unknown moment goes with
 // its force. No allocation per search.
+// Theory: docs/theory.md, section 6.5.
 #pragma once
 
 #include <algorithm>

@@ -2,6 +2,7 @@
 // What one measurement says of contacts on any two bodies of a segment, to be worked on for longer
 // than the instant. It keeps where the bodies were, and what unit wrenches on each do to all rows.
 // No allocation.
+// Theory: docs/theory.md, section 6.5.
 #pragma once
 
 #include <algorithm>

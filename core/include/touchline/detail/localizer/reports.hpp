@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is said of the contacts on one segment after a sample, each under its number.
+// Theory: docs/theory.md, section 6.4.
 #pragma once
 
 #include <cmath>

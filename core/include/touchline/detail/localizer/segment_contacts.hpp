@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is remembered of the contacts on one segment from sample to sample.
+// Theory: docs/theory.md, section 6.4.
 #pragma once
 
 #include <algorithm>
@@ -19,8 +20,6 @@ struct SegmentSample {
 
 struct SegmentContacts {
   static constexpr int kMost = JointEstimate::kMost;
-  static constexpr double kYoung = 3.0;  // times 1 / K, until a contact counts as known
-  static constexpr double kRefit = 0.5;  // times 1 / K, between fits of a sole contact
 
   // Contacts at a time before anything new could have been felt.
   struct Reference {
@@ -86,8 +85,8 @@ struct SegmentContacts {
   }
 
   // What may have become of the contacts up to an instant.
-  void creep(const SegmentSample& now) {
-    contacts.creep(std::max(0.0, now.time - crept), now.bandwidth);
+  void creep(const SegmentSample& now, const LocalizerTuning& t) {
+    contacts.creep(std::max(0.0, now.time - crept), now.bandwidth, t);
     crept = now.time;
   }
 

@@ -2,6 +2,7 @@
 // One of the contacts on a segment slides while the others are held. It is located anew in every
 // sample, with what is known of the others taken out, from where all of them were known before it
 // began to. No allocation per sample.
+// Theory: docs/theory.md, section 6.4.
 #pragma once
 
 #include <algorithm>
@@ -32,7 +33,8 @@ class Slides {
   template <class Read>
   Outcome follow(SegmentContacts& s, const SegmentSample& now, Read&& read) {
     const JointEstimate& before = s.before.contacts;
-    const double time = now.time, brief = now.brief(), way = kFastest * (time - s.since + brief);
+    const double time = now.time, brief = now.brief(),
+        way = settings_.fastest_slide * (time - s.since + brief);
     const double passed = 0.5 * now.bandwidth * std::max(0.0, time - s.weighed);
     s.weighed = time;
     int slider = -1;
@@ -44,8 +46,9 @@ class Slides {
       }
       const double lag = before.count > 1 ? before.known[c].lag : now.lag;
       const Answer& a = single_.locate(now.segment, lag, measurement_);
-      const bool can = within_reach(before.known[c], a, single_.surfaces(), way);
-      s.against[c] += passed * (can ? a.chi2 : chi2_limit(measurement_.size(), kNever));
+      const bool can = within_reach(before.known[c], a, single_.surfaces(), way, settings_);
+      const double never = chi2_limit(measurement_.size(), settings_.slide_never);
+      s.against[c] += passed * (can ? a.chi2 : never);
       if (!can || (slider >= 0 && s.against[c] > s.against[slider])) continue;
       slider = c;
       answer_ = a;
@@ -69,7 +72,7 @@ class Slides {
     if (!found) return Outcome::slides;
     read();
     if (before.count == 1) {  // nothing is held: any sample tells where it is
-      if (time - s.since < SegmentContacts::kYoung * brief) return Outcome::slides;
+      if (time - s.since < settings_.young * brief) return Outcome::slides;
       rest(s.rested = before, slider);
       s.contacts = s.rested;
       return Outcome::rests;
@@ -77,7 +80,7 @@ class Slides {
     if (anew || !stays(s)) {
       s.rests = time;
       rest(s.rested = before, slider);
-    } else if (time - s.rests >= (decided(s, slider) ? SegmentContacts::kYoung : kLong) * brief) {
+    } else if (time - s.rests >= rest_time(s, slider) * brief) {
       s.contacts = s.rested;
       return Outcome::rests;
     }
@@ -85,15 +88,15 @@ class Slides {
   }
 
  private:
-  static constexpr double kFastest = 0.5;  // contacts slide no faster [m/s]
-  // Of chi2: a difference that tells which one slides; and in sigmas, that of what cannot slide.
-  static constexpr double kMargin = 9.0, kNever = 5.0;
-  static constexpr double kLong = 10.0;  // times 1 / K, where it cannot be told
+  // Times 1 / K, for which it has to rest.
+  double rest_time(const SegmentContacts& s, int slider) const {
+    return decided(s, slider) ? settings_.young : settings_.slide_long;
+  }
 
   // Can no other one as well have slid?
-  static bool decided(const SegmentContacts& s, int slider) {
+  bool decided(const SegmentContacts& s, int slider) const {
     for (int c = 0; c < s.before.contacts.count; ++c) {
-      if (c != slider && s.against[c] < s.against[slider] + kMargin) return false;
+      if (c != slider && s.against[c] < s.against[slider] + settings_.slide_margin) return false;
     }
     return true;
   }
@@ -112,7 +115,7 @@ class Slides {
   void rest(JointEstimate& contacts, int c) {
     KnownContact& k = contacts.known[c];
     k = found_contact(k.serial, answer_, single_.surfaces(), k.age, k.lag);
-    contacts.forget(c, settings_.force_scale);
+    contacts.forget(c, settings_);
     fit_.weigh(contacts, measurement_);
     fit_.begin(measurement_, contacts);
     fit_.judge(contacts);

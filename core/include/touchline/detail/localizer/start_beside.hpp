@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Many pairs of points at once: the forces at both that explain best, in closed form, for one start
 // of a body beside all those of another.
+// Theory: docs/theory.md, section 6.5.
 #pragma once
 
 #include <limits>
@@ -72,7 +73,7 @@ class StartBeside {
   const double* normal() const { return normal_; }
 
  private:
-  static constexpr double kSingular = 1e-13;
+  static constexpr double kSingular = 1e-13;  // below it the forces are not told apart
 
   template <class T>
   static void turned(const T* lower, const Lanes* x, Lanes* out) {

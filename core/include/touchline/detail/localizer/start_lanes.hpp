@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The starts of one body side by side in lanes: what a force at each does to the whitened rows.
 // The numbers are the same to the last bit however many lanes there are.
+// Theory: docs/theory.md, section 6.5.
 #pragma once
 
 #include <limits>

@@ -2,6 +2,7 @@
 // The contacts on one segment over time. Contacts rarely begin at the same instant: as long as the
 // known ones, with their forces free, explain what is measured, nothing has begun. When they no
 // longer do, what is left without them is a single contact again. No allocation per sample.
+// Theory: docs/theory.md, section 6.4.
 #pragma once
 
 #include <algorithm>
@@ -26,10 +27,10 @@ class Tracks {
       : single_(single),
         measurement_(measurement),
         settings_(settings),
-        fit_(measurement.posture(), single.surfaces(), rows),
-        known_(measurement, fit_, settings.force_scale),
+        fit_(measurement.posture(), single.surfaces(), settings, rows),
+        known_(measurement, fit_, settings),
         reports_(single.surfaces()),
-        pasts_(segments, Past(measurement.posture().nodes().size())),
+        pasts_(segments, Past(measurement.posture().nodes().size(), settings.past_worn)),
         arrivals_(single, measurement, settings, fit_, known_, reports_, period),
         merging_(single.surfaces(), settings, fit_, known_, reports_),
         twins_(single.surfaces(), measurement, settings, fit_, known_, reports_, rows, segments) {}
@@ -47,10 +48,10 @@ class Tracks {
       report(s.first, single_.locate(g, 0.0, measurement_, again(s), true));
       return;
     }
-    now_.lag = s.age.follow(measurement_.load(), bandwidth, time) / bandwidth;
+    now_.lag = s.age.follow(measurement_.load(), bandwidth, time, settings_.oldest) / bandwidth;
     if (measurement_.has_wrench())
       pasts_[g].follow(measurement_.load(), bandwidth, time, measurement_.posture());
-    if (!s.arriving || s.contacts.count > 1) s.contacts.age(bandwidth, time);
+    if (!s.arriving || s.contacts.count > 1) s.contacts.age(bandwidth, time, settings_);
     if (s.arriving) {
       arrivals_.follow(s, now_, read);
     } else if (s.contacts.count < 2) {
@@ -80,10 +81,6 @@ class Tracks {
   }
 
  private:
-  static constexpr double kLook = 0.35;        // times 1 / K, between searches
-  static constexpr double kNear = 2e-3;        // places that differ by less are the same [m]
-  static constexpr double kLasting = 2.0;      // times 1 / K: the age of a reference in calm
-
   void report(int serial, const Answer& answer) { reports_.add(serial, answer); }
   void report(const KnownContact& k) { reports_.add(k); }
   void end(int serial) { reports_.end(serial); }
@@ -107,16 +104,16 @@ class Tracks {
       } else if (!s.explains) {
         s.explains = true;
         s.explained = now_.time;
-      } else if (now_.time - s.explained >= SegmentContacts::kYoung * now_.brief()) {
+      } else if (now_.time - s.explained >= settings_.young * now_.brief()) {
         settle(s, a);
       }
       return;
     }
     const KnownContact& known = s.contacts.known[0];
-    if (agrees(known, a, single_.surfaces(), kNear)) {
+    if (agrees(known, a, single_.surfaces(), settings_)) {
       report(known.serial, a);
-      if (now_.time - s.updated < SegmentContacts::kRefit * now_.brief()) return;
-      s.creep(now_);
+      if (now_.time - s.updated < settings_.refit * now_.brief()) return;
+      s.creep(now_, settings_);
       if (explains(s.contacts)) accept(s);
       return;
     }
@@ -132,7 +129,7 @@ class Tracks {
   // Was the contact looked for a moment ago? Filtered noise does not change much in the meantime.
   bool again(SegmentContacts& s) const {
     const bool same = s.contacts.count == s.looked_for;
-    if (same && now_.time - s.looked < kLook * now_.brief()) return true;
+    if (same && now_.time - s.looked < settings_.look * now_.brief()) return true;
     s.looked = now_.time;
     s.looked_for = s.contacts.count;
     return false;
@@ -150,7 +147,7 @@ class Tracks {
   void settle(SegmentContacts& s, const Answer& a) {
     s.contacts.count = 0;
     s.contacts.add(found_contact(s.first, a, single_.surfaces(), s.age, now_.brief()),
-                   settings_.force_scale);
+                   settings_);
     if (explains(s.contacts)) fit_.judge(s.contacts);
     s.know(now_);
   }
@@ -162,13 +159,13 @@ class Tracks {
     if (!known_.held()) s.restless = now_.time;
     fit_.accept(s.contacts, known_.change(), 0.5 * now_.bandwidth * passed);
     const bool calm = now_.time - s.restless > 2.0 * now_.brief();
-    s.refer(now_.time, (calm ? kLasting : SegmentContacts::kRefit) * now_.brief());
+    s.refer(now_.time, (calm ? settings_.lasting : settings_.refit) * now_.brief());
   }
 
   // --- several contacts, all known ---
   template <class Read>
   void several(SegmentContacts& s, Read&& read) {
-    s.creep(now_);
+    s.creep(now_, settings_);
     fit_.weigh(s.contacts, measurement_);
     if (!known_.explain(s.contacts)) {
       arrivals_.begin(s, now_);
@@ -187,8 +184,8 @@ class Tracks {
     for (int c = s.contacts.count - 1; c >= 0 && s.contacts.count > 1; --c) {
       KnownContact& k = s.contacts.known[c];
       const double sigma = s.contacts.force_sigma(c);
-      const bool gone = norm(k.force) < std::max(settings_.least_force, 4.0 * sigma) &&
-                        sigma < settings_.least_force;
+      const double least = std::max(settings_.least_force, settings_.gone_sigmas * sigma);
+      const bool gone = norm(k.force) < least && sigma < settings_.least_force;
       if (!gone) k.gone = 0.0;
       if (gone && k.gone == 0.0) k.gone = now_.time;
       if (!gone || now_.time - k.gone < now_.brief()) continue;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Two contacts on one segment that began at the same instant. No allocation per sample.
+// Theory: docs/theory.md, section 6.5.
 #pragma once
 
 #include <algorithm>
@@ -42,8 +43,8 @@ class Twins {
       pairs_.search(now.segment, now.lag, measurement_);
       take(s, one, now);
       s.searched = time;
-      const double least = SegmentContacts::kRefit * now.brief();
-      s.next_search = time + std::max(least, 0.5 * (time - s.apart));
+      const double least = settings_.refit * now.brief();
+      s.next_search = time + std::max(least, settings_.search_growth * (time - s.apart));
     } else if (s.paired) {
       if (known_.explain_freely(s.pair)) fit_.accept(s.pair, known_.change(), 0.0);
     } else {
@@ -60,7 +61,7 @@ class Twins {
     s.pair.known[0].serial = s.first;
     s.pair.known[1].serial = s.twin;
     for (int k = 0; k < 2; ++k) reports_.add(s.pair.known[k]);
-    if (s.searched - s.apart < SegmentContacts::kYoung * now.brief()) return;
+    if (s.searched - s.apart < settings_.young * now.brief()) return;
     s.contacts = s.pair;
     s.twin = -1;
     s.paired = false;
@@ -76,9 +77,6 @@ class Twins {
   }
 
  private:
-  static constexpr int kSteps = 250;  // of a walk over what explains, in one sample
-  static constexpr double kRisen = 2.0;  // times 1 / K, until forces are worth it
-
   // Takes the outcome of a search over.
   void take(SegmentContacts& s, const Answer& one, const SegmentSample& now) {
     PairParts& parts = *parts_[now.segment];
@@ -88,7 +86,7 @@ class Twins {
         s.inseparable = one;
         said_.name_all(pairs_, s.inseparable);
       }
-      if (!parts.working() && now.time - s.apart >= kRisen * now.brief()) {
+      if (!parts.working() && now.time - s.apart >= settings_.risen * now.brief()) {
         parts.begin(pairs_);
         conclude(s, parts);
       }
@@ -99,7 +97,7 @@ class Twins {
     s.pair.count = 0;
     for (int k = 0; k < 2; ++k) {
       said_.name(pairs_, k, measurement_.size(), answer_);
-      s.pair.add(found_contact(-1, answer_, surfaces_, s.age, now.lag), settings_.force_scale);
+      s.pair.add(found_contact(-1, answer_, surfaces_, s.age, now.lag), settings_);
     }
     fit_.begin(measurement_, s.pair);
     fit_.judge(s.pair);
@@ -108,7 +106,7 @@ class Twins {
   // Goes on with what explains as well; what was said before stands until all is met.
   void walk(SegmentContacts& s, PairParts& parts) {
     if (!parts.working()) return;
-    parts.work(kSteps);
+    parts.work(settings_.pair_steps);
     conclude(s, parts);
   }
 

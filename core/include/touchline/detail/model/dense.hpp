@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Small symmetric systems, row by row in plain arrays.
+// Theory: docs/theory.md, section 1.3.
 #pragma once
 
 #include <cmath>
@@ -89,7 +90,7 @@ inline double log_determinant(const double* l, int n) {
 // Jacobi's rotations: the eigenvalues of a symmetric (n, n) matrix end up on its diagonal; the columns
 // of v are turned along, so that from the identity on they end up as the eigenvectors.
 inline void diagonalize(double* a, double* v, int n) {
-  constexpr int kSweeps = 12;
+  constexpr int kSweeps = 12;  // a bound: Jacobi's method converges quadratically
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
     double off = 0.0, diagonal = 0.0;
     for (int i = 0; i < n; ++i) {

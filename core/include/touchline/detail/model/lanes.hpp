@@ -2,6 +2,7 @@
 // Several samples side by side in one number type: the instantaneous terms of a recording do not
 // depend on each other, so `run` computes them for `kLanes` samples at once. Every operation is
 // that of a plain double, lane by lane, so the numbers are the same to the last bit.
+// Theory: docs/theory.md, section 1.3.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +20,7 @@ constexpr int kLanes = 2;  // one SSE2 or NEON register, which every x86-64 and 
 #endif
 using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
 #else
-constexpr int kLanes = 1;
+constexpr int kLanes = 1;  // no vectors are known of
 using Lanes = double;
 #endif
 

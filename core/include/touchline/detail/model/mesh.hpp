@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The triangles of one link with a bounding volume hierarchy: every crossing of a line, the point
 // nearest to a line, the point nearest to a point. No allocation after construction.
+// Theory: docs/theory.md, section 1.4.
 #pragma once
 
 #include <algorithm>
@@ -130,7 +131,7 @@ class Mesh {
   }
 
  private:
-  static constexpr int kLeaf = 4, kDepth = 64;
+  static constexpr int kLeaf = 4, kDepth = 64;  // triangles of a leaf; room for the stack
   static constexpr float kInfinity = std::numeric_limits<float>::infinity();
   static constexpr double kEdge = 1e-9;  // of barycentric coordinates: edges belong to both sides
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The robot at one configuration, all in world axes about the world origin: poses, the twist of
 // each joint, and the momentum that a unit velocity of each joint makes. No allocation per sample.
+// Theory: docs/theory.md, section 1.2.
 #pragma once
 
 #include <algorithm>

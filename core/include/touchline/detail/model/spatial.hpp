@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Spatial algebra: 3-vectors, rotations, twists and wrenches ([linear; angular] and
 // [force; moment], both about one stated point). T is double, or several samples side by side.
+// Theory: docs/theory.md, section 1.1.
 #pragma once
 
 #include <cmath>

@@ -4,6 +4,7 @@
 //
 // All vectors stand in world axes. Velocities, momenta and first moments of a node are about the
 // origin of that node's own frame: the shortest formulas for joint rows.
+// Theory: docs/theory.md, section 1.2.
 #pragma once
 
 #include <cstddef>

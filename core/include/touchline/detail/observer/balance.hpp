@@ -5,6 +5,7 @@
 // All rows of a robot stand side by side in plain arrays, which compilers vectorize. A group of
 // rows (a joint, a sensor) shares its times. As long as every group has a value at every sample,
 // nothing about times needs to be kept by group: `book` is for all other samples.
+// Theory: docs/theory.md, section 2.2.
 #pragma once
 
 #include <algorithm>

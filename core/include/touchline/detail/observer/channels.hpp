@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which balances and filters each joint, segment and sensor of a robot has, and the rules by which
 // a filter goes on, waits or begins anew where values were missing.
+// Theory: docs/theory.md, section 2.4.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Judges time stamps: what is a sample, a repetition, a gap, a clock that was set back.
+// Theory: docs/theory.md, section 2.3.
 #pragma once
 
 #include <algorithm>

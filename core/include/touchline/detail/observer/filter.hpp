@@ -7,6 +7,7 @@
 // the load's change is the most that a load can be off that went from one end to the other
 // without turning. The other, e - r, is what the gap would change in the estimate. Each is followed
 // as a load of its own, which the filter forgets as it forgets the error.
+// Theory: docs/theory.md, sections 2.2 and 2.3.
 #pragma once
 
 #include <algorithm>

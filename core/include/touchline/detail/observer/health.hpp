@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The health bits of one sample, and the sanity test of one number.
+// Theory: docs/theory.md, section 2.3.
 #pragma once
 
 #include <cmath>

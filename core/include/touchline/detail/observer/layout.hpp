@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which sensors and joints lie outboard of which: worked out once, from the tree.
+// Theory: docs/theory.md, section 2.4.
 #pragma once
 
 #include <stdexcept>

@@ -2,6 +2,7 @@
 // The extended momentum observer (Iskandar et al., ICRA 2021, eqs. 11-18) without matrices: the
 // generalized momentum of a sensor's locked virtual joint is the spatial momentum of everything
 // outboard of it. No allocation, lock, exception or output in `step` and `run`.
+// Theory: docs/theory.md, section 2.
 #pragma once
 
 #include <algorithm>

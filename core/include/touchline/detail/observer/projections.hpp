@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the sensors' unfiltered loads do to the joints, projected at their instant.
+// Theory: docs/theory.md, section 2.4.
 #pragma once
 
 #include <cstddef>

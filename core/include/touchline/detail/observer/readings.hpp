@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The signals of all joints and sensors, read into the rows of the balances.
+// Theory: docs/theory.md, section 2.1.
 #pragma once
 
 #include <cmath>

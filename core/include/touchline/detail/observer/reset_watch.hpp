@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Counts how often an estimate begins anew, and by how much it jumps then. Without a reset no
 // estimate moves in a sample by more than its filter does; who follows it takes the jump off.
+// Theory: docs/theory.md, section 2.5.
 #pragma once
 
 #include <algorithm>

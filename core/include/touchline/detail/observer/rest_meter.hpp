@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is felt of an arm at rest: the mean external torques and wrenches since it stands still.
 // With nothing touching they are the offsets that a tare takes off. No allocation in `take`.
+// Theory: docs/theory.md, section 2.5.
 #pragma once
 
 #include <algorithm>
@@ -10,13 +11,18 @@
 
 #include "touchline/detail/observer/health.hpp"
 #include "touchline/detail/observer/row.hpp"
+#include "touchline/detail/observer/tuning.hpp"
 
 namespace touchline {
 
 class RestMeter {
  public:
-  explicit RestMeter(const RowLayout& row)
-      : row_(row), torque_(row.joints, 0.0), wrench_(6 * row.sensors, 0.0) {}
+  explicit RestMeter(const RowLayout& row, const ObserverTuning& tuning = {})
+      : speed_(tuning.rest_speed),
+        window_(tuning.rest_window),
+        row_(row),
+        torque_(row.joints, 0.0),
+        wrench_(6 * row.sensors, 0.0) {}
 
   // The observer's row of an accepted sample, with the velocities (n) and the time [s] of it.
   void take(const double* row, const double* qd, double time) {
@@ -29,7 +35,7 @@ class RestMeter {
       return;
     }
     seconds_ += dt;
-    const double part = dt / std::min(seconds_, kWindow);
+    const double part = dt / std::min(seconds_, window_);
     follow(row + row_.tau_ext(), part, torque_);
     follow(row + row_.sensor_wrench(), part, wrench_);
   }
@@ -41,11 +47,8 @@ class RestMeter {
   const std::vector<double>& wrench() const { return wrench_; }
 
  private:
-  static constexpr double kStill = 0.01;   // [rad/s or m/s] a faster joint moves
-  static constexpr double kWindow = 0.5;   // [s] of the mean: many time constants of the filters
-
   bool still(const double* qd) const {
-    return std::all_of(qd, qd + row_.joints, [](double v) { return std::fabs(v) < kStill; });
+    return std::all_of(qd, qd + row_.joints, [this](double v) { return std::fabs(v) < speed_; });
   }
 
   void follow(const double* values, double part, std::vector<double>& mean) const {
@@ -55,6 +58,7 @@ class RestMeter {
     }
   }
 
+  double speed_, window_;  // [rad/s or m/s], [s]
   RowLayout row_;
   std::vector<double> torque_, wrench_;
   double time_ = 0.0, seconds_ = 0.0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The output of one sample: a row of numbers.
+// Theory: docs/theory.md, section 2.4.
 #pragma once
 
 #include <algorithm>

@@ -3,6 +3,7 @@
 // with those of the next samples side by side; filters run through time, with several rows side
 // by side. Every operation is that of a single step, lane by lane, so the numbers
 // are the same to the last bit. No allocation but in the constructor.
+// Theory: docs/theory.md, section 2.2.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // From what the robot reports to what acts on the model: gains, signs, biases, friction, axes,
 // polarity, and what a driver has already taken out.
+// Theory: docs/theory.md, section 2.1.
 #pragma once
 
 #include <cmath>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the model says of one instant, from positions and velocities alone: the rows of momentum
 // and n-bar (eqs. 11, 12), the joints' lines of action and the sensors' poses, without matrices.
+// Theory: docs/theory.md, section 2.1.
 #pragma once
 
 #include <cstddef>
@@ -32,7 +33,7 @@ struct TermsLayout {
   static constexpr std::size_t kLogRotation = 24;   // of the frame of the log in world
   static constexpr std::size_t kLocalMomentum = 33;  // in the sensor frame
   static constexpr std::size_t kLocalBias = 39;
-  static constexpr std::size_t kPerSensor = 45;
+  static constexpr std::size_t kPerSensor = 45;  // numbers in all
 };
 
 template <class T>

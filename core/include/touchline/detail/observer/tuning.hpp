@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the observer was tuned with: every number that is neither physics nor the robot's own.
+// Theory: docs/theory.md, section 8.
 #pragma once
 
 namespace touchline {
@@ -24,7 +25,7 @@ struct ObserverTuning {
   // `gap_growth`); half of the 5 % takes twice as long, double trembles by 10 %.
   double period_growth = 1.05;
   // The same for a step that is a gap, which a change of rate shows first as. Half of the 25 %:
-  // twice as many gaps are told after a change of rate.
+  // twice as many gaps are told after a change of rate. Double: one gap moves the period by half.
   double gap_growth = 1.25;
 
   // ---- Gaps ----
@@ -50,6 +51,31 @@ struct ObserverTuning {
   // A joint may be so far outside of the model's limits [rad or m] without the bit for it: encoders
   // and hard stops differ by less. Half or double only moves that bit.
   double limit_tolerance = 0.01;
+
+  // ---- Rest ----
+  // A joint that is faster moves [rad/s or m/s]. Half: an arm that trembles is never at rest.
+  // Double: one that creeps is tared.
+  double rest_speed = 0.01;
+  // What is felt at rest is averaged over so long [s]: many time constants of the filters. Half: an
+  // offset errs by half as much again. Double: a tare takes a second.
+  double rest_window = 0.5;
+
+  template <class Self, class Visit>
+  static void visit(Self& t, Visit&& v) {
+    v("gap_periods", "periods", t.gap_periods);
+    v("shortest_step", "s", t.shortest_step);
+    v("longest_period", "s", t.longest_period);
+    v("patience", "samples", t.patience);
+    v("period_growth", "1", t.period_growth);
+    v("gap_growth", "1", t.gap_growth);
+    v("bridged_steps", "1/K", t.bridged_steps);
+    v("longest_bridge", "s", t.longest_bridge);
+    v("settled_steps", "1/K", t.settled_steps);
+    v("tustin_steps", "1/K", t.tustin_steps);
+    v("limit_tolerance", "rad", t.limit_tolerance);
+    v("rest_speed", "rad/s", t.rest_speed);
+    v("rest_window", "s", t.rest_window);
+  }
 };
 
 }  // namespace touchline

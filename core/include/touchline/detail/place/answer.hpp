@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is said of the contact on one segment at one instant.
+// Theory: docs/theory.md, section 5.7.
 #pragma once
 
 #include "touchline/detail/place/view.hpp"
@@ -9,7 +10,7 @@ namespace touchline {
 enum class Status { none = 0, located = 1, ambiguous = 2, not_separable = 3, wrench_only = 4 };
 
 struct Answer {
-  static constexpr int kCandidates = 12;
+  static constexpr int kCandidates = 12;  // room
   Status status = Status::none;
   int count = 0;                      // of candidates
   Candidate candidates[kCandidates];  // the most probable body's best first

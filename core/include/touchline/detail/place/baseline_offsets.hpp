@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the detector has taken out of the rows of a segment: the offset of its wrench and of each
 // joint's torque, and how sure it is.
+// Theory: docs/theory.md, section 5.1.
 #pragma once
 
 #include <algorithm>

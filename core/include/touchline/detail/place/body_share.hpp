@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the evidence for links says of one body.
+// Theory: docs/theory.md, section 5.9.
 #pragma once
 
 #include "touchline/detail/model/spatial.hpp"

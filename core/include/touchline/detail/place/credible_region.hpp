@@ -2,6 +2,7 @@
 // The posterior of a contact's place over the surfaces, cell by cell: triangles halved until each
 // is small beside the spread of the place, however many places there are and whatever their shape.
 // For those who ask how sure a place is; not for the control loop: it allocates.
+// Theory: docs/theory.md, section 5.8.
 #pragma once
 
 #include <algorithm>
@@ -25,7 +26,7 @@ struct SurfaceCell {
 
 class CredibleRegion {
  public:
-  CredibleRegion(const Explanations& found, const LocalizerSettings& settings)
+  CredibleRegion(const Explanations& found, const PlaceSettings& settings)
       : found_(found), settings_(settings) {}
 
   // The cells of the segment that was explained last; probabilities sum to one.
@@ -37,14 +38,7 @@ class CredibleRegion {
   }
 
  private:
-  static constexpr double kEdge = 0.6;     // of a cell, in sigmas of the place
-  static constexpr double kCore = 4.0;     // sigmas within which cells are that small
-  static constexpr double kGrowth = 0.4;   // of their edges beyond, per sigma
-  static constexpr double kLength = 0.04;  // of an edge there [m]
-  static constexpr double kReach = 9.0;    // sigmas beyond which there is nothing
-  static constexpr double kClose = 25.0;   // of chi2, above the best
-  static constexpr double kNegligible = 15.0;  // of the log density, below the densest cell
-  static constexpr std::size_t kMost = 20000;  // cells
+  static constexpr std::size_t kMost = 20000;  // room: then cells stay as they are
 
   // chi2 grows by (p - origin)^T G (p - origin) away from an explanation.
   struct Metric {
@@ -66,7 +60,8 @@ class CredibleRegion {
     metrics_.clear();
     for (const Candidate& k : found_) {
       // Without a line a candidate is no measure of its surroundings: open forces add to them.
-      const bool counts = view.line ? k.weight > 1e-9 : k.fit.cost() < found_.best() + kClose;
+      const bool counts = view.line
+          ? k.weight > 1e-9 : k.fit.cost() < found_.best() + settings_.cell_close;
       if (k.view != index || !counts) continue;
       Metric m;
       if (!metric(view, k, m)) continue;
@@ -98,18 +93,19 @@ class CredibleRegion {
         const double edge = std::sqrt(edges[most]);
         const double d = std::max(0.0, std::sqrt(m.norm2(centre - m.origin)) - 0.67 * edge);
         distance = std::min(distance, d);
-        const double over = edge / (kEdge + kGrowth * std::max(0.0, d - kCore));
-        if (d < kReach && over > excess) {
+        const double beyond = std::max(0.0, d - settings_.cell_core);
+        const double over = edge / (settings_.cell_edge + settings_.cell_growth * beyond);
+        if (d < settings_.cell_reach && over > excess) {
           excess = over;
           longest = most;
         }
       }
-      if (distance < kCore && excess <= 1.0) {
+      if (distance < settings_.cell_core && excess <= 1.0) {
         const double lengths[3] = {norm(p.b - p.a), norm(p.c - p.b), norm(p.a - p.c)};
         longest = static_cast<int>(std::max_element(lengths, lengths + 3) - lengths);
-        excess = lengths[longest] / kLength;
+        excess = lengths[longest] / settings_.cell_length;
       }
-      if (distance > kReach) continue;
+      if (distance > settings_.cell_reach) continue;
       if (excess > 1.0 && cells_.size() + pieces_.size() < kMost) {
         const Vec3 q[3] = {p.a, p.b, p.c};
         const Vec3 &from = q[longest], &to = q[(longest + 1) % 3], &other = q[(longest + 2) % 3];
@@ -139,12 +135,12 @@ class CredibleRegion {
   void weigh() {
     double most = -std::numeric_limits<double>::infinity();
     for (const SurfaceCell& c : cells_) most = std::max(most, c.log_density);
-    const double floor = most - kNegligible;
+    const double floor = most - settings_.cell_negligible;
     most = -std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < cells_.size(); ++i) {
       SurfaceCell& c = cells_[i];
       if (c.log_density > floor && !found_.surfaces()[c.surface].graspable)
-        c.log_density += approach(found_.surfaces(), c.centre, forces_[i], settings_.finger);
+        c.log_density += approach(found_.surfaces(), c.centre, forces_[i], settings_);
       most = std::max(most, c.log_density);
     }
     double sum = 0.0;
@@ -157,7 +153,7 @@ class CredibleRegion {
   }
 
   const Explanations& found_;
-  const LocalizerSettings& settings_;
+  const PlaceSettings& settings_;
   std::vector<Metric> metrics_;
   std::vector<Piece> pieces_;
   std::vector<SurfaceCell> cells_;

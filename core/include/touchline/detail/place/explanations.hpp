@@ -2,6 +2,7 @@
 // The explanations of one contact on a segment: all entries of the line of force action into all
 // its links, or the nearest surface where the line misses. Where there is no line they are sampled
 // points, improved on the mesh. No allocation per sample.
+// Theory: docs/theory.md, section 5.6.
 #pragma once
 
 #include <algorithm>
@@ -20,10 +21,8 @@ namespace touchline {
 
 class Explanations {
  public:
-  static constexpr double kWindow = 50.0;  // of chi2: beyond it an explanation weighs nothing
-
   Explanations(const Observer& observer, const Posture& posture,
-               const LocalizerSettings& settings, std::vector<LinkSurface> surfaces)
+               const PlaceSettings& settings, std::vector<LinkSurface> surfaces)
       : posture_(posture),
         settings_(settings),
         fitter_(settings),
@@ -73,14 +72,14 @@ class Explanations {
     if (!whole && !possible(measurement.size())) return;
     for (int i = 0; i < used_; ++i) {
       View& view = views_[i];
-      if (!(view.least < best_ + kWindow)) continue;
+      if (!(view.least < best_ + settings_.cost_window)) continue;
       if (view.line && !view.found) view.find_line();
-      if (view.line && view.floor < best_ + kWindow) enter(view);
+      if (view.line && view.floor < best_ + settings_.cost_window) enter(view);
     }
     // What must be searched for costs more, so it comes last and only where it may matter.
     for (int i = 0; i < used_; ++i) {
       View& view = views_[i];
-      if (!(view.floor < best_ + kRelevant)) continue;
+      if (!(view.floor < best_ + settings_.relevant)) continue;
       if (view.line) beside(view);
       if (!measurement.has_wrench()) search(view);
     }
@@ -108,18 +107,8 @@ class Explanations {
   }
 
  private:
+  // Room: for candidates, for starts on a surface, for faces beside a line.
   static constexpr int kMost = 192, kStarts = 3, kPassed = 4;
-  static constexpr double kRelevant = 25.0;  // of chi2: where a search is worth while
-  static constexpr double kRough = 150.0;    // of chi2: where a start may lead to something
-  static constexpr double kFew = 1e4;        // and as long as there are only few of them
-  static constexpr double kSpread = 0.04;    // of starts on one surface [m]
-  static constexpr double kFar = 0.15;       // from the line: not what it speaks of [m]
-  static constexpr double kGrazing = 4.0;  // cost of the cone beyond which a point is moved
-  static constexpr double kCoarse = 6e-3;  // joint torques alone tell no place better [m]
-  static constexpr double kSame = 5e-3;    // points nearer than this are one [m]
-  static constexpr double kFine = 1e-3;    // what a place is worth knowing to [m]
-  static constexpr double kSigmas = 4.0;   // of a place, within which faces are looked for
-  static constexpr double kApart = 0.015;  // faces farther apart are looked at for themselves [m]
 
   // Can any point explain, by the bounds that each body sets: the misfit of the best wrench at all,
   // and of the best one of a pure force?
@@ -147,7 +136,7 @@ class Explanations {
         k.normal = normal;
         k.fit.force = view.wrench.linear;
         fitter_.judge(view.q, view.earlier(point), normal, surfaces_[surface].graspable, k.fit);
-        view.steep = view.steep || k.fit.cone < kGrazing;
+        view.steep = view.steep || k.fit.cone < settings_.grazing;
         view.met = true;
         if (!known(before, 1e-7)) keep();  // an edge is met twice
       });
@@ -158,8 +147,9 @@ class Explanations {
   // where it only grazes the body, better points are nearby.
   void beside(View& view) {
     const int found = count_, own = index(view);
-    const bool near = view.floor < best_ + kSigmas * kSigmas;
-    const bool passed = near && (again_ ? revisit(view, kFine, kApart) : pass(view));
+    const bool near = view.floor < best_ + settings_.face_sigmas * settings_.face_sigmas;
+    const bool passed = near &&
+        (again_ ? revisit(view, settings_.fine, settings_.faces_apart) : pass(view));
     for (int i = 0; near && !again_ && i < found; ++i) {  // what is entered now may be missed next
       if (candidates_[i].view == own) remember(view, candidates_[i]);
     }
@@ -170,7 +160,7 @@ class Explanations {
       candidates_[count_] = candidates_[i];
       candidates_[i].fit.cone = std::numeric_limits<double>::infinity();  // replaced
       refinement_.improve(view, candidates_[count_]);
-      if (!known(found, kSame)) keep();
+      if (!known(found, settings_.same_point)) keep();
     }
   }
 
@@ -194,11 +184,12 @@ class Explanations {
     if (!fitter_.place_metric(view.q, middle, view.wrench.linear, G)) return false;
     Candidate starts[kPassed];
     int found = 0;
-    const double limit = std::min(kFar, kSigmas * widest(G, line.direction));
+    const double limit =
+        std::min(settings_.farthest, settings_.face_sigmas * widest(G, line.direction));
     for (int s : *view.surfaces) {
       surfaces_.around(s, line, limit, fitter_.steepest(), [&](const SurfacePoint& p) {
         const double chi2 = view.floor + squared(G, p.point - nearest(p.point));
-        if (!(chi2 < best_ + kSigmas * kSigmas)) return;
+        if (!(chi2 < best_ + settings_.face_sigmas * settings_.face_sigmas)) return;
         Candidate k;
         k.surface = s;
         k.view = index(view);
@@ -206,15 +197,15 @@ class Explanations {
         k.normal = p.normal;
         k.fit.cone = fitter_.cone_cost(-dot(p.normal, line.direction));
         k.fit.chi2 = chi2;
-        if (k.fit.cost() < best_ + kSigmas * kSigmas && !entered(k))
-          found = insert(starts, kPassed, found, k, kApart);
+        if (k.fit.cost() < best_ + settings_.face_sigmas * settings_.face_sigmas && !entered(k))
+          found = insert(starts, kPassed, found, k, settings_.faces_apart);
       });
     }
     for (int i = 0; i < found && count_ < kMost; ++i) {
       place(view, starts[i].surface, starts[i].point, starts[i].normal);
-      refinement_.improve(view, candidates_[count_], kFine, kApart);
+      refinement_.improve(view, candidates_[count_], settings_.fine, settings_.faces_apart);
       remember(view, candidates_[count_]);
-      if (!known(0, kSame)) keep();
+      if (!known(0, settings_.same_point)) keep();
     }
     return found > 0;
   }
@@ -229,15 +220,15 @@ class Explanations {
       place(view, start.surface, surfaces_.to_world(start.point, view.node),
             surfaces_.turn_to_world(start.normal, view.node));
       if (view.line && entered(candidates_[count_])) continue;
-      if (!(candidates_[count_].fit.cost() < best_ + kRough)) continue;
+      if (!(candidates_[count_].fit.cost() < best_ + settings_.rough)) continue;
       refinement_.improve(view, candidates_[count_], finest, around);
-      if (!known(0, kSame)) keep();
+      if (!known(0, settings_.same_point)) keep();
     }
     return any;
   }
 
   void remember(const View& view, const Candidate& k) {
-    if (found_->size() < kMost && k.fit.cost() < best_ + kRelevant)
+    if (found_->size() < kMost && k.fit.cost() < best_ + settings_.relevant)
       found_->push_back({k.surface, surfaces_.to_node(k.point, view.node),
                          surfaces_.turn_to_node(k.normal, view.node)});
   }
@@ -246,8 +237,8 @@ class Explanations {
   bool entered(const Candidate& k) const {
     for (int i = 0; i < count_; ++i) {
       const Candidate& other = candidates_[i];
-      if (other.view == k.view && norm(other.point - k.point) < kApart &&
-          (other.fit.cone < kGrazing || other.fit.cost() < k.fit.cost()))
+      if (other.view == k.view && norm(other.point - k.point) < settings_.faces_apart &&
+          (other.fit.cone < settings_.grazing || other.fit.cost() < k.fit.cost()))
         return true;
     }
     return false;
@@ -262,7 +253,7 @@ class Explanations {
     for (int i = first; i < count_; ++i) {
       const Candidate& other = candidates_[i];
       if (other.surface == k.surface && norm(other.point - k.point) < distance &&
-          other.fit.cost() < k.fit.cost() + kGrazing)
+          other.fit.cost() < k.fit.cost() + settings_.grazing)
         return true;
     }
     return false;
@@ -270,7 +261,7 @@ class Explanations {
 
   void keep() {
     const double cost = candidates_[count_].fit.cost();
-    if (!(cost < best_ + kWindow)) return;
+    if (!(cost < best_ + settings_.cost_window)) return;
     best_ = std::min(best_, cost);
     if (count_ < kMost) ++count_;
   }
@@ -279,10 +270,10 @@ class Explanations {
   void miss(View& view) {
     const ForceLine line = view.later_line();
     for (int s : *view.surfaces) {
-      const SurfacePoint p = surfaces_.nearest(s, line, kFar);
+      const SurfacePoint p = surfaces_.nearest(s, line, settings_.farthest);
       if (p.face < 0 || count_ == kMost) continue;
       // At an edge the normal is that of either side: what counts is the wrench alone.
-      if (fitter_.free_chi2(view.q, view.earlier(p.point)) > best_ + kRelevant) continue;
+      if (fitter_.free_chi2(view.q, view.earlier(p.point)) > best_ + settings_.relevant) continue;
       place(view, s, p.point, p.normal);
       refinement_.improve(view, candidates_[count_]);
       keep();
@@ -300,7 +291,7 @@ class Explanations {
   // Without a line: the best of the points spread over each link, each improved.
   void search(View& view) {
     if (again_) {
-      revisit(view, kCoarse, 4.0 * kCoarse);
+      revisit(view, settings_.coarse, 4.0 * settings_.coarse);
       return;
     }
     for (int s : *view.surfaces) {
@@ -308,24 +299,25 @@ class Explanations {
       int found = 0;
       for (const SurfaceSample& sample : surfaces_.samples(s)) {
         if (count_ == kMost) return;
-        const double limit =
-            std::max(best_ + kRough, found < kStarts ? kFew : worst(starts, found)->fit.cost());
+        const double few = settings_.rough_few;
+        const double limit = std::max(
+            best_ + settings_.rough, found < kStarts ? few : worst(starts, found)->fit.cost());
         place(view, s, surfaces_.to_world(sample.point, view.node),
               surfaces_.turn_to_world(sample.normal, view.node), limit);
-        found = insert(starts, kStarts, found, candidates_[count_], kSpread);
+        found = insert(starts, kStarts, found, candidates_[count_], settings_.start_spacing);
       }
       for (int i = 0; i < found && count_ < kMost; ++i) {
         Candidate& k = candidates_[count_] = starts[i];
-        if (!refinement_.descend(view, k) && k.fit.cost() < best_ + kRough)
-          refinement_.settle(view, k, kCoarse, 0.8 * kSpread);
+        if (!refinement_.descend(view, k) && k.fit.cost() < best_ + settings_.rough)
+          refinement_.settle(view, k, settings_.coarse, 0.8 * settings_.start_spacing);
         remember(view, k);
-        if (!known(0, kSame)) keep();
+        if (!known(0, settings_.same_point)) keep();
       }
     }
   }
 
   const Posture& posture_;
-  const LocalizerSettings& settings_;
+  const PlaceSettings& settings_;
   ForceFitter fitter_;
   LinkSurfaces surfaces_;
   Refinement refinement_;

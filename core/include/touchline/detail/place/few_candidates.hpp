@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The best few of many candidates, apart from each other.
+// Theory: docs/theory.md, section 5.6.
 #pragma once
 
 #include <algorithm>

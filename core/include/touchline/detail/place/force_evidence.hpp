@@ -3,6 +3,7 @@
 // forces, integrated over them. Where a measurement knows the force well in all directions Laplace's
 // formula serves; joint torques alone often leave one or two directions open, and then the cone of
 // friction bounds the force, not the measurement. No allocation.
+// Theory: docs/theory.md, section 5.7.
 #pragma once
 
 #include <algorithm>
@@ -25,7 +26,7 @@ class ForceEvidence {
     fitter_.force_terms(q, point, A, g);
     std::copy(A, A + 9, factor);
     if (!cholesky(factor, 3)) return -std::numeric_limits<double>::infinity();
-    const double wide = kWide * std::max(norm(fit.force), 1.0);
+    const double wide = fitter_.settings().wide * std::max(norm(fit.force), 1.0);
     invert_lower(factor, 3, inverse);
     double variance = 0.0;
     for (double x : inverse) variance += x * x;
@@ -58,12 +59,11 @@ class ForceEvidence {
 
  private:
   static constexpr double kTurn = 6.283185307179586;
-  static constexpr double kWide = 0.12;  // of a force: beyond, its cone bounds it
-  static constexpr int kSteps = 16, kDirections = 64;
+  static constexpr int kSteps = 16, kDirections = 64;  // that are summed up
 
   // Over the forces f + t e with information `known` on t.
   double along(const Vec3& f, const Vec3& e, double known, const Vec3& normal, bool grasped) const {
-    const double reach = 3.0 / std::sqrt(known);
+    const double reach = fitter_.settings().wide_sigmas / std::sqrt(known);
     double from = -reach, to = reach;
     if (!grasped && !inside_cone(f, e, normal, from, to))
       return -std::numeric_limits<double>::infinity();

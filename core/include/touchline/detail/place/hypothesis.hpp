@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // One contact explained: a point of a link's surface and a force in its friction cone, judged by
 // what the measurements say of the wrench that the two make.
+// Theory: docs/theory.md, section 5.5.
 #pragma once
 
 #include <algorithm>
@@ -10,24 +11,9 @@
 #include "touchline/detail/model/dense.hpp"
 #include "touchline/detail/model/mesh.hpp"
 #include "touchline/detail/place/quadratic.hpp"
+#include "touchline/detail/place/settings.hpp"
 
 namespace touchline {
-
-struct LocalizerSettings {
-  double friction = 0.8;          // coefficient of the friction cone
-  double cone_softness = 0.1;     // one sigma of the angle beyond the cone [rad]
-  double force_scale = 50.0;      // of contact forces, where they cannot be seen [N]
-  double place_scale = 0.1;       // of surfaces, where the place cannot be seen [m]
-  double pitch_limit = 4.0;       // sigmas beyond which one force does not explain a segment
-  double least_force = 0.3;       // below it no place is named [N]
-  double certain = 0.9;           // probability of a place that counts as located
-  double place_radius = 0.0225;   // explanations nearer than this are one place [m]
-  double finger = 0.03;           // free space that a push comes from [m]
-  bool first_entry = false;       // the paper's rule
-
-  // A place that is less sure than this is not located [m].
-  double spread_limit() const { return 4.0 * place_radius; }
-};
 
 struct Fit {
   Vec3 force;
@@ -53,7 +39,7 @@ inline void tangents(const Vec3& n, Vec3& s, Vec3& t) {
 
 class ForceFitter {
  public:
-  explicit ForceFitter(const LocalizerSettings& settings)
+  explicit ForceFitter(const PlaceSettings& settings)
       : settings_(settings), cone_(std::atan(settings.friction)) {
     for (int i = 0; i < kDirections; ++i) {
       const double angle = kTurn * i / kDirections;
@@ -115,9 +101,12 @@ class ForceFitter {
     const double directions = grasped ? 2.0 : 1.0 - std::cos(cone_);
     const double volume = directions * std::max(dot(fit.force, fit.force), 1.0);
     if (grasped) return -std::log(volume);
-    const double beyond = std::max(0.0, std::acos(std::clamp(fit.cosine, -1.0, 1.0)) - kSlant);
-    return -std::log(volume) - 0.5 * beyond * beyond / (kSlantSigma * kSlantSigma);
+    const double angle = std::acos(std::clamp(fit.cosine, -1.0, 1.0));
+    const double beyond = std::max(0.0, angle - settings_.slant), sigma = settings_.slant_sigma;
+    return -std::log(volume) - 0.5 * beyond * beyond / (sigma * sigma);
   }
+
+  const PlaceSettings& settings() const { return settings_; }
 
   // Cosine between push and inward normal, below which a face is not worth looking at.
   double steepest() const { return std::cos(cone_ + 4.0 * settings_.cone_softness); }
@@ -226,9 +215,8 @@ class ForceFitter {
   }
 
  private:
-  static constexpr double kSlant = 0.3, kSlantSigma = 0.2;  // of pushes from the normal [rad]
-
-  static constexpr int kDirections = 8;
+  static constexpr int kDirections = 8;  // around the cone, from which halved steps go on
+  static constexpr double kFinestTurn = 0.05;  // [rad] of them
   static constexpr double kTurn = 6.283185307179586;
 
   double size_cost(double size) const {
@@ -289,7 +277,7 @@ class ForceFitter {
       force = (along / curve) * u;
     };
     for (const Direction& d : directions_) offer(d.angle, d.cosine, d.sine);
-    for (double step = 0.5 * kTurn / kDirections; step > 0.05; step *= 0.5) {
+    for (double step = 0.5 * kTurn / kDirections; step > kFinestTurn; step *= 0.5) {
       const double middle = at;
       offer(middle - step, std::cos(middle - step), std::sin(middle - step));
       offer(middle + step, std::cos(middle + step), std::sin(middle + step));
@@ -305,7 +293,7 @@ class ForceFitter {
     double angle, cosine, sine;  // [rad]
   };
 
-  const LocalizerSettings& settings_;
+  const PlaceSettings& settings_;
   double cone_;
   Direction directions_[kDirections];  // around the edge of the cone, tried first
 };

@@ -2,6 +2,7 @@
 // Errors that stay while a contact lasts, unlike white noise, which any mean takes away. They are of
 // the model, as far as the arm has moved on since the baseline, and of gains, which grow with the load.
 // No allocation per sample.
+// Theory: docs/theory.md, section 5.1.
 #pragma once
 
 #include <algorithm>

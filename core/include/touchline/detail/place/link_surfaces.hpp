@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The surfaces of all links at one posture: which bodies make a segment, where a line enters them,
 // and points spread evenly over them. No allocation per sample.
+// Theory: docs/theory.md, section 1.4.
 #pragma once
 
 #include <algorithm>
@@ -97,7 +98,7 @@ class LinkSurfaces {
   }
 
  private:
-  static constexpr int kSamples = 64;  // per surface
+  static constexpr int kSamples = 64;  // room: points per surface
 
   SurfacePoint in_world(SurfacePoint p, int node) const {
     p.point = to_world(p.point, node);

@@ -2,6 +2,7 @@
 // What a segment's sensors say of one contact on one of its bodies, weighed by the covariance of
 // the noise. The same for every layout: a six-axis sensor at the inboard end, joint torques, sensors
 // of fewer axes, or what there is of them. No allocation per sample.
+// Theory: docs/theory.md, section 5.1.
 #pragma once
 
 #include <algorithm>
@@ -17,13 +18,17 @@
 #include "touchline/detail/place/quadratic.hpp"
 #include "touchline/detail/place/row_noise.hpp"
 #include "touchline/detail/place/segment_rows.hpp"
+#include "touchline/detail/place/settings.hpp"
 
 namespace touchline {
 
 class Measurement {
  public:
-  Measurement(const Observer& observer, std::vector<DetectionRow> tests, NoiseFigures noise)
-      : observer_(observer),
+  // Observer and settings stay the caller's.
+  Measurement(const Observer& observer, std::vector<DetectionRow> tests, NoiseFigures noise,
+              const PlaceSettings& settings)
+      : settings_(settings),
+        observer_(observer),
         posture_(observer.tree(), observer.row_layout().joints),
         offsets_(observer, posture_, tests),
         rows_(observer, posture_),
@@ -241,9 +246,6 @@ class Measurement {
   }
 
  private:
-  static constexpr double kOffset = 3.0;  // sigmas of a normal variable: beyond, it is no noise
-  static constexpr double kSure = 0.1;    // of the variance of a sample, in a baseline of 20 / K
-
   // What a wrench on the body of `node` does to all rows, and what they read: rows of seven, to the
   // scale of the noise.
   const double* design(int node) {
@@ -270,7 +272,7 @@ class Measurement {
   // its own noise, unless a model has errors and the baseline, a mean over `quiet` [s], is sure.
   bool take_out_offsets() {
     const double rest = offsets_.variance(segment_, quiet_ != nullptr ? quiet_[segment_] : 0.0);
-    if (!(lasts_ && rest < kSure) && !noticeable(rest)) return true;
+    if (!(lasts_ && rest < settings_.offset_sure) && !noticeable(rest)) return true;
     const int first = has_wrench_ ? 6 : 0;
     for (int i = 0; i < first; ++i) wrench_[i] -= offsets_.wrench()[i];
     for (int i = 0; i < count_; ++i) {
@@ -292,7 +294,7 @@ class Measurement {
     solve_lower(factor_.data(), size_, d);
     double distance = 0.0;
     for (int i = 0; i < size_; ++i) distance += d[i] * d[i];
-    return distance >= rest * chi2_limit(size_, kOffset);
+    return distance >= rest * chi2_limit(size_, settings_.offset_sigmas);
   }
 
   double offset_of(const SegmentRow& r) const {
@@ -362,7 +364,7 @@ class Measurement {
     const int first = has_wrench_ ? 6 : 0;
     for (int i = 0; i < count_; ++i) {
       if (used_[i]->joint < 0) continue;
-      const double std = kGapSigmas * row_[layout_.joint_gap_std() + used_[i]->joint];
+      const double std = settings_.gap_sigmas * row_[layout_.joint_gap_std() + used_[i]->joint];
       if (std > 0.0) covariance_[(first + i) * (size_ + 1)] += std * std;
     }
     const double* std = row_ + layout_.segment_gap_std() + 2 * segment_;
@@ -371,7 +373,7 @@ class Measurement {
     const Pose& X = posture_.pose(observer_.sensors()[sensor].node);
     for (int a = 0; a < 6; ++a) {
       double unit[6] = {}, v[6];
-      unit[a] = kGapSigmas * std[a / 3];
+      unit[a] = settings_.gap_sigmas * std[a / 3];
       store(wrench_to_parent({identity<double>(), X.p}, touchline::load(unit)), v);
       for (int i = 0; i < 6; ++i) {
         for (int j = 0; j <= i; ++j) covariance_[i * size_ + j] += v[i] * v[j];
@@ -394,6 +396,7 @@ class Measurement {
     return cholesky(factor_.data(), size_, 1e-15);
   }
 
+  const PlaceSettings& settings_;
   const Observer& observer_;
   Posture posture_;
   BaselineOffsets offsets_;

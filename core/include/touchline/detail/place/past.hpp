@@ -4,6 +4,7 @@
 //   int K exp(-K a) (R c + p)(t - a) x f(t - a) da.
 // That is the moment of the filtered force at the mean place, weighed by the force that was felt
 // then, and a rest, where the force has turned meanwhile. No allocation per sample.
+// Theory: docs/theory.md, section 5.3.
 #pragma once
 
 #include <cmath>
@@ -21,9 +22,9 @@ struct Mean {
 };
 
 // What is not known of where a body was: a part of the way it has come since, and so much per
-// squared angle that it has turned [m].
+// squared angle that it has turned [m]. A turn moves points `reach` [m] from its origin.
 struct Doubt {
-  double way, turn;
+  double way, turn, reach;
 };
 
 // Of a body that has long moved with a steady twist (about the world origin) and felt a steady
@@ -39,7 +40,8 @@ inline Mean steady_mean(const Pose& now, const Spatial& twist, double lag) {
 
 class Past {
  public:
-  explicit Past(std::size_t nodes) : bodies_(nodes) {}
+  // `worn`: part of the force that must have kept its direction.
+  Past(std::size_t nodes, double worn) : worn_(worn), bodies_(nodes) {}
 
   void restart() { weight_ = 0.0; }
 
@@ -49,7 +51,7 @@ class Past {
     const double size = norm(force);
     if (!(size > 0.0)) return;
     double keep = std::exp(-bandwidth * (time - time_));
-    if (!(weight_ > kWorn * norm(force_)) || !(keep < 1.0)) keep = 0.0;
+    if (!(weight_ > worn_ * norm(force_)) || !(keep < 1.0)) keep = 0.0;
     const bool anew = keep == 0.0;
     const Vec3 gained = force - keep * (anew ? Vec3{} : force_);
     const double gain = dot(gained, force) / size;
@@ -77,11 +79,9 @@ class Past {
     return {{{s * b.R.x, s * b.R.y, s * b.R.z}, p}, b.moment - cross(p, force_)};
   }
   // Is there a mean?
-  bool known() const { return weight_ > kWorn * norm(force_); }
+  bool known() const { return weight_ > worn_ * norm(force_); }
 
  private:
-  static constexpr double kWorn = 0.3;  // part of the force that has kept its direction
-
   struct Body {
     Pose before;
     Mat3 R;  // these three weighed and summed up
@@ -92,6 +92,7 @@ class Past {
     sum = keep * sum + (0.5 * gain) * (before + now);
   }
 
+  double worn_;
   std::vector<Body> bodies_;  // per node
   Vec3 force_;
   double weight_ = 0.0, time_ = 0.0;

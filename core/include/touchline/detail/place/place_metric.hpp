@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is known of a place, in all directions: chi2 grows by d^T G d with a way d from it.
+// Theory: docs/theory.md, section 5.6.
 #pragma once
 
 #include <algorithm>

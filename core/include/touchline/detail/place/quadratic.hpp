@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What measurements say of one wrench: chi2(w) = constant - 2 vector . w + w^T information w, for
 // the contact's wrench w in world axes about the world origin.
+// Theory: docs/theory.md, section 5.2.
 #pragma once
 
 #include <cmath>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Moves a candidate over its surface to where it explains best. No allocation.
+// Theory: docs/theory.md, section 5.6.
 #pragma once
 
 #include <algorithm>
@@ -16,18 +17,22 @@ namespace touchline {
 class Refinement {
  public:
   Refinement(const LinkSurfaces& surfaces, const ForceFitter& fitter)
-      : surfaces_(surfaces), fitter_(fitter) {}
+      : surfaces_(surfaces), fitter_(fitter), settings_(fitter.settings()) {}
 
-  // To the best place nearby, as exactly as `finest` [m]; where it does not go straight downhill,
-  // within about `around` [m].
-  void improve(const View& view, Candidate& k, double finest = 1e-3, double around = 0.064) const {
+  // To the best place nearby; where it does not go straight downhill, within about `settle_around`.
+  void improve(const View& view, Candidate& k) const {
+    improve(view, k, settings_.fine, settings_.settle_around);
+  }
+
+  // As exactly as `finest` [m], and within about `around` [m].
+  void improve(const View& view, Candidate& k, double finest, double around) const {
     if (!descend(view, k)) settle(view, k, finest, around);
   }
 
   // Goes downhill by Gauss-Newton steps; returns whether that was all there was to do.
   bool descend(const View& view, Candidate& k) const {
     bool arrived = false;
-    for (int i = 0; i < 8 && !arrived; ++i) {
+    for (int i = 0; i < kSteps && !arrived; ++i) {
       double H[25], g[5];
       fitter_.information(view.q, view.earlier(k.point), k.normal, k.fit.force, H, g);
       if (!cholesky(H, 5)) break;
@@ -36,8 +41,8 @@ class Refinement {
       tangents(k.normal, s, t);
       Vec3 step = g[3] * s + g[4] * t;
       const double length = norm(step);
-      if (length > 0.05) step = (0.05 / length) * step;
-      arrived = length < kArrived;
+      if (length > settings_.farthest_step) step = (settings_.farthest_step / length) * step;
+      arrived = length < settings_.arrived;
       if (!arrived && !try_point(view, k, k.point + step)) break;
     }
     return arrived && k.fit.cone < 1.0;
@@ -45,15 +50,16 @@ class Refinement {
 
   // Where the friction cone or an edge stands in the way: smaller and smaller trials around, down
   // to `finest` [m].
-  void settle(const View& view, Candidate& k, double finest, double around = 0.064) const {
+  void settle(const View& view, Candidate& k, double finest, double around) const {
     for (double radius = 0.5 * around; radius > finest; radius *= 0.5) {
-      for (int round = 0; round < 3 && better_around(view, k, radius); ++round) {
+      for (int round = 0; round < kRounds && better_around(view, k, radius); ++round) {
       }
     }
   }
 
  private:
-  static constexpr double kArrived = 2e-4;  // length of a step [m]
+  static constexpr int kSteps = 8, kRounds = 3;  // a bound on time
+  static constexpr double kBetter = 1e-6;       // of chi2: less is rounding
 
   bool better_around(const View& view, Candidate& k, double radius) const {
     Vec3 s, t;
@@ -70,7 +76,7 @@ class Refinement {
 
   bool try_point(const View& view, Candidate& k, const Vec3& target) const {
     // The candidate is on the surface itself: nothing farther away than it is of interest.
-    const double limit = std::min(0.06, 1.000001 * norm(target - k.point));
+    const double limit = std::min(settings_.surface_reach, 1.000001 * norm(target - k.point));
     const SurfacePoint p = surfaces_.nearest(k.surface, target, limit);
     if (p.face < 0) return false;
     const bool grasped = surfaces_[k.surface].graspable;
@@ -78,7 +84,7 @@ class Refinement {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     const Fit fit =
         fitter_.fit(view.q, view.earlier(p.point), p.normal, grasped, kInfinity, cost);
-    if (!(fit.cost() < cost - 1e-6)) return false;
+    if (!(fit.cost() < cost - kBetter)) return false;
     k.point = p.point;
     k.normal = p.normal;
     k.fit = fit;
@@ -87,6 +93,7 @@ class Refinement {
 
   const LinkSurfaces& surfaces_;
   const ForceFitter& fitter_;
+  const PlaceSettings& settings_;
 };
 
 }  // namespace touchline

@@ -2,6 +2,7 @@
 // What the joint torques of a segment are while nothing touches: their mean over the last half
 // second, and the covariance of what they stray from it, noise, friction and model errors together.
 // What came just before a touch was detected belongs to the touch. No allocation per sample.
+// Theory: docs/theory.md, section 5.9.
 #pragma once
 
 #include <algorithm>
@@ -9,13 +10,18 @@
 #include <vector>
 
 #include "touchline/detail/model/dense.hpp"
+#include "touchline/detail/place/tuning.hpp"
 
 namespace touchline {
 
 class RestingTorques {
  public:
-  explicit RestingTorques(std::size_t joints)
-      : n_(joints), blocks_(kBlocks, std::vector<double>(joints)), counts_(kBlocks, 0),
+  RestingTorques(std::size_t joints, const PlaceTuning& tuning)
+      : block_(tuning.rest_block),
+        memory_(tuning.rest_memory),
+        n_(joints),
+        blocks_(kBlocks, std::vector<double>(joints)),
+        counts_(kBlocks, 0),
         mean_(joints, 0.0), scatter_(joints * joints, 0.0), part_(joints * joints, 0.0),
         last_part_(joints * joints, 0.0) {}
 
@@ -24,7 +30,7 @@ class RestingTorques {
   // Takes the torques (n) [Nm] of a sample in which nothing touches; NaN is taken for no load.
   void take(const double* torque, double time) {
     if (touched_ || filled_ == 0) begin(time);
-    if (time - since_ >= kBlock) next(time);
+    if (time - since_ >= block_) next(time);
     std::vector<double>& block = blocks_[at_];
     const double count = ++counts_[at_];
     for (std::size_t j = 0; j < n_; ++j) {
@@ -54,9 +60,7 @@ class RestingTorques {
   }
 
  private:
-  static constexpr int kBlocks = 10;
-  static constexpr double kBlock = 0.05;  // s: a touch is detected within one
-  static constexpr double kMemory = 2.0;  // s: of the scatter
+  static constexpr int kBlocks = 10;  // room: the mean is that of half a second
 
   double strayed(const double* torque, std::size_t j) const {
     return std::isfinite(torque[j]) ? torque[j] - mean_[j] : 0.0;
@@ -83,7 +87,7 @@ class RestingTorques {
   // first after a touch is still the end of it.
   void next(double time) {
     if (last_count_ > 0) {
-      const double kept = std::min(samples_, kMemory / kBlock * last_count_);
+      const double kept = std::min(samples_, memory_ / block_ * last_count_);
       for (std::size_t i = 0; i < n_ * n_; ++i) {
         if (samples_ > 0.0) scatter_[i] *= kept / samples_;
         scatter_[i] += last_part_[i];
@@ -115,6 +119,7 @@ class RestingTorques {
     known_ = known_ || sum > 0.0;
   }
 
+  double block_, memory_;  // [s]
   std::size_t n_;
   std::vector<std::vector<double>> blocks_;  // means of torques
   std::vector<int> counts_;

@@ -2,6 +2,7 @@
 // How the noise of the signals reaches the rows that a segment is judged by: linear in independent
 // sources (readings, velocities), from which the covariance of all rows follows. No allocation per
 // sample.
+// Theory: docs/theory.md, section 5.1.
 #pragma once
 
 #include <algorithm>

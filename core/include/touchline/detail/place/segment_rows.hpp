@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The rows of each segment besides the wrench of its six-axis sensor: joint torques, and the axes of
 // sensors that have fewer than six. What a wrench on a body does to each of them.
+// Theory: docs/theory.md, section 5.1.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // One contact on a segment: each explanation weighed by its posterior given the measurement, and the
 // answer that follows. No allocation per sample.
+// Theory: docs/theory.md, section 5.7.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +19,7 @@ namespace touchline {
 
 class SingleContact {
  public:
-  SingleContact(const Observer& observer, const Posture& posture, const LocalizerSettings& settings,
+  SingleContact(const Observer& observer, const Posture& posture, const PlaceSettings& settings,
                 std::vector<LinkSurface> surfaces)
       : observer_(observer),
         posture_(posture),
@@ -34,13 +35,13 @@ class SingleContact {
     const auto mean = [&](int node) {
       return steady_mean(posture_.pose(node), posture_.twist(node), lag);
     };
-    return locate(g, mean, kDoubt, measurement, again, whole);
+    return locate(g, mean, steady_doubt(), measurement, again, whole);
   }
 
   // The same, if it is known where the bodies were when they felt it.
   const Answer& locate(int g, const Past& past, Measurement& measurement, bool again) {
-    return locate(g, [&](int node) { return past.mean(node); }, kRemembered, measurement, again,
-                  false);
+    return locate(g, [&](int node) { return past.mean(node); }, remembered_doubt(), measurement,
+                  again, false);
   }
 
   // The same, where forces of other contacts are free.
@@ -72,7 +73,7 @@ class SingleContact {
       for (int i = 0; i < answer.count; ++i) {
         if (node_of(all[i]) == of.node) all[i].weight *= of.share / here;
       }
-      if (here > 0.0 || of.share < kLeast) continue;
+      if (here > 0.0 || of.share < settings_.least_told) continue;
       if (answer.count == Answer::kCandidates) {  // in place of the least likely
         std::iter_swap(all + answer.count - 1,
                        std::min_element(all, all + answer.count, [](const auto& a, const auto& b) {
@@ -94,11 +95,11 @@ class SingleContact {
  private:
   static constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   static constexpr int kUnknowns = 5;  // of one contact: two of its place, three of its force
-  static constexpr double kLeast = 1e-3;  // probability of a candidate that is told
-  static constexpr double kNegligible = 10.0;  // of the log posterior, below the best
+
   // A steady twist and force are assumed. A past that is remembered is exact up to the first order:
-  // the rest (`Mean::moment`) is that of the body's origin (measured: 0.08 to 0.1 m in the plane).
-  static constexpr Doubt kDoubt{0.1, 0.0}, kRemembered{0.0, 0.1};
+  // the rest (`Mean::moment`) is that of the body's origin.
+  Doubt steady_doubt() const { return {settings_.uncertain_way, 0.0, settings_.body_reach}; }
+  Doubt remembered_doubt() const { return {0.0, settings_.uncertain_turn, settings_.body_reach}; }
 
   template <class MeanOf>
   const Answer& locate(int g, MeanOf&& mean, const Doubt& doubt, Measurement& measurement,
@@ -130,7 +131,7 @@ class SingleContact {
     const double size2 = dot(answer_.force, answer_.force), variance = C[0] + C[7] + C[14];
     if (beside_free_forces_) return false;
     return size2 < settings_.least_force * settings_.least_force ||
-           size2 < 16.0 * variance;
+           size2 < settings_.weak_sigmas * settings_.weak_sigmas * variance;
   }
 
   // Posterior of each candidate: likelihood, the volume of force and surface that explains as well
@@ -139,7 +140,7 @@ class SingleContact {
     double most = -std::numeric_limits<double>::infinity();
     for (Candidate& k : found_) {
       k.weight = -std::numeric_limits<double>::infinity();
-      if (!(k.fit.cost() < found_.best() + Explanations::kWindow)) continue;
+      if (!(k.fit.cost() < found_.best() + settings_.cost_window)) continue;
       double H[25], g[5];
       const View& view = found_.view(k);
       found_.fitter().information(view.q, view.earlier(k.point), k.normal, k.fit.force, H, g);
@@ -151,10 +152,10 @@ class SingleContact {
     }
     double reached = -std::numeric_limits<double>::infinity();
     for (Candidate& k : found_) {
-      if (k.weight < most - kNegligible) {
+      if (k.weight < most - settings_.negligible) {
         k.weight = -std::numeric_limits<double>::infinity();
       } else if (!graspable(k)) {
-        k.weight += approach(found_.surfaces(), k.point, k.fit.force, settings_.finger);
+        k.weight += approach(found_.surfaces(), k.point, k.fit.force, settings_);
       }
       reached = std::max(reached, k.weight);
     }
@@ -202,7 +203,8 @@ class SingleContact {
     spread_over_surface(best, answer_);
     copy_candidates();
     if (std::fabs(view.pitch) > settings_.pitch_limit ||
-        (!graspable(best) && found_.fitter().cone_cost(best.fit.cosine) > 16.0) ||
+        (!graspable(best) &&
+            found_.fitter().cone_cost(best.fit.cosine) > settings_.implausible_cone) ||
         best.fit.chi2 > chi2_limit(answer_.degrees, settings_.pitch_limit)) {
       answer_.status = unexplained(g, measurement);
     } else {
@@ -213,7 +215,8 @@ class SingleContact {
   void copy_candidates() {
     answer_.count = 0;
     for (const Candidate& k : found_) {
-      if (answer_.count < Answer::kCandidates && (answer_.count == 0 || k.weight > kLeast))
+      if (answer_.count < Answer::kCandidates &&
+          (answer_.count == 0 || k.weight > settings_.least_told))
         answer_.candidates[answer_.count++] = k;
     }
   }
@@ -337,7 +340,7 @@ class SingleContact {
 
   const Observer& observer_;
   const Posture& posture_;
-  const LocalizerSettings& settings_;
+  const PlaceSettings& settings_;
   Explanations found_;
   bool beside_free_forces_ = false;
   std::vector<double> lasting_;  // per segment: see `Answer`

@@ -2,6 +2,7 @@
 // How well a patch of a surface explains a measurement: the likelihood, integrated over all pushes
 // that may come there, their force, direction and place. A place that needs luck, the one force in
 // many that does not load a joint, pays for it. No allocation.
+// Theory: docs/theory.md, section 5.9.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +17,7 @@ namespace touchline {
 class SurfaceEvidence {
  public:
   // `settings` stay the caller's.
-  explicit SurfaceEvidence(const LocalizerSettings& settings) : settings_(settings) {
+  explicit SurfaceEvidence(const PlaceSettings& settings) : settings_(settings) {
     // Points of a normal distribution in three dimensions, spread evenly: an additive recurrence,
     // whose ratio is the root of x^4 = x + 1, by Box and Muller.
     constexpr double kRatio[4] = {0.8566748838545029, 0.7338918566271260, 0.6287067210378087,
@@ -39,7 +40,7 @@ class SurfaceEvidence {
   // each direction. What cannot come within `worst` of the log evidence is not worked out.
   Explained at(const Quadratic& q, const Vec3& point, const Vec3& normal, bool grasped,
                double radius, double worst) const {
-    LocalizerSettings settings = settings_;
+    PlaceSettings settings = settings_;
     settings.place_scale = radius;
     const ForceFitter fitter(settings);
     Explained e;
@@ -73,7 +74,7 @@ class SurfaceEvidence {
   }
 
  private:
-  static constexpr int kForces = 32;
+  static constexpr int kForces = 32;  // that are summed up
   static constexpr double kDensest = 1.6;  // logarithm of what no density of pushes is above
   static constexpr double kTurn = 6.283185307179586;
 
@@ -94,7 +95,7 @@ class SurfaceEvidence {
     return sum / kForces;
   }
 
-  const LocalizerSettings& settings_;
+  const PlaceSettings& settings_;
   Vec3 spread_[kForces];
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the measurements say if the contact is on one body: its line of force action, and where the
 // body was when they were true. And a candidate: one point of that body, with its force.
+// Theory: docs/theory.md, section 5.4.
 #pragma once
 
 #include <algorithm>
@@ -64,7 +65,7 @@ struct View {
     q.shift({{}, mean.moment});
     const Vec3 x = back.x - Vec3{1.0, 0.0, 0.0}, y = back.y - Vec3{0.0, 1.0, 0.0},
                z = back.z - Vec3{0.0, 0.0, 1.0};
-    const double way = norm(now - before) + kReach * (norm(x) + norm(y));
+    const double way = norm(now - before) + doubt.reach * (norm(x) + norm(y));
     const double angle2 = 0.5 * (dot(x, x) + dot(y, y) + dot(z, z));
     const double moment = (doubt.way * way + doubt.turn * angle2) * force;
     if (moment > 1e-6) width = loosen(q, moment);
@@ -108,7 +109,6 @@ struct View {
   }
 
  private:
-  static constexpr double kReach = 0.15;  // of a body, from its origin [m]
   static constexpr double kRidge = 1e-7;        // information on any wrench, where there is none
   static constexpr double kExact = 1e-6;        // sigmas of the pitch that is left
 

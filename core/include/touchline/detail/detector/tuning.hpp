@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the detector was tuned with. Thresholds, times and a robot's noise are not here: they are
+// the robot's own (`DetectionRow`, `DetectionSettings`), and calibration writes them. K is the
+// bandwidth of a row's filter.
+// Theory: docs/theory.md, section 8.
+#pragma once
+
+namespace touchline {
+
+struct DetectorTuning {
+  // ---- Residuals and their noise ----
+  // Time constant of the quick baseline that windows and CUSUM take for offset [s]. Half: a push
+  // that rises in 0.1 s is half taken for offset. Double: errors of the model in motion fire.
+  double reference = 0.2;
+  // What a gap may have left counts this many times, for thresholds and for weights. It is no noise
+  // that scatters about zero but the size of one error, which lasts for some 1/K. Half: with one, 3
+  // of 250 gaps in three held pushes begin a false contact beside them; with three, one. Double:
+  // with five, none, but new contacts are felt later.
+  double gap_sigmas = 3.0;
+  // Of the mean, that CUSUM is made for [sigmas per sample]: half of it is taken off each sample.
+  // Half: weaker loads are found, later. Double: 0.5 sigma a sample is never found.
+  double cusum_shift = 1.0;
+  // Innovations are summed up only after so long [s], when their filter has settled. Half: its
+  // start shows as a load. Double: CUSUM is blind for 0.2 s.
+  double cusum_warm_up = 0.1;
+  // A sum may grow to so many thresholds while all is felt, so that it clears soon after. Half:
+  // below the threshold itself, nothing would ever be felt. Double: a contact clears later.
+  double cusum_most = 1.5;
+  // Covariances follow the posture this often [s]: a joint at 1 rad/s has moved by 0.01 rad. Half:
+  // twice the time for them. Double: nothing that can be seen at ordinary speeds.
+  double refresh = 0.01;
+  // Speed and acceleration are low-passed over so long [s], so that a collision does not raise its
+  // own threshold. Half: it begins to. Double: thresholds lag 0.1 s behind a motion.
+  double activity_time = 0.05;
+
+  // ---- Noise as seen ----
+  // Times told: noise figures are no better than this. Half: rounding of them counts as noise.
+  // Double: noise three times as large as told fires first.
+  double noisier = 1.5;
+  // Values until which noise may be larger than seen: a sigma of so many is right by a sixth. Half:
+  // by a quarter. Double: thresholds stay high for twice as long after the start.
+  double noise_enough = 20.0;
+  // Times 1 / K: the time constant of the mean that the scatter is about. Half: it takes slow noise
+  // away. Double: a slow motion's errors count as noise.
+  double noise_mean = 2.0;
+  // Values that are remembered: 5 s at K = 100. Half: a sigma trembles by 5 %. Double: what has
+  // become quieter is believed after 10 s.
+  double noise_most = 500.0;
+  // Sigmas beyond which a value is an outlier, and what one counts, as a part of a value. Half and
+  // double: how soon noise that has grown is believed, against how much a contact counts as noise.
+  double noise_far = 3.0;
+  double noise_doubted = 0.1;
+  // Sigmas by which a variance must exceed the one that is told. Half: one row in fifty exceeds it
+  // by chance. Double: noise that is 1.6 times as told is believed after four times as long.
+  double noise_sure = 4.0;
+  // Values before anything is judged: fewer may be the beginning of a contact. Half or double:
+  // 15 ms sooner or 30 ms later at K = 100.
+  double noise_few = 5.0;
+  // Third differences before noise is told from the first moments; their median is right by a
+  // third. Half: by a half. Double: an arm is watched with raised thresholds for longer.
+  int first_few = 16;
+  // So many from one look at the median to the next, since sorting takes time. Half: twice the
+  // time. Double: noise is told eight samples later.
+  int first_often = 8;
+  // Times told, that sixteen of them hardly reach by chance. Half: chance does. Double: noise that
+  // is three times as large as told fires in the first moments.
+  double first_clearly = 2.0;
+
+  // ---- Errors of the model in motion ----
+  // What motion has shown is remembered over so long of motion [s]. Half: a pause in a program
+  // forgets its friction. Double: what one hard motion has shown dulls the next 20 s.
+  double motion_memory = 10.0;
+  // While it is taken for a contact an error counts so many times: it then fills the memory in 0.5
+  // s. Half: false events of motion last twice as long. Double: a push that lasts is learned in
+  // 0.25 s.
+  double motion_touched = 20.0;
+  // Root mean squares beyond which motion alone hardly goes. A friction that changes sign exceeds
+  // its own twofold. Half: friction fires. Double: pushes in motion must be twice as strong.
+  double motion_sigmas = 3.0;
+  // An arm leaves the constant part of its model's errors on its way through ordinary motion, so
+  // far from where the baseline was averaged [rad]. Half: places spread twice as much. Double: they
+  // are stated too sure on models with errors of weight.
+  double drift_way = 0.75;
+  // Such errors grow as far as this [rad]: weights are periodic. Half: too sure after large
+  // motions. Double: nothing but in joints that turn by more.
+  double drift_farthest = 2.0;
+  // In a joint's own torque there is friction, all of which comes with a motion so fast [rad/s].
+  // Half: it comes with a joint that creeps. Double: with one that already turns.
+  double drift_speed = 0.1;
+
+  // ---- When an arm moves ----
+  // Slower than this it stands [rad/s]; a hand that pushes an arm moves it, too. Half: trembling
+  // arms never stand. Double: a slow motion is judged by the rules of rest.
+  double standing = 0.02;
+  // Faster than this it moves [rad/s]; slower is an arm that a hand pushes aside. Half: such a push
+  // counts as the arm's motion. Double: slow motions are taken for rest.
+  double moving = 0.1;
+  // An arm that stops for less goes on moving [s]. Half: reversals count as rest. Double: a touch
+  // soon after a stop is judged as one in motion.
+  double pause = 0.3;
+  // A joint slower than this is about to turn, or just has [rad/s]: where friction changes its
+  // sign. Half: such changes count as pushes. Double: pushes on slow joints count as friction.
+  double reversal_speed = 0.2;
+
+  // ---- The start ----
+  // Times 1 / K: by then settling leaves nothing of what it began with. Half: its rest counts as an
+  // offset. Double: noise that is not as told is believed later.
+  double confirm = 8.0;
+  // Times 1 / K, and samples where the filter forgets from one to the next: what begins sooner was
+  // there before. Half: an offset is called a touch. Double: a touch at once is called an offset.
+  double start = 3.0;
+  double start_samples = 3.0;
+  // A factor within which an offset is still the same one. Half and double: whether an arm that
+  // sags a little counts as not as told.
+  double alike = 3.0;
+
+  // ---- What makes an event ----
+  // Thresholds: a sample that no noise makes needs no other. Half: two bad packets are an event.
+  // Double: blows are told a sample later.
+  double alone = 4.0;
+  // Thresholds: noise that has yet to be seen is below it. Half: noise ten times as told fires at
+  // the start. Double: hard touches in the first moments are missed.
+  double unseen = 10.0;
+  // Limits: models of arms in motion are not better, and an event must exceed it or last. Half: any
+  // does. Double: soft pushes in motion are told 2 / K later.
+  double barely = 1.5;
+  // Times 1 / K: time constant of the mean of the last moments. Half: its noise is larger, and with
+  // it the weakest load that is found. Double: an event is judged over twice as long.
+  double trend = 2.0;
+  // Of what was there before: a push adds more in 2 / K. Half: motions count as pushes. Double:
+  // pushes that rise slowly count as motion.
+  double creep_share = 0.25;
+  // A push on an arm in motion rarely lasts longer [s]. Half: a guiding hand's push ends early.
+  // Double: an error of the model lasts 4 s as an event.
+  double hand = 2.0;
+
+  // ---- What ends one ----
+  // Of an event's peak: what may rest after it, as friction does. Half: what sticks lasts as an
+  // event. Double: any held force that does not change comes to rest.
+  double little = 0.5;
+  // The same of an arm that moves: what two contacts against each other hardly leave. Half: false
+  // events in motion go on. Double: one that is clamped is taken for free.
+  double trace = 0.25;
+  // Samples of calm that one of noise takes away. Half and double: how soon an event ends in noise.
+  double spike = 5.0;
+  // Times 1 / K: how long rests what has come to rest. Half: a hand that holds still for 25 ms at
+  // K = 100 is gone. Double: events end later.
+  double rest = 5.0;
+  // And at least so long while the arm moves [s]. Half: a steady push in motion ends. Double: a
+  // false one lasts for 0.3 s more.
+  double rest_moving = 0.15;
+  // Limits: half of what noise is to exceed hardly ever, for turns to and fro. Half: trembling
+  // hands are noise. Double: noise is none.
+  double fro = 0.5;
+  // Times 1 / K: for how long turns to and fro count, and how many are noise. At K = 100 a hand
+  // that trembles at 10 Hz makes 1.6. Half: it counts as noise. Double: noise is an event for
+  // longer.
+  double fro_memory = 8.0;
+  double fro_turns = 3.0;
+
+  template <class Self, class Visit>
+  static void visit(Self& t, Visit&& v) {
+    v("reference", "s", t.reference);
+    v("gap_sigmas", "1", t.gap_sigmas);
+    v("cusum_shift", "sigmas", t.cusum_shift);
+    v("cusum_warm_up", "s", t.cusum_warm_up);
+    v("cusum_most", "1", t.cusum_most);
+    v("refresh", "s", t.refresh);
+    v("activity_time", "s", t.activity_time);
+    v("noisier", "1", t.noisier);
+    v("noise_enough", "values", t.noise_enough);
+    v("noise_mean", "1/K", t.noise_mean);
+    v("noise_most", "values", t.noise_most);
+    v("noise_far", "sigmas", t.noise_far);
+    v("noise_doubted", "1", t.noise_doubted);
+    v("noise_sure", "sigmas", t.noise_sure);
+    v("noise_few", "values", t.noise_few);
+    v("first_few", "values", t.first_few);
+    v("first_often", "values", t.first_often);
+    v("first_clearly", "1", t.first_clearly);
+    v("motion_memory", "s", t.motion_memory);
+    v("motion_touched", "1", t.motion_touched);
+    v("motion_sigmas", "1", t.motion_sigmas);
+    v("drift_way", "rad", t.drift_way);
+    v("drift_farthest", "rad", t.drift_farthest);
+    v("drift_speed", "rad/s", t.drift_speed);
+    v("standing", "rad/s", t.standing);
+    v("moving", "rad/s", t.moving);
+    v("pause", "s", t.pause);
+    v("reversal_speed", "rad/s", t.reversal_speed);
+    v("confirm", "1/K", t.confirm);
+    v("start", "1/K", t.start);
+    v("start_samples", "samples", t.start_samples);
+    v("alike", "1", t.alike);
+    v("alone", "1", t.alone);
+    v("unseen", "1", t.unseen);
+    v("barely", "1", t.barely);
+    v("trend", "1/K", t.trend);
+    v("creep_share", "1", t.creep_share);
+    v("hand", "s", t.hand);
+    v("little", "1", t.little);
+    v("trace", "1", t.trace);
+    v("spike", "samples", t.spike);
+    v("rest", "1/K", t.rest);
+    v("rest_moving", "s", t.rest_moving);
+    v("fro", "1", t.fro);
+    v("fro_memory", "1/K", t.fro_memory);
+    v("fro_turns", "1", t.fro_turns);
+  }
+};
+
+}  // namespace touchline
