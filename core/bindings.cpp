@@ -166,6 +166,14 @@ void bind_rows(nb::module_& m) {
       .def_rw("coulomb", &tl::JointRow::coulomb)
       .def_rw("viscous", &tl::JointRow::viscous)
       .def_rw("coulomb_width", &tl::JointRow::coulomb_width)
+      .def("set_rest",
+           [](tl::JointRow& joint, const std::vector<double>& q, const std::vector<double>& qd,
+              const std::vector<double>& torque) {
+             const tl::LearnedRest rest{q, qd, torque};
+             if (!rest.sound()) throw std::invalid_argument("a learned rest has no sound table");
+             joint.rest = rest;
+           },
+           "q"_a, "qd"_a, "torque"_a)
       .def_rw("lower", &tl::JointRow::lower)
       .def_rw("upper", &tl::JointRow::upper)
       .def_rw("bandwidth", &tl::JointRow::bandwidth)

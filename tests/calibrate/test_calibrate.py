@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from free_motion import free_motion
 
 import touchline as tl
 from touchline.bench.detection.free_motion import (
@@ -23,6 +24,7 @@ from touchline.detector.tail import Tail
 from touchline.detector.thresholds import make_thresholds, row_name
 from touchline.errors import InputError
 from touchline.logs import write_table
+from touchline.model.robot import Robot
 from touchline.model.robot_file import write_description
 from touchline.model.values import METHODS
 from touchline.model.yaml_file import read_yaml
@@ -200,6 +202,45 @@ def test_relative_paths_hold_from_the_new_place(tmp_path):
     data = read_yaml(out)
     assert (out.parent / data["model"]).resolve() == (tmp_path / "m" / "arm.urdf").resolve()
     assert (out.parent / data["package_dirs"][0]).resolve() == source.parent.resolve()
+
+
+def test_what_is_left_is_learned_and_written_beside_the_description(robot, tmp_path, capsys):
+    def rippled(noise):
+        s = free_motion(robot, 24.0, 100.0, seed=1, noise=noise)
+        s.tau[:, 2] += 0.6 * np.sin(4.0 * s.q[:, 2])
+        return s
+
+    log = tmp_path / "log.parquet"
+    write_table(log, rippled(0.02), robot.description)
+    out = tmp_path / "new.yaml"
+    arguments = [str(log), "--robot", "sara", "--out", str(out), "--learn"]
+    assert main(["calibrate", *arguments]) == 0
+    assert "learned beside it, by joint" in capsys.readouterr().out
+    assert read_yaml(out)["learned_rest"] == "new_rest.csv"
+    learned = tl.load_robot(out)
+    assert learned.description.joints[2].rest is not None
+    s = rippled(0.0)
+    plain = Robot(
+        replace(
+            learned.description,
+            joints=tuple(replace(j, rest=None) for j in learned.description.joints),
+        ),
+        learned.mechanism,
+    )
+    left = [
+        tl.Observer(r, bandwidth=20.0).run(s.time, s.q, s.qd, s.tau, s.wrench).tau_ext[100:, 2]
+        for r in (plain, learned)
+    ]
+    assert np.std(left[1]) < 0.5 * np.std(left[0])
+
+
+def test_learning_needs_identification(tmp_path, capsys):
+    log = tmp_path / "none.parquet"
+    log.touch()
+    arguments = ["--robot", "sara", "--out", str(tmp_path / "a.yaml"), "--learn", "--no-identify"]
+    assert main(["calibrate", str(log), *arguments]) == 2
+    assert "leave --no-identify out" in capsys.readouterr().err
+    assert not (tmp_path / "a.yaml").exists()
 
 
 def test_noise_is_measured_beneath_motion_and_jumps():

@@ -8,10 +8,15 @@ import pytest
 from program import COMPILER, compile_program, run_program
 
 import touchline as tl
+from touchline.identify.rest import with_rest
+from touchline.model.learned_rest import LearnedRest
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scenario import Run, three_touches
 
 ROOT = Path(__file__).parents[2]
+REST = LearnedRest(
+    (-9.0, 1.0, 9.0), (-9.0, 0.0, 9.0), (0.0,) * 4 + (0.02,) + (0.0,) * 4, (0.0,) * 9
+)
 SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C++ compiler on this machine")
@@ -21,7 +26,7 @@ pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C++ compiler on thi
 def replayed(tmp_path_factory):
     """Folder with an exported robot and a log with faults; the robot; samples."""
     folder = tmp_path_factory.mktemp("replay")
-    robot = tl.load_robot("sara")
+    robot = with_rest(tl.load_robot("sara"), {"joint4": REST})
     s = three_touches(robot, speed=1.0, seconds=0.6, settings=Run(noise=SensorNoise())).samples
     s.tau[300, 2] = np.nan
     s.wrench[320:330, 0] = np.inf

@@ -84,6 +84,7 @@ inline void check(const Robot& robot) {
     for (const int source : joint.sources)
       require(within(source, 0, k), "a joint is read from a sensor that is not there");
     require(joint.bandwidth > 0.0 && std::isfinite(joint.bandwidth), "a bandwidth is not positive");
+    require(joint.rest.sound(), "a learned rest has no sound table");
   }
   for (const SensorRow& sensor : robot.sensors) {
     require(within(sensor.node, 0, nodes), "a sensor stands on a node that is not there");

@@ -22,7 +22,7 @@
 namespace touchline {
 
 // Of the file; another one is refused. It changes with every part of `Robot`.
-constexpr std::uint32_t kRobotFormat = 4;
+constexpr std::uint32_t kRobotFormat = 5;
 
 // A file that cannot be read or written: it says which, and why.
 struct RobotFileError : std::runtime_error {
@@ -131,6 +131,7 @@ template <class A> void store(A& file, Vec3& v);
 template <class A> void store(A& file, Mat3& m);
 template <class A> void store(A& file, Pose& X);
 template <class A> void store(A& file, Node& node);
+template <class A> void store(A& file, LearnedRest& rest);
 template <class A> void store(A& file, JointRow& joint);
 template <class A> void store(A& file, SensorRow& sensor);
 template <class A> void store(A& file, ModelError& error);
@@ -183,11 +184,16 @@ void store(A& file, Node& node) {
   store_all(file, parent, kind, placement, mass, com, inertia, coordinate, multiplier, offset);
 }
 template <class A>
+void store(A& file, LearnedRest& rest) {
+  auto& [q, qd, torque] = rest;
+  store_all(file, q, qd, torque);
+}
+template <class A>
 void store(A& file, JointRow& joint) {
   auto& [torque, compensated, sign, gain, bias, range, rotor_inertia, coulomb, viscous,
-         coulomb_width, lower, upper, bandwidth, nodes, sources] = joint;
+         coulomb_width, rest, lower, upper, bandwidth, nodes, sources] = joint;
   store_all(file, torque, compensated, sign, gain, bias, range, rotor_inertia, coulomb, viscous,
-            coulomb_width, lower, upper, bandwidth, nodes, sources);
+            coulomb_width, rest, lower, upper, bandwidth, nodes, sources);
 }
 template <class A>
 void store(A& file, SensorRow& sensor) {

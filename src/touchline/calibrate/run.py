@@ -29,9 +29,12 @@ from touchline.errors import InputError
 from touchline.folder import check_file
 from touchline.identify.delay import Delay, find_delays, with_delays
 from touchline.identify.described import description_changes, identified_robot
-from touchline.identify.evidence import gather
+from touchline.identify.evidence import filtered, gather
 from touchline.identify.identification import Identification, identify, rms
+from touchline.identify.rest import Rest, grids_of, with_rest
+from touchline.identify.rest import learn as learn_rest
 from touchline.model.description import CalibrationDescription, Noise, RowCalibration
+from touchline.model.learned_rest import write_rest
 from touchline.model.robot import Robot, load_robot
 from touchline.model.robot_file import write_description
 from touchline.model.values import METHODS
@@ -85,6 +88,7 @@ class Calibration:
         thresholds: None where the data are too short for them.
         lacking: why there are none, and what was taken instead.
         delays: that were found beside it.
+        rest: what was learned of what is left; None if that was not asked for.
     """
 
     robot: Robot
@@ -99,6 +103,7 @@ class Calibration:
     thresholds: Thresholds | None
     lacking: str = ""
     delays: tuple[Delay, ...] = ()
+    rest: Rest | None = None
 
     @property
     def share(self) -> float:
@@ -115,6 +120,7 @@ def calibrate(
     false_alarms: float | None = None,
     trust: bool = False,
     identification: bool = True,
+    learn: bool = False,
 ) -> Calibration:
     """Calibrates a robot and writes its new description.
 
@@ -126,12 +132,18 @@ def calibrate(
         false_alarms: per hour of the whole robot, to be written; default: the description's.
         trust: what stands out is the robot's own doing, not a contact.
         identification: of biases, friction and inertias; False takes them as described.
+        learn: tables of what is left of joint torques over the joints' own motion, too.
 
     Raises:
         InputError: something cannot be read or written, is too short, or shows contacts throughout.
     """
     model = load_robot(robot)
     _check(logs, out, false_alarms)
+    if learn and not identification:
+        raise InputError("--learn: it learns what identification leaves: leave --no-identify out")
+    had_rest = any(joint.rest is not None for joint in model.description.joints)
+    if learn:
+        model = with_rest(model, {})
     source = model.description.path
     if source is None:
         raise InputError(f"{robot}: has no file to start from")
@@ -144,6 +156,7 @@ def calibrate(
     found: Identification | None = None
     left_out: list[tuple[int, float, float]] = []
     delays: list[Delay] = []
+    rest: Rest | None = None
     if identification:
         described = model
         evidence = gather(model, recordings.all("equations"))
@@ -154,16 +167,23 @@ def calibrate(
             evidence = gather(model, recordings.all("equations"))
         found = identify(evidence, trust)
         left_out = found.touches()
+        if learn:
+            grids = grids_of(evidence)
+            hats = filtered(evidence.robot, recordings.all("what is left"), grids.hats)
+            rest = learn_rest(found, grids, hats)
         recordings.leave_out(left_out)
         model = identified_robot(found)
         changes = description_changes(described, model)
+        if rest is not None and (rest.tables or had_rest):
+            model = with_rest(model, rest.tables)
+            changes["learned_rest"] = f"{out.stem}_rest.csv"
     model = with_methods(model, *chosen, min_duration=hold, calibration=None, false_alarms=rate)
     noise = measure_noise(model, recordings.all("noise"))
     changes["noise"] = {key: _plain(value) for key, value in noise_keys(model, noise).items()}
     quiet = Robot(replace(model.description, noise=noise), model.mechanism)
     thresholds, lacking = None, ""
     try:
-        more_elsewhere = {} if found is None else growth(found)
+        more_elsewhere = {} if found is None else growth(found, rest)
         thresholds, more = _find_thresholds(
             quiet, recordings, logs, chosen, rate, trust, more_elsewhere
         )
@@ -178,7 +198,7 @@ def calibrate(
                 recordings.period,
                 recordings.seconds,
                 recordings.all("residuals"),
-                growth(found),
+                growth(found, rest),
             )
             if short is not None:
                 lacking += f"\n{SHORT}"
@@ -188,6 +208,8 @@ def calibrate(
         detection: dict[str, Any] = {"method": list(chosen), "false_alarms": rate}
         detection |= {"min_duration": hold, "calibration": _plain(thresholds.description)}
         changes["detection"] = detection
+    if "learned_rest" in changes and rest is not None:
+        write_rest(out.parent / changes["learned_rest"], rest.tables)
     write_description(source, out, changes)
     return Calibration(
         quiet,
@@ -202,14 +224,19 @@ def calibrate(
         thresholds,
         lacking,
         tuple(delays),
+        rest,
     )
 
 
-def growth(found: Identification) -> dict[str, float]:
+def growth(found: Identification, rest: Rest | None = None) -> dict[str, float]:
     """By row, how much larger residuals are on data that played no part in the fit, at least 1."""
     whole = rms(found.left()[~found.touched])
     ratios = np.maximum(found.after / np.maximum(whole, 1e-9), 1.0)
     names = found.evidence.rows.names
+    for j, name in enumerate(names[: found.evidence.joints]):
+        if rest is not None and name in rest.tables:
+            elsewhere = max(rest.after[j], rest.region_after[j])
+            ratios[j] = max(elsewhere / max(rest.inside[j], 1e-9), 1.0)
     return {names[r]: float(ratios[r]) for r in np.flatnonzero(found.evidence.used)}
 
 

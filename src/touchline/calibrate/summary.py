@@ -7,7 +7,7 @@ from touchline.calibrate.run import Calibration, Thresholds
 from touchline.detector.limits import threshold
 from touchline.detector.residual_noise import residual_noise
 from touchline.detector.thresholds import make_thresholds, row_name
-from touchline.identify.summary import identification_lines
+from touchline.identify.summary import identification_lines, rest_lines
 from touchline.model.robot import Robot
 from touchline.model.values import METHODS
 
@@ -30,6 +30,8 @@ def summary_text(result: Calibration) -> str:
             for x in result.delays
         ]
         parts.append(identification_lines(result.identification, late))
+    if result.rest is not None:
+        parts.append(rest_lines(result.rest, result.robot.joint_names))
     parts.append(_noise_lines(result))
     if result.thresholds is None:
         lines = result.lacking.splitlines()

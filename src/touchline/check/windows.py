@@ -126,7 +126,7 @@ def _expecting(robot: Robot, compensated: str) -> Observer:
         replace(s, compensated=compensated, bias=(0.0,) * 6, polarity="outboard", frame="sensor")
         for s in description.sensors
     )
-    joints = tuple(replace(j, bias=0.0, friction=Friction()) for j in description.joints)
+    joints = tuple(replace(j, bias=0.0, friction=Friction(), rest=None) for j in description.joints)
     bare = Robot(replace(description, sensors=sensors, joints=joints), robot.mechanism)
     return Observer(bare, bandwidth=1e9, method="paper", discretization="exponential")
 
@@ -138,6 +138,8 @@ def _read_torques(robot: Robot, part: Samples) -> Array:
         torques[:, j] = joint.sign * joint.gain * part.tau[:, j] - joint.bias
         torques[:, j] -= friction.coulomb * np.tanh(qd / friction.coulomb_width)
         torques[:, j] -= friction.viscous * qd
+        if joint.rest is not None:
+            torques[:, j] -= joint.rest.at(part.q[:, j], qd)
     return torques
 
 

@@ -19,6 +19,7 @@ def calibrate(
     false_alarms: Annotated[float | None, arg(metavar="PER_HOUR")] = None,
     trust: bool = False,
     identify: bool = True,
+    learn: bool = False,
     figure: Annotated[Path | None, arg(metavar="FILE")] = None,
     pictures: Annotated[Path | None, arg(metavar="DIR")] = None,
 ) -> int:
@@ -54,6 +55,9 @@ def calibrate(
         false_alarms: Per hour of the whole robot. Default: as described, or 1.
         trust: Nothing touched the robot: what stands out is friction or the like, and counts.
         identify: False takes biases, friction and inertias as they are described.
+        learn: Learns what physics leaves of each joint's torque, as a table over the joint's own
+            position and velocity, beside the robot.yaml (NAME_rest.csv). A joint gets one only
+            where that helps in time and space it has not seen. Off where nothing was seen.
         figure: Draws how often which statistic was exceeded, with the thresholds (.svg, .png).
         pictures: Draws residuals before and after, and friction over speed, into this folder.
     """
@@ -70,7 +74,7 @@ def calibrate(
         from touchline.calibrate.figure import check_figure
 
         check_figure(figure)
-    result = run(list(logs), robot, out, method, false_alarms, trust, identify)
+    result = run(list(logs), robot, out, method, false_alarms, trust, identify, learn)
     print(summary_text(result))
     if figure is not None:
         from touchline.calibrate.figure import draw_calibration

@@ -6,7 +6,7 @@
 Every column has gone through the observer's own filter, so no acceleration is needed anywhere.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -127,8 +127,9 @@ def gather(
     """
     found: Evidence | None = None
     for recording in recordings:
-        one = _gather_one(robot, list(recording), bandwidth)
-        if one is not None:
+        signals = _signals_of(robot, list(recording), bandwidth)
+        if signals is not None:
+            one = _gather_one(robot, signals, bandwidth)
             found = one if found is None else found.joined(one)
     if found is None:
         raise ValueError("no recording is long enough: a second of motion at least")
@@ -136,7 +137,53 @@ def gather(
     return found.part(np.arange(0, len(found), every))
 
 
-def _gather_one(robot: Robot, parts: list[Samples], bandwidth: float) -> Evidence | None:
+def filtered(
+    robot: Robot,
+    recordings: Iterable[Iterable[Samples]],
+    of: Callable[[Array, Array], Array],
+    bandwidth: float = BANDWIDTH,
+) -> NDArray[np.float32]:
+    """Functions of the motion through the same filter, at the instants that `gather` keeps.
+
+    Args:
+        robot: as for `gather`.
+        recordings: the same.
+        of: from positions and velocities (N, n) to values (N, columns).
+        bandwidth: of the filter [rad/s].
+
+    Returns:
+        (instants, columns) in single precision, which is as much as they are good for.
+    """
+    found: list[NDArray[np.float32]] = []
+    for recording in recordings:
+        signals = _signals_of(robot, list(recording), bandwidth)
+        if signals is None:
+            continue
+        smoother = Smoother()
+        for start in range(0, len(signals.q) - 1, PIECE):
+            stop = min(start + PIECE, len(signals.q) - 1)
+            piece = slice(start, stop + 1)
+            inputs = mean(of(signals.q[piece], signals.qd[piece]))
+            out = smoother.run(inputs, signals.steps.part(start, stop))
+            found.append(out[signals.keep[start:stop]].astype(np.float32))
+    whole = np.concatenate(found)
+    return whole[:: -(-len(whole) // MOST)]
+
+
+@dataclass(frozen=True)
+class _Signals:
+    """What is there of a recording, at N samples, and which of its intervals are kept."""
+
+    time: Array
+    q: Array
+    qd: Array
+    reading: Array
+    used: NDArray[np.bool_]
+    steps: Steps
+    keep: NDArray[np.bool_]
+
+
+def _signals_of(robot: Robot, parts: list[Samples], bandwidth: float) -> _Signals | None:
     if not parts:
         return None
     names = ("time", "q", "qd", "tau", "wrench")
@@ -146,7 +193,6 @@ def _gather_one(robot: Robot, parts: list[Samples], bandwidth: float) -> Evidenc
     if len(time) < LEAST:
         return None
     bare = bare_robot(robot)
-    rows = rows_of(bare)
     usual = np.all(np.isfinite(np.concatenate([q, qd], axis=1)), axis=1)
     q, qd = (np.where(usual[:, None], x, 0.0) for x in (q, qd))
     reading = _read(bare, q, qd, tau, wrench)
@@ -164,16 +210,18 @@ def _gather_one(robot: Robot, parts: list[Samples], bandwidth: float) -> Evidenc
     every = max(every, -(-len(time) // (4 * MOST)))
     keep = np.arange(len(steps.dt)) % every == 0
     keep &= ready
-    if not keep.any():
-        return None
-    columns = [p for p in _columns(bare, rows, q, qd, reading, steps, keep)]
+    return _Signals(time, q, qd, reading, used, steps, keep) if keep.any() else None
+
+
+def _gather_one(robot: Robot, s: _Signals, bandwidth: float) -> Evidence:
+    bare = bare_robot(robot)
+    rows = rows_of(bare)
+    columns = [p for p in _columns(bare, rows, s.q, s.qd, s.reading, s.steps, s.keep)]
     joined = {name: np.concatenate([c[name] for c in columns]) for name in columns[0]}
-    joined["reading"] = np.where(used, joined["reading"], 0.0)
-    count = int(keep.sum())
-    at = np.flatnonzero(keep) + 1
-    return Evidence(
-        robot, rows, used, bandwidth, time[at], np.zeros(count, np.int64), q[at], qd[at], **joined
-    )
+    joined["reading"] = np.where(s.used, joined["reading"], 0.0)
+    at = np.flatnonzero(s.keep) + 1
+    number = np.zeros(len(at), np.int64)
+    return Evidence(robot, rows, s.used, bandwidth, s.time[at], number, s.q[at], s.qd[at], **joined)
 
 
 def _columns(
@@ -238,7 +286,7 @@ def _read(robot: Robot, q: Array, qd: Array, tau: Array, wrench: Array) -> Array
     """Readings (N, R), NaN where there is none; a weight that was taken out stays out."""
     sensors = tuple(replace(s, compensated="none") for s in robot.description.sensors)
     plain = Robot(replace(robot.description, sensors=sensors), robot.mechanism)
-    torques = read_torque(plain, qd, tau)
+    torques = read_torque(plain, q, qd, tau)
     if not sensors:
         return torques
     turned = any(s.frame != "sensor" for s in sensors)

@@ -32,6 +32,8 @@ class Identification:
         before, after: (R,) RMS of the residuals on data held out, of the described model and of
             one that was fitted to the other data alone.
         parted: how the data were parted.
+        train, test: (N,) the other data, and those held out.
+        trained: the solution from `train` alone.
     """
 
     evidence: Evidence
@@ -40,6 +42,9 @@ class Identification:
     before: Array
     after: Array
     parted: str
+    train: NDArray[np.bool_]
+    test: NDArray[np.bool_]
+    trained: Solution
 
     @property
     def problem(self) -> Problem:
@@ -88,7 +93,8 @@ def identify(evidence: Evidence, trust: bool = False) -> Identification:
     held = evidence.part(test)
     start = held.residual()
     before = rms(start)
-    after = rms(start + applied(held, chooser.fit(problem)))
+    trained = chooser.fit(problem)
+    after = rms(start + applied(held, trained))
     while problem.columns or problem.bodies:
         worse = (after > WORSE * before) & evidence.used
         if not worse.any():
@@ -97,12 +103,14 @@ def identify(evidence: Evidence, trust: bool = False) -> Identification:
         if smaller == problem:
             smaller = replace(problem, bodies=())
         problem = smaller
-        after = rms(start + applied(held, chooser.fit(problem)))
+        trained = chooser.fit(problem)
+        after = rms(start + applied(held, trained))
     if float(after.sum()) >= float(before.sum()):
         problem, after = Problem(), before
+        trained = chooser.fit(problem)
     whole = Chooser(evidence, ~touched)
     solution = whole.with_errors(whole.fit(problem))
-    return Identification(evidence, solution, touched, before, after, parted)
+    return Identification(evidence, solution, touched, before, after, parted, train, test, trained)
 
 
 def identify_all(evidence: Evidence) -> Solution:

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What was identified, as text."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from touchline.identify.fit import main_links
 from touchline.identify.identification import Identification
 from touchline.identify.payload import payload_link
+from touchline.identify.rest import Rest
 
 UNITS = {"bias": "Nm", "viscous": "Nm s/rad", "coulomb": "Nm", "rotor": "kg m2", "gain": ""}
 WORDS = {
@@ -30,6 +33,23 @@ def identification_lines(found: Identification, beside: list[str] | None = None)
             "joints that hardly moved are not; a minute of motion of all joints tells them"
         )
     return [*lines, "", *_residual_lines(found)]
+
+
+def rest_lines(rest: Rest, joints: Sequence[str]) -> list[str]:
+    """What was learned of what is left, and what it is worth where it has not been."""
+    lines = ["learned beside it, by joint, over its own position and velocity"]
+    if not rest.tables:
+        return [*lines, "  nothing that foretells parts of time and space which it has not seen"]
+    head = f"  {'joint':20} {'up to':>8}  {'held out':>16}  {'elsewhere':>16}"
+    lines.append(f"{head}  (RMS before and after)")
+    for j, name in enumerate(joints):
+        if name not in rest.tables:
+            continue
+        pairs = (rest.before[j], rest.after[j]), (rest.region_before[j], rest.region_after[j])
+        told = "  ".join(f"{a:8.3g}{b:8.3g}" for a, b in pairs)
+        lines.append(f"  {name:20} {rest.tables[name].largest:8.3g}  {told} Nm")
+    told = "elsewhere: in parts of the workspace that played no part; off where nothing was seen"
+    return [*lines, f"  {told}"]
 
 
 def _column_lines(found: Identification) -> list[str]:

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from touchline.model.learned_rest import LearnedRest
+
 Vector = tuple[float, ...]
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 
@@ -22,7 +24,8 @@ class Friction:
 class JointDescription:
     """One observed joint.
 
-    `torque` is "sensor", "motor", "none" or "from"; then `sources` names sensors.
+    `torque` is "sensor", "motor", "none" or "from"; then `sources` names sensors. `rest` is what
+    was learned of the torque beside all that is described.
     """
 
     name: str
@@ -36,6 +39,7 @@ class JointDescription:
     compensated: str = "none"
     rotor_inertia: float = 0.0
     friction: Friction = field(default_factory=Friction)
+    rest: LearnedRest | None = None
 
     @property
     def measured(self) -> bool:

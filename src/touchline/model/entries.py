@@ -81,6 +81,7 @@ class RobotFile:
     force_torque_sensors: list[SensorEntry] = field(default_factory=list)
     loads: list[Load] = field(default_factory=list)
     links: dict[str, LinkCorrection] = field(default_factory=dict)
+    learned_rest: str | None = None
     graspable: list[str] = field(default_factory=list)
     noise: dict[str, Any] = field(default_factory=dict)
     observer: ObserverEntry = ObserverEntry()

@@ -57,6 +57,8 @@ def joint_row(robot: Robot, index: int, bandwidth: float | None) -> core.JointRo
     row.coulomb = joint.friction.coulomb
     row.viscous = joint.friction.viscous
     row.coulomb_width = joint.friction.coulomb_width
+    if joint.rest is not None:
+        row.set_rest(joint.rest.q, joint.rest.qd, joint.rest.torque)
     model = robot.mechanism.joints[joint.name]
     row.lower, row.upper = model.lower, model.upper
     row.bandwidth = bandwidth or robot.description.bandwidth_joints[index]

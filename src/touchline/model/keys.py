@@ -140,5 +140,10 @@ HOOKS: dict[type, dict[str, Hook]] = {
     },
     RetractDescription: {"way": values.positive, "speed": values.positive},
     PolicyDescription: {"zones": _zones, "transient_time": values.positive},
-    RobotFile: {"name": values.text, "model": values.text, "gravity": _VECTOR3},
+    RobotFile: {
+        "name": values.text,
+        "model": values.text,
+        "gravity": _VECTOR3,
+        "learned_rest": values.text,
+    },
 }

@@ -12,6 +12,7 @@ from touchline.model.description import JointDescription, RobotDescription, Sens
 from touchline.model.entries import JointEntry, RobotFile, SensorEntry
 from touchline.model.expand import Expander
 from touchline.model.interface_names import check_interface
+from touchline.model.learned_rest import LearnedRest, read_rest
 from touchline.model.mechanism import Mechanism
 from touchline.model.names import Names, check_names, joint_entries, names_in, sensor_entries
 from touchline.model.packages import resolve, resolve_robot
@@ -56,6 +57,7 @@ def read_robot_data(data: dict[Any, Any], path: Path) -> tuple[RobotDescription,
     model, mechanism, model_problems = _read_model(file, path, folders)
     names = names_in(data)
     draft = _Draft(path, model, folders, file, names, mechanism)
+    problems += draft.read_rest()
     at_fault = tuple(problems)  # a whole is not to blame where one of its parts is
     for where, what in draft.problems:
         if not any(problem.startswith(f"{where}.") for problem in at_fault):
@@ -145,6 +147,7 @@ class _Draft:
         self.noise = self.expander.noise(file.noise)
         self.bandwidth = self.expander.bandwidth(file.observer.bandwidth)
         self.detection = self.expander.detection(file.detection)
+        self.rest: dict[str, LearnedRest] = {}
         self.sensors = [self._sensor(place, sensor) for place, sensor in sensor_entries(file)]
         self.problems = [
             *check_names(file, names, mechanism),
@@ -167,6 +170,17 @@ class _Draft:
         same.update(vars(entry.pose), bias=bias, range=reach)
         return SensorDescription(**same)
 
+    def read_rest(self) -> list[str]:
+        """Reads what was learned of the torques; returns what is wrong with it."""
+        if self.file.learned_rest is None:
+            return []
+        names = [joint.name for joint in self.joints]
+        try:
+            self.rest = read_rest(self.path.parent / self.file.learned_rest, names)
+        except InputError as error:
+            return [f"learned_rest: {problem}" for problem in error.problems]
+        return []
+
     def description(self) -> RobotDescription:
         """Return the description; only without problems."""
         file = self.file
@@ -174,7 +188,7 @@ class _Draft:
         return RobotDescription(
             name=str(file.name),
             model=Path(str(self.model)),
-            joints=tuple(map(_joint, self.joints)),
+            joints=tuple(_joint(joint, self.rest.get(joint.name)) for joint in self.joints),
             sensors=tuple(self.sensors),
             noise=self.noise,
             bandwidth_joints=joints,
@@ -194,6 +208,6 @@ class _Draft:
         )
 
 
-def _joint(entry: JointEntry) -> JointDescription:
+def _joint(entry: JointEntry, rest: LearnedRest | None) -> JointDescription:
     torque: dict[str, Any] = {"torque": entry.torque.kind, "sources": entry.torque.sources}
-    return JointDescription(**vars(entry) | torque)
+    return JointDescription(**vars(entry) | torque, rest=rest)

@@ -69,6 +69,11 @@ MEANINGS: dict[str, tuple[str, str, str]] = {
     "loads[].mass": ("number", "kg", "Mass."),
     "loads[].com": (THREE, "m", "Centre of mass in link axes."),
     "loads[].inertia": (SIX, "kg m²", f"{INERTIA}."),
+    "learned_rest": (
+        "text",
+        "",
+        "A CSV of what the torques have beside the model, written by `calibrate --learn`.",
+    ),
     "links": ("mapping LINK: mapping", "", "Corrections of links, written by `calibrate`."),
     "links.NAME.mass": ("number", "kg", "Mass, instead of the model's."),
     "links.NAME.com": (THREE, "m", "Centre of mass, instead of the model's."),

@@ -29,8 +29,8 @@ def write_description(source: Path, out: Path, changes: dict[str, Any]) -> None:
         source: the description.
         out: where the new one will stand; may be the same.
         changes: top-level key -> keys within it -> new value; of `joints` and
-            `force_torque_sensors` name -> keys of that entry -> new value; a list replaces what
-            stands there.
+            `force_torque_sensors` name -> keys of that entry -> new value; a list or a text
+            replaces what stands there.
 
     Raises:
         InputError: the file cannot be written.
@@ -42,6 +42,10 @@ def write_description(source: Path, out: Path, changes: dict[str, Any]) -> None:
     for key, value in moved.items():
         lines = _replaced(lines, key, _dumped(key, value))
     for key, values in changes.items():
+        if isinstance(values, str):
+            lines = _replaced(lines, key, _dumped(key, values))
+            expected[key] = values
+            continue
         if key in NAMED:
             values = _named(data.get(key) or [], values)
         if key == "loads":
@@ -138,6 +142,9 @@ def _moved_paths(source: Path, out: Path, data: dict[Any, Any]) -> dict[str, Any
     if isinstance(model, str) and not re.match(r"^\w+:", model) and not Path(model).is_absolute():
         shipped = [name for name, path in shipped_descriptions().items() if path == source]
         changes["model"] = f"robot:{shipped[0]}" if shipped else _relative(here / model, there)
+    rest = data.get("learned_rest")
+    if isinstance(rest, str) and not Path(rest).is_absolute():
+        changes["learned_rest"] = _relative(here / rest, there)
     folders = data.get("package_dirs")
     if isinstance(folders, list):
         changes["package_dirs"] = [

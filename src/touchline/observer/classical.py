@@ -140,7 +140,7 @@ def acceleration(robot: Robot, q: Array, qd: Array, tau: Array, residual: Array)
     rest = inverse_dynamics(robot, q, qd, np.zeros_like(qd)).torque  # C qd + g
     weight = gravity_loads(robot, q).torque
     taken_out = np.array([joint.compensated == "gravity" for joint in joints])
-    load = read_torque(robot, qd, tau) + np.where(taken_out, weight, 0.0)
+    load = read_torque(robot, q, qd, tau) + np.where(taken_out, weight, 0.0)
     return _solved(moved_mass(robot, q), load - rest + residual)
 
 

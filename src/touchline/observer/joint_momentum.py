@@ -112,7 +112,7 @@ class JointMomentumObserver:
         joints = self.robot.description.joints
         M = moved_mass(self.robot, q)
         C_transposed = np.swapaxes(coriolis_matrix(self.robot, q, qd), -1, -2)
-        load = read_torque(self.robot, qd, tau)
+        load = read_torque(self.robot, q, qd, tau)
         weight = gravity_loads(self.robot, q).torque
         p, u = times(M, qd), load + times(C_transposed, qd) - weight
         for j, joint in enumerate(joints):

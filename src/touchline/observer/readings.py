@@ -14,11 +14,11 @@ from touchline.observer.dynamics import Posture, gravity_loads
 Array = NDArray[np.float64]
 
 
-def read_torque(robot: Robot, qd: Array, tau: Array) -> Array:
+def read_torque(robot: Robot, q: Array, qd: Array, tau: Array) -> Array:
     """Joint torques (N, n) [Nm] without friction, from logged ones.
 
-    Applies sign, gain, bias and friction. What the driver has taken out stays out; joints without
-    a torque signal are NaN.
+    Applies sign, gain, bias, friction and what was learned beside it. What the driver has taken out
+    stays out; joints without a torque signal are NaN.
     """
     read = np.full(tau.shape, np.nan)
     for j, joint in enumerate(robot.description.joints):
@@ -27,6 +27,8 @@ def read_torque(robot: Robot, qd: Array, tau: Array) -> Array:
         law, speed = joint.friction, qd[:, j]
         friction = law.coulomb * np.tanh(speed / law.coulomb_width) + law.viscous * speed
         read[:, j] = joint.sign * joint.gain * tau[:, j] - joint.bias - friction
+        if joint.rest is not None:
+            read[:, j] -= joint.rest.at(q[:, j], speed)
     return read
 
 

@@ -98,6 +98,8 @@ def _friction(joint: JointDescription) -> str:
         parts.append(f"{friction.coulomb:g} tanh(qd / {friction.coulomb_width:g})")
     if friction.viscous:
         parts.append(f"{friction.viscous:g} qd")
+    if joint.rest is not None:
+        parts.append(f"learned, up to {joint.rest.largest:.2g}")
     return " + ".join(parts)
 
 

@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 from touchline.bench.identify.arms import ARMS, KINOVA, Arm
 from touchline.bench.identify.pushes import FORCE, detect
 from touchline.errors import InputError
-from touchline.identify.evidence import Evidence, gather
+from touchline.identify.evidence import Evidence, filtered, gather
 from touchline.identify.identification import identify, identify_all, rms
 from touchline.identify.payload import payload_mass
+from touchline.identify.rest import grids_of, learn, regions_of
 from touchline.logs import open_log
 from touchline.model.robot import Robot, load_robot
+from touchline.observer.samples import Samples
 
 Array = NDArray[np.float64]
 
@@ -33,25 +35,60 @@ class Judgement:
     arm: Arm
     before: Array
     after: Array
+    learned: Array
 
     @property
     def share(self) -> float:
         """What is left of the sum over joints."""
         return float(self.after.sum() / self.before.sum())
 
+    @property
+    def learned_share(self) -> float:
+        """What is left of it with a learned rest."""
+        return float(self.learned.sum() / self.before.sum())
+
 
 def judge(arm: Arm, data: Path) -> Judgement:
     """Identifies an arm from the first half, and judges on the rest."""
-    robot = described(arm, data)
-    recordings = [read(robot, data / log) for log in arm.logs]
-    if len(recordings) > 1:
-        first, rest = recordings[:2]
+    robot, recordings, whole = _whole(arm, data)
+    if len(arm.logs) > 1:
+        first = whole.recording == 0
     else:
-        (whole,) = recordings
-        index = np.arange(len(whole))
-        first, rest = whole.part(index < len(index) // 2), whole.part(index >= len(index) // 2)
-    found = identify(first)
-    return Judgement(arm, rms(rest.residual()), rms(found.left(rest)))
+        first = np.arange(len(whole)) < len(whole) // 2
+    return _judged(arm, robot, recordings, whole, first)
+
+
+def judge_regions(arm: Arm, data: Path) -> list[Judgement]:
+    """The same with each part of the workspace in turn judged by what was seen of the others."""
+    robot, recordings, whole = _whole(arm, data)
+    parts = regions_of(whole, np.ones(len(whole), dtype=bool))
+    return [_judged(arm, robot, recordings, whole, part.train) for part in parts]
+
+
+def _whole(arm: Arm, data: Path) -> tuple[Robot, list[list[Samples]], Evidence]:
+    robot = described(arm, data)
+    recordings = []
+    for log in arm.logs[:2]:
+        with open_log(data / log, robot.description) as recording:
+            recordings.append(list(recording.chunks(CHUNK)))
+    return robot, recordings, gather(robot, recordings)
+
+
+def _judged(
+    arm: Arm,
+    robot: Robot,
+    recordings: list[list[Samples]],
+    whole: Evidence,
+    first: NDArray[np.bool_],
+) -> Judgement:
+    part, n = whole.part(first), whole.joints
+    found, grids = identify(part), grids_of(part)
+    hats = filtered(robot, recordings, grids.hats)
+    rest = learn(found, grids, hats[first])
+    left = found.left(whole)[:, :n]
+    more = left + rest.applied(robot.joint_names, grids, hats)
+    before = whole.residual()[:, :n]
+    return Judgement(arm, *(rms(x[~first]) for x in (before, left, more)))
 
 
 def tool_masses(data: Path) -> list[tuple[float, float]]:
@@ -83,17 +120,23 @@ def main(data: Path) -> int:
     if not data.is_dir():
         raise InputError(f"--data {data}: no such folder")
     print("RMS of the residuals at K = 20 rad/s, sum over joints, on data that played no part")
-    print(f"{'arm':16} {'before':>8} {'after':>8} {'left':>7} {'limit':>7}  joints that got worse")
+    head = f"{'arm':16} {'before':>8} {'after':>8} {'left':>7} {'limit':>7} {'learned':>8}"
+    print(f"{head}  joints that got worse")
     missed = False
     for arm in ARMS:
         j = judge(arm, data)
         worse = np.flatnonzero(j.after > j.before)
-        missed |= j.share > arm.limit or len(worse) > 0
+        missed |= j.share > arm.limit or len(worse) > 0 or j.learned_share > j.share
         print(
             f"{arm.name:16} {j.before.sum():5.2f} Nm {j.after.sum():5.2f} Nm "
-            f"{100 * j.share:5.1f} % {100 * arm.limit:5.0f} %  "
+            f"{100 * j.share:5.1f} % {100 * arm.limit:5.0f} % {100 * j.learned_share:6.1f} %  "
             f"{', '.join(str(w + 1) for w in worse) or 'none'}"
         )
+    print("the same in eight parts of the workspace, each judged by what was seen of the others")
+    for arm in ARMS:
+        shares = [(j.share, j.learned_share) for j in judge_regions(arm, data)]
+        told = ", ".join(f"{100 * a:.1f} -> {100 * b:.1f}" for a, b in shares)
+        print(f"{arm.name:16} {told} %")
     masses = tool_masses(data)
     print("tool of the Kinova, from each file alone: ", end="")
     print(", ".join(f"{mass:.3f} +- {error:.3f} kg" for mass, error in masses))

@@ -303,7 +303,7 @@ class Observer {
     Balances& balances = channels_.balances;
     const TermsLayout& at = terms_.at();
     std::copy_n(terms + at.joint_momentum(), at.joints, balances.p(channels_.joint(0)));
-    bool complete = torques_.read(sample.tau, sample.qd, terms + at.joint_bias(),
+    bool complete = torques_.read(sample.tau, sample.q, sample.qd, terms + at.joint_bias(),
                                   balances.u(channels_.joint(0)), health);
     for (std::size_t s = 0; s < at.sensors; ++s) {
       Health own = 0;

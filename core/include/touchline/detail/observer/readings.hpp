@@ -27,6 +27,7 @@ class JointReadings {
       offset_.push_back(joint.measured() ? joint.bias : kNaN);
       viscous_.push_back(joint.viscous);
       if (joint.measured() && joint.coulomb != 0.0) rough_.push_back(j);
+      if (joint.measured() && !joint.rest.empty()) learned_.push_back(j);
       limits_.push_back(joint.measured() ? safe_limit(joint.range / std::fabs(joint.gain))
                                          : kNoLimit);
     }
@@ -34,7 +35,8 @@ class JointReadings {
   }
 
   // The same for samples side by side, all of which are usable: `logged` (kLanes, n).
-  void read(const double* logged, const Lanes* qd, const Lanes* n_bar, Lanes* u) const {
+  void read(const double* logged, const Lanes* q, const Lanes* qd, const Lanes* n_bar,
+            Lanes* u) const {
     const std::size_t n = slope_.size();
     for (std::size_t j = 0; j < n; ++j) {
       Lanes tau;
@@ -48,6 +50,10 @@ class JointReadings {
         set_lane(u[j], k, lane(u[j], k) - friction);
       }
     }
+    for (std::size_t j : learned_) {
+      for (int k = 0; k < kLanes; ++k)
+        set_lane(u[j], k, lane(u[j], k) - joints_[j].rest(lane(q[j], k), lane(qd[j], k)));
+    }
   }
   // Are all torques of one sample usable and within their ranges?
   bool sound(const double* logged) const {
@@ -57,13 +63,14 @@ class JointReadings {
   // Per joint: was its last torque usable?
   const std::vector<char>& present() const { return present_; }
 
-  // Writes the known loads u = tau - friction - n [Nm] (NaN for joints that have no sensor);
+  // Writes the known loads u = tau - friction - rest - n [Nm] (NaN for joints that have no sensor);
   // returns whether all joints that should have one have a usable torque.
-  bool read(const double* logged, const double* qd, const double* n_bar, double* u,
-            Health& health) {
+  bool read(const double* logged, const double* q, const double* qd, const double* n_bar,
+            double* u, Health& health) {
     convert(logged, qd, n_bar, u);
     for (std::size_t j : rough_)
       u[j] -= joints_[j].coulomb * std::tanh(qd[j] / joints_[j].coulomb_width);
+    for (std::size_t j : learned_) u[j] -= joints_[j].rest(q[j], qd[j]);
     if (all_below(logged, limits_.data(), limits_.size())) {
       if (incomplete_) present_ = measured_;
       incomplete_ = false;
@@ -98,7 +105,7 @@ class JointReadings {
   std::vector<char> measured_, present_;
   std::vector<double> slope_, offset_, viscous_;
   std::vector<std::uint64_t> limits_;
-  std::vector<std::size_t> rough_;  // joints with Coulomb friction
+  std::vector<std::size_t> rough_, learned_;  // joints with Coulomb friction, with a learned rest
   bool incomplete_ = false;
 };
 

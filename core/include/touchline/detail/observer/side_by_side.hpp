@@ -104,7 +104,7 @@ class SideBySide {
     const TermsLayout& at = model_.at();
     const std::size_t n = at.joints;
     std::copy_n(terms_.data() + at.joint_momentum(), n, p_.data());
-    torques_.read(tau, q_.data() + n, terms_.data() + at.joint_bias(), u_.data());
+    torques_.read(tau, q_.data(), q_.data() + n, terms_.data() + at.joint_bias(), u_.data());
     for (std::size_t s = 0; s < at.sensors; ++s) {
       const Lanes* terms = terms_.data() + at.sensor(s);
       const std::size_t first = row(channels_.sensor(s));

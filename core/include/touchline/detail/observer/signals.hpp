@@ -10,6 +10,7 @@
 
 #include "touchline/detail/model/spatial.hpp"
 #include "touchline/detail/observer/health.hpp"
+#include "touchline/detail/observer/learned_rest.hpp"
 
 namespace touchline {
 
@@ -24,6 +25,7 @@ struct JointRow {
   double sign = 1.0, gain = 1.0, bias = 0.0, range = kInfinity;
   double rotor_inertia = 0.0;
   double coulomb = 0.0, viscous = 0.0, coulomb_width = 0.05;
+  LearnedRest rest;
   double lower = -kInfinity, upper = kInfinity;
   double bandwidth = 100.0;
   std::vector<int> nodes;    // that move with this joint: itself, then those that mimic it

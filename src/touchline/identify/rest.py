@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What physics leaves of joint torques, learned as tables over a joint's own motion.
+
+The table of a joint has nodes over its position and velocity, and is bilinear between them. Each
+node's hat goes through the observer's own filter, so the residual is linear in the torques at the
+nodes. Their prior is a Gaussian process; the posterior at the nodes is the table and its doubt
+(structured kernel interpolation: Wilson and Nickisch, ICML 2015). A node in whose cells nothing was
+seen is 0, so the table is off there.
+
+A joint gets a table only if that foretells parts of time that the fit has not seen, and is no worse
+in parts of the workspace that it has not seen.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from touchline.identify.choice import Fold, folds_of
+from touchline.identify.evidence import Evidence
+from touchline.identify.fit import applied
+from touchline.identify.identification import WORSE, Identification, rms
+from touchline.identify.touches import usual_scatter
+from touchline.model.learned_rest import LearnedRest
+from touchline.model.robot import Robot
+
+Array = NDArray[np.float64]
+
+POSITIONS, SPEEDS = 16, 17  # nodes at most
+APART, APART_SPEED = 0.12, 0.5  # rad, and in units of `_bend`: nodes are at least so far apart
+LENGTH, LENGTH_SPEED = 0.3, 1.0  # over which a table may change, in the same units
+SLOW = 0.05  # rad/s; below it nodes stand as closely as that, beyond ever farther apart
+KNOWN, UNKNOWN = 0.5, 0.9  # of the prior variance: from there on a node counts less, and not at all
+CORRELATED = 0.2  # equations closer than the filter's memory repeat each other
+LEAST = 0.05  # of the residual's usual scatter is taken as noise at least
+REGIONS = 4  # of the workspace, along each of its two widest directions
+HELPS = 0.99  # of the RMS: what a table must leave at most, in time and space it has not seen
+HUBER = 3.0  # usual sigmas beyond which an equation loses weight
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Nodes of a joint's table, without those on the edges."""
+
+    q: Array
+    qd: Array
+
+    @property
+    def size(self) -> int:
+        """How many nodes there are."""
+        return len(self.q) * len(self.qd)
+
+    def hats(self, q: Array, qd: Array) -> Array:
+        """How much each node counts (N, nodes) at positions and velocities (N,)."""
+        whole = np.einsum("ni,nk->nik", _hats(_widened(self.q), q), _hats(_widened(self.qd), qd))
+        return whole[:, 1:-1, 1:-1].reshape(len(q), -1)
+
+    def prior(self) -> Array:
+        """Covariance (nodes, nodes) of the torques, in units of their variance."""
+        a, b = np.meshgrid(self.q / LENGTH, _bend(self.qd) / LENGTH_SPEED, indexing="ij")
+        at = np.column_stack([a.ravel(), b.ravel()])
+        square = ((at[:, None] - at[None]) ** 2).sum(axis=-1)
+        return np.exp(-0.5 * square) + 1e-6 * np.eye(len(at))
+
+    def table(self, torque: Array, doubt: Array) -> LearnedRest:
+        """The table with its edges, where nothing is known."""
+        q, qd = _widened(self.q), _widened(self.qd)
+        values, sigma = np.zeros((len(q), len(qd))), np.zeros((len(q), len(qd)))
+        values[1:-1, 1:-1] = torque.reshape(len(self.q), -1)
+        sigma[1:-1, 1:-1] = doubt.reshape(len(self.q), -1)
+        flat = (tuple(float(x) for x in a.ravel()) for a in (q, qd, values, sigma))
+        return LearnedRest(*flat)
+
+
+@dataclass(frozen=True)
+class Grids:
+    """Of all joints; None for one that gets no table. The columns stand joint by joint."""
+
+    of: tuple[Grid | None, ...]
+
+    def hats(self, q: Array, qd: Array) -> Array:
+        """How much each node of each joint counts (N, columns)."""
+        parts = [g.hats(q[:, j], qd[:, j]) for j, g in enumerate(self.of) if g is not None]
+        return np.concatenate([np.empty((len(q), 0)), *parts], axis=1)
+
+    def columns(self, joint: int) -> slice:
+        """Those of a joint."""
+        sizes = [0 if g is None else g.size for g in self.of]
+        first = sum(sizes[:joint])
+        return slice(first, first + sizes[joint])
+
+
+@dataclass(frozen=True)
+class Rest:
+    """What was learned.
+
+    Attributes:
+        tables: by joint; only of those that are better with one.
+        before, after: (n,) RMS of the residuals [Nm] on data that played no part, identified
+            without tables and with them.
+        inside: (n,) the same with tables, on the data that they were learned from.
+        region_before, region_after: (n,) the same in parts of the workspace that a fit had not
+            seen; NaN for joints without a table.
+    """
+
+    tables: dict[str, LearnedRest]
+    before: Array
+    after: Array
+    inside: Array
+    region_before: Array
+    region_after: Array
+
+    def applied(self, joints: Sequence[str], grids: Grids, columns: NDArray[np.floating]) -> Array:
+        """The torques (N, n) [Nm] of the tables, filtered like the columns (N, columns)."""
+        torques = np.zeros((len(columns), len(joints)))
+        for j, name in enumerate(joints):
+            if name in self.tables:
+                torques[:, j] = columns[:, grids.columns(j)] @ inner(self.tables[name])
+        return torques
+
+
+def grids_of(evidence: Evidence) -> Grids:
+    """Nodes over all that the joints with a torque did."""
+    grids: list[Grid | None] = []
+    for j in range(evidence.joints):
+        q, bent = evidence.q[:, j], _bend(evidence.qd[:, j])
+        if not evidence.used[j] or np.ptp(q) < APART or np.ptp(bent) < APART_SPEED:
+            grids.append(None)
+            continue
+        places = min(POSITIONS, int(np.ptp(q) / APART) + 1)
+        speeds = min(SPEEDS, int(np.ptp(bent) / APART_SPEED) + 1)
+        nodes = np.linspace(q.min(), q.max(), places)
+        fast = SLOW * np.sinh(np.linspace(bent.min(), bent.max(), speeds))
+        grids.append(Grid(nodes, fast) if min(places, speeds) > 1 else None)
+    return Grids(tuple(grids))
+
+
+def learn(found: Identification, grids: Grids, columns: NDArray[np.floating]) -> Rest:
+    """Learns what is left after an identification.
+
+    Args:
+        found: the identification.
+        grids: from `grids_of` its evidence.
+        columns: (N, columns) their hats, filtered, at the instants of the evidence.
+    """
+    evidence, n = found.evidence, found.evidence.joints
+    trained = evidence.residual() + applied(evidence, found.trained)
+    whole, use = found.left(), ~found.touched
+    tables: dict[str, LearnedRest] = {}
+    before, after = rms(trained[found.test])[:n], rms(trained[found.test])[:n]
+    regions, parts = list(regions_of(evidence, use)), list(folds_of(evidence, use))
+    inside, unseen = rms(whole[use])[:n], np.full((2, n), np.nan)
+    for j, grid in enumerate(grids.of):
+        if grid is None:
+            continue
+        hats = columns[:, grids.columns(j)].astype(float)
+        joint = _Joint(evidence, grid, hats, whole[:, j])
+        elsewhere, later = joint.foretold(regions), joint.foretold(parts)
+        if elsewhere.share > 1.0 or (elsewhere + later).share > HELPS:
+            continue
+        held = _Joint(evidence, grid, hats, trained[:, j])
+        told = held.foretold([Fold(found.train, found.test)])
+        if told.share > WORSE:
+            continue
+        torque, doubt = joint.fit(use)
+        after[j], inside[j] = told.after, rms(whole[use, j, None] + hats[use] @ torque[:, None])[0]
+        unseen[:, j] = elsewhere.before, elsewhere.after
+        tables[evidence.rows.names[j]] = grid.table(torque, doubt)
+    return Rest(tables, before, after, inside, *unseen)
+
+
+def inner(table: LearnedRest) -> Array:
+    """The torques at the nodes of a table (nodes,) without its edges."""
+    whole = np.array(table.torque).reshape(len(table.q), len(table.qd))
+    return whole[1:-1, 1:-1].ravel()
+
+
+def regions_of(evidence: Evidence, use: NDArray[np.bool_]) -> Iterator[Fold]:
+    """Parts of the workspace, each judged by what was seen of the others."""
+    centred = evidence.q - evidence.q[use].mean(axis=0)
+    directions = np.linalg.svd(centred[use], full_matrices=False)[2][:2]
+    for direction in directions:
+        along = centred @ direction
+        limits = np.quantile(along[use], np.linspace(0.0, 1.0, REGIONS + 1))
+        part = np.clip(np.searchsorted(limits, along, "right") - 1, 0, REGIONS - 1)
+        for k in range(REGIONS):
+            test, train = use & (part == k), use & (part != k)
+            if test.any() and train.any():
+                yield Fold(train, test)
+
+
+def with_rest(robot: Robot, tables: dict[str, LearnedRest]) -> Robot:
+    """The robot with these tables and no others."""
+    description = robot.description
+    joints = tuple(replace(j, rest=tables.get(j.name)) for j in description.joints)
+    return Robot(replace(description, joints=joints), robot.mechanism)
+
+
+class _Joint:
+    """The equations of one joint: what is left (N,) + hats (N, nodes) @ torques = 0."""
+
+    def __init__(self, evidence: Evidence, grid: Grid, hats: Array, left: Array) -> None:
+        self.evidence, self.grid, self.hats, self.residual = evidence, grid, hats, left
+
+    def fit(self, use: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Torques at the nodes and their doubt (nodes,), 0 where nothing was seen."""
+        hats, left = self.hats[use], self.residual[use]
+        size = float(np.mean(left**2))
+        scatter = usual_scatter(left[:, None], np.array([True]))[0]
+        noise = max(scatter**2, LEAST**2 * size)
+        far = np.abs(left) / np.sqrt(noise)
+        weight = CORRELATED / noise * np.minimum(1.0, HUBER / np.maximum(far, 1e-12))
+        precision = hats.T @ (weight[:, None] * hats) + np.linalg.inv(size * self.grid.prior())
+        covariance = np.linalg.inv(precision)
+        ratio = np.diag(covariance) / size  # of what is not known to what was not known before
+        told = np.clip((UNKNOWN - ratio) / (UNKNOWN - KNOWN), 0.0, 1.0)
+        torque = -told * (covariance @ (hats.T @ (weight * left)))
+        return torque, np.where(told > 0.0, np.sqrt(np.diag(covariance)), 0.0)
+
+    def foretold(self, folds: list[Fold]) -> "_Foretold":
+        """What is left at the instants of the folds that the fits have not seen."""
+        total = _Foretold(0, 0.0, 0.0)
+        for fold in folds:
+            torque, _ = self.fit(fold.train)
+            without = self.residual[fold.test]
+            left = without + self.hats[fold.test] @ torque
+            total += _Foretold(len(left), float(without @ without), float(left @ left))
+        return total
+
+
+@dataclass(frozen=True)
+class _Foretold:
+    """Sums of squares at some instants, without a table and with one."""
+
+    count: int
+    without: float
+    with_table: float
+
+    def __add__(self, other: "_Foretold") -> "_Foretold":
+        return _Foretold(
+            self.count + other.count,
+            self.without + other.without,
+            self.with_table + other.with_table,
+        )
+
+    @property
+    def before(self) -> float:
+        """RMS without a table."""
+        return float(np.sqrt(self.without / max(self.count, 1)))
+
+    @property
+    def after(self) -> float:
+        """RMS with a table."""
+        return float(np.sqrt(self.with_table / max(self.count, 1)))
+
+    @property
+    def share(self) -> float:
+        """How much of the RMS is left."""
+        return self.after / max(self.before, 1e-12)
+
+
+def _bend(speed: Array) -> Array:
+    """Velocities, ever more closely told the slower they are."""
+    return np.arcsinh(speed / SLOW)
+
+
+def _widened(nodes: Array) -> Array:
+    """The nodes and one more on either side."""
+    return np.concatenate([[2.0 * nodes[0] - nodes[1]], nodes, [2.0 * nodes[-1] - nodes[-2]]])
+
+
+def _hats(nodes: Array, x: Array) -> Array:
+    """Linear interpolation's weights (N, nodes) at x (N,); 0 beyond the nodes."""
+    i = np.clip(np.searchsorted(nodes, x, "right") - 1, 0, len(nodes) - 2)
+    share = (x - nodes[i]) / (nodes[i + 1] - nodes[i])
+    inside = (x > nodes[0]) & (x < nodes[-1])
+    found = np.zeros((len(x), len(nodes)))
+    at = np.arange(len(x))
+    found[at, i] = np.where(inside, 1.0 - share, 0.0)
+    found[at, i + 1] = np.where(inside, share, 0.0)
+    return found
