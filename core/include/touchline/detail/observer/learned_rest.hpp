@@ -2,6 +2,7 @@
 // What a joint's torque has beside the model, as a table over its own position and velocity: ripple,
 // friction that depends on the place, offsets of a sensor that turns. It was learned from motion
 // without contact. Between the nodes it is bilinear; beyond them, where nothing was seen, it is 0.
+// Theory: docs/theory.md, section 2.1.
 #pragma once
 
 #include <algorithm>
