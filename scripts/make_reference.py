@@ -15,6 +15,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from touchline.cli.bench import BENCHMARKS
+from touchline.cli.explained import default_text, explanation, types_of
 from touchline.cli.main import COMMANDS
 from touchline.health import Health
 from touchline.model.meanings import MEANINGS, accepted_keys
@@ -22,6 +23,7 @@ from touchline.report.outputs import CONTACT_SCHEMA
 from touchline.result.contact import Candidate, Contact
 from touchline.result.event import Event
 from touchline.result.native import CONTACT
+from touchline.result.standing import Standing
 from touchline.tuning import DEFAULTS
 
 REPOSITORY = Path(__file__).parents[1]
@@ -49,6 +51,104 @@ LOG_COLUMNS = [
     ("truth.contact.K.link", "whole number", "", "none", "Link in `truth.links`; of a simulation."),
     ("truth.contact.K.x, .y, .z", "number", "m", "none", "Place in world; of a simulation."),
     ("truth.contact.K.fx, .fy, .fz", "number", "N", "none", "Force in world; of a simulation."),
+    ("truth.contact.K.mx, .my, .mz", "number", "Nm", "none", "Twist of a grasp; of a simulation."),
+    ("arrival", "number", "s", "none", "When the sample came, by the recorder's clock."),
+    ("sequence", "whole number", "", "none", "Number of the sample at its source."),
+    ("SENSOR.age", "number", "s", "none", "How much older its wrench was than the sample."),
+]
+POSTURES = [
+    ("time", "number", "s", "Time stamp of the sample."),
+    ("q.JOINT", "number", "rad or m", "Position of an observed joint."),
+]
+ANALYSIS = [
+    ("touchline", "text", "", "Version that made the results."),
+    ("log", "text", "", "Where the recording was."),
+    ("robot", "text", "", "Robot, as it was named."),
+    ("method", "text", "", "Method of the observer: `segment` or `paper`."),
+    ("bandwidth", "number", "rad/s", "What `--bandwidth` gave; null: as described."),
+    ("period", "number", "s", "Sample period that thresholds were made for."),
+    ("friction", "number", "", "Coefficient of friction that pushes were looked for with."),
+    ("reach", "number", "m", "Free space that pushes were given."),
+    ("start", "number", "s", "Time of the first sample."),
+    ("end", "number", "s", "Time of the last sample."),
+    ("samples", "whole number", "", "Number of samples."),
+    ("watch", "by segment", "", "How many samples were `watched`, `degraded` and `blind`."),
+    ("findings", "list of text", "", "What the first samples show to be wrong."),
+    ("standing", "list", "", "Signals that are not as told: offsets and noise, see below."),
+    ("tuning", "by name", "", "The numbers of [tuning](tuning.md) that were used."),
+]
+TABLES = {
+    "contacts": [
+        ("robot", "text", "", "Name of the robot."),
+        ("date", "text", "", "Day in UTC, or `undated`."),
+        ("recording", "text", "", "Name of the recording's folder."),
+        ("hour", "whole number", "h", "Hour of the day, or since the first sample."),
+        ("id", "whole number", "", "Number of the event in its recording."),
+        ("segment", "text", "", "Name of the segment."),
+        ("link", "text", "", "Link that was touched; null where not known."),
+        ("level", "text", "", "`contact` or `collision`."),
+        ("status", "text", "", "What is known of the place, as in `events.json`."),
+        ("detected", "number", "s", "Time at which the test fired."),
+        ("cleared", "number", "s", "Time at which it ended; null: it lasts to the end."),
+        ("lasted", "number", "s", "Time between these two."),
+        ("force_peak", "number", "N", "Largest force."),
+        ("torque_peak", "number", "Nm", "Largest external torque on `joint`."),
+        ("joint", "text", "", "The most distal loaded joint."),
+        ("clamped", "true or false", "", "Whether forces on two sides opposed each other."),
+        ("x, y, z", "number", "m", "Place in world; null where not known."),
+    ],
+    "health": [
+        ("robot, date, recording, hour", "", "", "As above."),
+        ("samples", "whole number", "", "Samples in that hour."),
+        ("healthy", "whole number", "", "Samples with health 0."),
+        ("BIT", "whole number", "", "Samples with that health bit: `SETTLING`, `GAP` and so on."),
+    ],
+    "joints": [
+        ("robot, date, recording, hour", "", "", "As above."),
+        ("joint", "text", "", "Name of the joint."),
+        (
+            "quiet",
+            "whole number",
+            "",
+            "Samples without a remark or contact; what follows is of these.",
+        ),
+        ("nan", "whole number", "", "Samples in which the external torque is not known."),
+        ("torque_mean", "number", "Nm or N", "Mean external torque."),
+        ("torque_rms", "number", "Nm or N", "Its root mean square."),
+        ("torque_largest", "number", "Nm or N", "Its largest size."),
+    ],
+    "segments": [
+        ("robot, date, recording, hour", "", "", "As above."),
+        ("segment", "text", "", "Name of the segment."),
+        (
+            "quiet",
+            "whole number",
+            "",
+            "Samples without a remark or contact; what follows is of these.",
+        ),
+        ("nan", "whole number", "", "Samples in which the force is not known."),
+        ("force_p50, force_p95, force_p99", "number", "N", "Percentiles of the external force."),
+    ],
+}
+MANIFEST = [
+    ("name", "text", "", "Folder of its results, below the folder given with `--out`."),
+    ("log", "text", "", "Path or address of the recording."),
+    ("robot", "text", "", "Robot, as it was named."),
+    ("status", "text", "", "`ok`, `partial`, `failed` or `skipped`."),
+    ("reason", "text", "", "Why it is not `ok`."),
+    ("content", "text", "", "Hash of the recording."),
+    ("configuration", "text", "", "Hash of robot, options and version."),
+    ("touchline", "text", "", "Version that made the results."),
+    ("bytes", "whole number", "", "Size of the recording."),
+    ("samples", "whole number", "", "Samples read."),
+    ("flagged", "whole number", "", "Samples with any health bit."),
+    ("duration", "number", "s", "From the first sample to the last."),
+    ("events", "whole number", "", "Number of events."),
+    ("collisions", "whole number", "", "How many of them are collisions."),
+    ("outputs", "by file", "", "Hash of each file of the results."),
+    ("seconds", "number", "s", "Time that the analysis took."),
+    ("cpu_seconds", "number", "s", "CPU time that it took."),
+    ("memory_mb", "number", "MB", "Largest memory of its process."),
 ]
 ESTIMATES = [
     ("time", "number", "s", "Time stamp of the sample."),
@@ -64,8 +164,8 @@ ESTIMATES = [
 FURTHER = {  # that a docstring tells in passing
     "body": "the rigid body that the link belongs to",
     "position_std": "square root of the covariance's trace [m]",
-    "unknowns": "to which `rank` belongs: two for each place and three for each force",
-    "degrees": "of freedom of `chi2`",
+    "unknowns": "how many unknowns stand against `rank`: two for each place, three for each force",
+    "degrees": "degrees of freedom of `chi2`",
 }
 
 
@@ -108,18 +208,23 @@ def table(head: str, rows: Iterable[Iterable[str]]) -> str:
 
 def robot_yaml() -> str:
     """Every key of robot.yaml."""
-    rows, defaults = [], {key.place: key.default for key in accepted_keys()}
-    for place, (kind, unit, meaning) in MEANINGS.items():
-        default = defaults.get(place, "-")
+    defaults = {key.place: key.default for key in accepted_keys()}
+    defaults |= {place: "-" for place in MEANINGS if place not in defaults}  # those of `log`
+    rows = []
+    for place, default in defaults.items():
+        kind, unit, meaning = MEANINGS[place]
         rows.append([f"`{place}`", kind, unit, "required" if default is None else default, meaning])
     return (
         "# robot.yaml\n\n"
         + NOTE
-        + "A robot description is a YAML file. `model` is required, and so is a `name`. "
-        "Unknown keys are refused; all errors of a file are told at once. `[]` stands for an item "
-        "of a list, NAME for a name. `-` means: not given.\n\n"
+        + "A robot description is a YAML file. Only `model` is required. Unknown keys are refused; "
+        "all errors of a file are told at once. `[]` stands for an item of a list, NAME for a "
+        "name. The default `-` means: not given.\n\n"
         "`touchline init MODEL LOG --out robot.yaml` writes a first one with comments.\n\n"
         + table("key|type|unit|default|meaning", rows)
+        + "\nA *column* is a name, or `{column: NAME, factor: F}` where values times F are in SI "
+        "units. A *column pattern* is the same with placeholders; a list has one column for each "
+        "joint or axis.\n"
     )
 
 
@@ -129,7 +234,8 @@ def logs() -> str:
         "# Logs\n\n"
         + NOTE
         + "A table is Parquet, CSV or CSV.gz, with one row per sample. Other column names are "
-        "given under `log` in [robot.yaml](robot_yaml.md).\n\n"
+        "given under `log` in [robot.yaml](robot_yaml.md). Columns that are not listed here are "
+        "left alone. Those from `arrival` on are written by `touchline live --record`.\n\n"
         + table(
             "column|type|unit|if missing|meaning", ([f"`{c}`", *rest] for c, *rest in LOG_COLUMNS)
         )
@@ -180,13 +286,13 @@ def results() -> str:
     candidate = [
         ["`link`", "text", "", "Link of the place."],
         ["`body`", "text", "", "Rigid body that the link belongs to."],
-        ["`probability`", "number", "", "Of this place, 0 to 1."],
-        ["`position`", "list of 3 numbers", "m", "In world."],
+        ["`probability`", "number", "", "How likely this place is, 0 to 1."],
+        ["`position`", "list of 3 numbers", "m", "The place in world."],
         [
             "`radius`",
             "number",
             "m",
-            "Of the part of the link that it stands for; missing for a place.",
+            "Radius of the part of the link that it stands for; missing for a single place.",
         ],
     ]
     assert {row[0].strip("`") for row in candidate} == {f.name for f in fields(Candidate)}
@@ -197,7 +303,7 @@ def results() -> str:
         + "`touchline analyze LOG --robot ROBOT --out DIR` writes these files. What cannot be "
         "computed is null in Parquet and JSON.\n\n"
         "## estimates.parquet\n\nOne row per sample.\n\n"
-        + table("column|type|unit|meaning", ([f"`{c}`", *rest] for c, *rest in ESTIMATES))
+        + described("column", ESTIMATES)
         + "\n## contacts.parquet\n\nOne row per contact and sample.\n\n"
         + table("column|type|unit|meaning", rows)
         + "\n## events.json\n\nA list, in the order of detection. Missing values are null.\n\n"
@@ -206,22 +312,37 @@ def results() -> str:
         + table("key|type|unit|meaning", candidate)
         + "\n## Health bits\n\n"
         + table("bit|name|meaning", health)
-        + "\n## Other files\n\n"
-        + table(
-            "file|holds",
-            [
-                ["`report.html`", "the page with pictures and curves; it needs no network"],
-                [
-                    "`postures.parquet`",
-                    "`time` [s] and joint positions [rad or m], 100 a second at most",
-                ],
-                [
-                    "`analysis.json`",
-                    "what the results were made from: robot, findings, tuning, for later",
-                ],
-            ],
+        + "\n## report.html\n\nThe page with pictures and curves. It needs no network.\n"
+        + "\n## postures.parquet\n\nHow the arm stood, 100 times a second at most.\n\n"
+        + described("column", POSTURES)
+        + "\n## analysis.json\n\nWhat the results were made from, for `touchline view`.\n\n"
+        + described("key", ANALYSIS)
+        + "\nEach of `standing`:\n\n"
+        + described("key", standing())
+        + "\n## Several recordings\n\nEach has a folder with the files above. Beside these folders "
+        "stand the page `fleet.html`, the file `manifest.jsonl` and the folder `tables`.\n\n"
+        "### manifest.jsonl\n\nOne line of JSON per recording.\n\n"
+        + described("key", MANIFEST)
+        + "".join(
+            f"\n### tables/{name}\n\nParquet, in folders by robot and date.\n\n"
+            + described("column", rows)
+            for name, rows in TABLES.items()
         )
     )
+
+
+def described(head: str, rows: Iterable[Iterable[str]]) -> str:
+    """A table of names with type, unit and meaning."""
+    return table(f"{head}|type|unit|meaning", ([f"`{name}`", *rest] for name, *rest in rows))
+
+
+def standing() -> list[list[str]]:
+    """The keys of an entry of `standing`."""
+    told = attributes(Standing)
+    return [
+        [f.name, kind_of(f.type), unit_of(told[f.name]), plain(told[f.name])]
+        for f in fields(Standing)
+    ]
 
 
 def kind_of(annotation: object) -> str:
@@ -266,35 +387,17 @@ def command_line() -> str:
 
 
 def _command(name: str, command) -> str:
-    text = inspect.cleandoc(command.__doc__ or "")
-    about, _, arguments = text.partition("Args:\n")
-    meanings: dict[str, str] = {}
-    word = ""
-    for line in arguments.splitlines():
-        match = re.match(r"^    (\w+): (.*)$", line)
-        if match:
-            word = match[1]
-            meanings[word] = match[2]
-        elif line.strip() and word:
-            meanings[word] += " " + line.strip()
+    told, types = explanation(command), types_of(command)
     rows = []
     for key, parameter in inspect.signature(command).parameters.items():
         positional = parameter.kind is inspect.Parameter.POSITIONAL_ONLY
         shown = key.upper() if positional else f"--{key.replace('_', '-')}"
         empty = parameter.default is inspect.Parameter.empty
-        default = "required" if empty else _default(parameter.default)
-        rows.append([f"`{shown}`", default, meanings.get(key, "")])
-    about = re.sub(r"^Example: (.*)$", r"    \1", about.strip(), flags=re.MULTILINE)
-    listing = "\n" + table("argument|default|meaning", rows) if rows else ""
-    return f"## touchline {name}\n\n{about}\n{listing}"
-
-
-def _default(value: object) -> str:
-    if value is None or value == ():
-        return "-"
-    if isinstance(value, tuple):
-        return " ".join(map(str, value))
-    return str(value)
+        default = "required" if empty else default_text(parameter.default)
+        rows.append([f"`{shown}`", types[key], default, told.meanings.get(key, "")])
+    about = [re.sub(r"^Example: ", "    ", paragraph) for paragraph in told.about]
+    listing = "\n\n" + table("argument|type|default|meaning", rows) if rows else "\n"
+    return f"## touchline {name}\n\n" + "\n\n".join(about) + listing
 
 
 MODULES = {  # in the order of a sample's way

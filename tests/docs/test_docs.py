@@ -3,6 +3,7 @@
 import contextlib
 import importlib.util
 import io
+import json
 import re
 import shlex
 import shutil
@@ -11,6 +12,7 @@ import sys
 import tomllib
 from pathlib import Path
 
+import pyarrow.parquet as pq
 import pytest
 from prose import REPOSITORY, code, long_sentences
 from prose_of_code import CPP, PYTHON, passages
@@ -159,11 +161,10 @@ def rows(page: str) -> dict[str, list[str]]:
 
 
 def test_every_key_of_a_description_is_explained():
-    keys = {key.place: key for key in accepted_keys()}
-    places = {*keys, *(f"log.{name}" for name in LOG_KEYS)}
-    assert places <= set(MEANINGS), "touchline/model/meanings.py explains every key"
+    places = {key.place for key in accepted_keys()} | {f"log.{name}" for name in LOG_KEYS}
+    assert places == set(MEANINGS), "touchline/model/meanings.py explains every key, and no other"
     told = rows("robot_yaml.md")
-    assert places <= set(told)
+    assert set(told) == places
     for kind, _, default, meaning in told.values():
         assert kind and default and meaning.endswith(".")
 
@@ -183,8 +184,46 @@ def test_every_command_and_option_is_explained():
     text = written("command_line.md")
     for name in [*COMMANDS, *(f"bench {name}" for name in BENCHMARKS)]:
         assert f"## touchline {name}\n" in text
-    empty = re.findall(r"^\| `(.*)` \| .* \|  \|$", text, re.MULTILINE)
-    assert empty == [], "arguments without a meaning"
+    arguments = [
+        re.split(r"(?<!\\)\|", line)[1:-1] for line in text.splitlines() if line[:3] == "| `"
+    ]
+    assert len(arguments) > 150
+    for name, kind, default, meaning in arguments:
+        assert kind.strip() and default.strip() and meaning.strip().endswith((".", ")")), name
+
+
+def columns_told(page: str) -> set[str]:
+    """The names that the tables of a page explain, written out: `x.fx, .fy` are x.fx and x.fy."""
+    found = set()
+    for name in rows(page):
+        first, *more = name.split(", ")
+        base = first.rpartition(".")[0]
+        found |= {first, *(base + part if part[0] == "." else part for part in more)}
+    return found
+
+
+def test_every_column_that_files_have_is_explained(tmp_path):
+    """Of a simulated recording, of results, and of the tables of several recordings."""
+    for name in ("one", "two"):
+        options = ["--speed", "0.5", "--seconds", "0.6", "--out", str(tmp_path / f"{name}.parquet")]
+        assert main(["simulate", "three_touches", *options]) == 0
+    out = tmp_path / "results"
+    logs = [str(tmp_path / f"{name}.parquet") for name in ("one", "two")]
+    assert main(["analyze", *logs, "--robot", "sara", "--out", str(out), "--workers", "1"]) == 0
+    told = {page: columns_told(page) for page in ("logs.md", "results.md")}
+    joint, sensor, number = r"\.joint\d$", r"^(base|wrist|handle)\.", r"\.\d+\."
+    checked = 0
+    for file in tmp_path.rglob("*.parquet"):
+        page = "logs.md" if file.parent == tmp_path else "results.md"
+        for column in pq.read_schema(file).names:
+            general = re.sub(number, ".K.", re.sub(joint, ".JOINT", column))
+            general = re.sub(sensor, "SEGMENT." if ".seg." in column else "SENSOR.", general)
+            assert general in told[page] or column in Health.__members__, f"{file.name}: {column}"
+            checked += 1
+    assert checked > 100
+    for row in (out / "manifest.jsonl").read_text().splitlines():
+        assert set(json.loads(row)) <= told["results.md"]
+    assert set(json.loads((out / "one" / "analysis.json").read_text())) <= told["results.md"]
 
 
 def test_the_site_is_built_without_a_warning_and_loads_nothing_from_elsewhere(tmp_path):

@@ -89,6 +89,13 @@ def test_all_keys_of_the_contract(folder):
     assert (robot.detection.release, robot.log) == (0.5, {"time": "t"})
 
 
+def test_without_a_name_it_is_the_model_s(folder):
+    assert load_description(edit(folder, ("name: arm\n", ""))).name == "arm"
+    model = folder / "arm.urdf"
+    model.write_text(model.read_text().replace('<robot name="arm"', '<robot name="its own"'))
+    assert load_description(folder / "robot.yaml").name == "its-own"
+
+
 def test_without_joints_all_that_move_are_observed(folder):
     robot = load_description(write(folder, "name: arm\nmodel: arm.urdf\n"))
     assert [joint.name for joint in robot.joints] == ["shoulder", "elbow", "grip"]
@@ -245,7 +252,6 @@ WRIST = "{name: wrist, link: hand}"
             "{name: wrist, link: hand, range: [1, 1, 1, 1, 1, 0]}",
             "force_torque_sensors[1].range: 0 is not allowed; allowed: more than 0",
         ),
-        ("name: arm\n", "", "name: is missing"),
         ("name: arm\n", "name: [arm]\n", "name: ['arm'] is a list, not text"),
         ("model: arm.urdf\n", "", "model: is missing"),
         ("model: arm.urdf", "model: gone.urdf", "model: 'gone.urdf': no such file: "),

@@ -57,23 +57,25 @@ def analyze(
             .db3, or its folder). Foreign column names are given in the robot description, key
             `log`.
         out: Directory for the results.
-        robot: Its robot.yaml, or the name of a robot that ships with Touchline (sara).
-        bandwidth: Of the observer [rad/s]: higher is faster and noisier. Default: as described.
-        method: segment: each segment's own momentum, no ghost contacts in motion; paper: each
-            residual in its sensor's frame, as published.
+        robot: A robot.yaml, a URDF or MJCF, or the name of a robot.
+        bandwidth: Bandwidth of the observer [rad/s]: a higher one is faster and noisier. Default:
+            as described.
+        method: segment: the momentum of each segment, without ghost contacts in motion; paper:
+            each residual in its sensor's frame, as published.
         report: full; summary: without pictures and curves of each event; none: no report.html.
         friction: Coefficient of friction of what touches. Default: as described (`pushes`).
         reach: Free space that a push needs: length of a finger or tool [m]. Default: as described.
         beside: Results of another run or method: the report shows their curves, dashed, and events
-            on the same time line. Of one recording.
-        rerun: Also a file for Rerun (.rrd): arm, contacts, curves, events. Of one recording.
-        foxglove: The same for Foxglove (.mcap).
+            on the same time line. For one recording.
+        rerun: Writes a file for Rerun (.rrd), too: arm, contacts, curves, events. For one
+            recording.
+        foxglove: Writes such a file for Foxglove (.mcap).
         dry_run: Print what would be done: files, hours, bytes, about how long, what is skipped.
         workers: Processes for several recordings. Default: one per core.
-        time_limit: For each of several recordings [s].
-        memory_limit: For each process of several recordings [MB].
-        cluster: Of a dask scheduler, such as tcp://host:8786, for several recordings; its workers
-            see the same folders.
+        time_limit: Time that each of several recordings may take [s].
+        memory_limit: Memory that each process may take, of several recordings [MB].
+        cluster: Address of a dask scheduler, such as tcp://host:8786, for several recordings. Its
+            workers must see the same folders.
     """
     from touchline.fleet.forecast import forecast, forecast_text
     from touchline.fleet.plan import is_single, make_plan

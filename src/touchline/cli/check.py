@@ -18,14 +18,15 @@ def check(
     Example: touchline check robot.yaml run1.parquet
 
     Without LOG it shows what the model says: masses, what each sensor carries, segments, bodies,
-    and which sensor faults the layout cannot see. With LOG it compares: signs, polarity, frames,
-    units, biases, weights outboard of the sensors, dead signals, sample rate, gaps and stamps.
-    A recording in which the robot rests in several poses and touches nothing tells most.
+    which sensor faults the layout cannot see, and the smallest force that is felt on each link.
+    Where there is no robot.yaml it lists what is assumed. With LOG it compares: signs, polarity,
+    frames, units, biases, weights outboard of the sensors, dead signals, sample rate, gaps and
+    stamps. A recording in which the robot rests in several poses and touches nothing tells most.
 
     Exit status: 0 nothing found, 1 findings, 2 bad input.
 
     Args:
-        robot: A robot.yaml, a URDF or MJCF, or the name of a robot (sara).
+        robot: A robot.yaml, a URDF or MJCF, or the name of a robot.
         log: A recording: a table (.parquet, .csv, .csv.gz) or a rosbag2 (.mcap, .db3).
         fix: Writes a copy of the description in which a missing load or a tilted base is mended.
     """

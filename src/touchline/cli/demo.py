@@ -38,14 +38,13 @@ def demo(
 
     Args:
         headless: No page: simulate, analyze, print.
-        duration: Of the recording with --headless [s], default 12; of the page, default: until
-            Ctrl-C.
+        duration: How long the arm moves [s]. Default: 12 with --headless, else until Ctrl-C.
         out: Directory for the log and the results of --headless.
-        seed: Of the motion, the places and the noise.
+        seed: Seed of the motion, the places and the noise.
         robot: A robot.yaml, a URDF or MJCF, or the name of a robot.
-        host: Address at which the page is served. Another than 127.0.0.1 lets other machines see
-            and push the arm: it needs the token that is then printed.
-        port: The first port that is tried.
+        host: Address at which the page is served. With any but 127.0.0.1 other machines can see
+            and push the arm; they need the token that is then printed.
+        port: The first port that is tried; the next ones follow.
         browser: Open the page in the browser.
         interface: The arm has buttons, a slider and a writing pad; the mouse is a finger.
     """

@@ -11,8 +11,8 @@ def export(
     robot: Annotated[Positional[str], arg(metavar="ROBOT")],
     /,
     out: Annotated[Path, arg(metavar="FILE")],
-    period: float = 1e-3,
-    bandwidth: float | None = None,
+    period: Annotated[float, arg(metavar="S")] = 1e-3,
+    bandwidth: Annotated[float | None, arg(metavar="K")] = None,
 ) -> int:
     """Writes a robot with its surfaces as one file for C++ programs.
 
@@ -23,10 +23,10 @@ def export(
     Python, URDF or MuJoCo; core/example/replay.cpp shows how.
 
     Args:
-        robot: A robot.yaml, or the name of a robot that ships with Touchline (sara).
+        robot: A robot.yaml, a URDF or MJCF, or the name of a robot.
         out: The file to write; it is replaced only when the new one is whole.
         period: Time between samples [s], for thresholds and weights that follow from the noise.
-        bandwidth: K [rad/s] of all rows; default: the description's.
+        bandwidth: Bandwidth of the observer [rad/s]. Default: as described.
     """
     from touchline.model.robot import load_robot
     from touchline.numbers import check_positive

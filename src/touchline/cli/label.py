@@ -31,15 +31,16 @@ def label(
     Nothing else is changed; each file is replaced as a whole. Prints what the rate costs.
 
     Args:
-        dataset: With joint positions, and joint torques or wrenches as they were measured.
-        robot: Its robot.yaml, or the name of a robot that ships with Touchline (sara).
+        dataset: Data set with joint positions, and joint torques or wrenches as measured.
+        robot: A robot.yaml, a URDF or MJCF, or the name of a robot.
         out: Leaves DATASET alone and labels a copy. Default: in place.
         q: Array with the joint positions. Default: known names are looked for.
-        qd: With the joint velocities. Default: known names, else from the positions.
-        tau: With the joint torques.
-        wrench: With six numbers for each force-torque sensor.
-        rate: Samples per second. Default: as the data set tells.
-        bandwidth: Of the observer [rad/s]. Default: as described.
+        qd: Array with the joint velocities. Default: known names, else from the positions.
+        tau: Array with the joint torques. Default: known names are looked for.
+        wrench: Array with six numbers for each force-torque sensor. Default: known names are
+            looked for.
+        rate: Samples per second [Hz]. Default: as the data set tells.
+        bandwidth: Bandwidth of the observer [rad/s]. Default: as described.
         workers: Processes that label the files of a LeRobot data set. Default: one per core.
     """
     import os

@@ -31,18 +31,18 @@ def live(
     is refused with the reason. Ctrl-C ends it.
 
     Args:
-        robot: Its robot.yaml, or the name of a robot that ships with Touchline (sara).
+        robot: A robot.yaml, a URDF or MJCF, or the name of a robot.
         source: sim:// (a simulated arm), replay://LOG?speed=1 (a recording, in its own time;
             speed=0: as fast as possible), ros2:// (topics), ur://HOST (a UR arm), franka://HOST.
-        record: Every sample as it came, to a .mcap or .parquet that `analyze` and replay:// read;
-            it can be read even if this program is killed.
-        duration: Ends after so long by the sensors' clock [s]. Default: until Ctrl-C, or the end.
-        force: Go live whatever the first second looks like.
-        view: Show the robot and what it feels on a page.
+        record: Keeps every sample as it came in a .mcap or .parquet, which `analyze` and replay://
+            read. It can be read even if this program is killed.
+        duration: How long it goes on, by the sensors' clock [s]. Default: until Ctrl-C, or the end.
+        force: Goes live whatever the first second looks like.
+        view: Shows the robot and what it feels on a page.
         allow_control: Visitors of the page may let the estimate start anew, and tare.
-        host: Address at which the page is served. Another than 127.0.0.1 lets other machines see
-            it: it needs the token that is then printed.
-        port: The first port that is tried.
+        host: Address at which the page is served. With any but 127.0.0.1 other machines can see
+            it; they need the token that is then printed.
+        port: The first port that is tried; the next ones follow.
         browser: Open the page in the browser.
     """
     if duration is not None:

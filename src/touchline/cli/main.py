@@ -12,6 +12,7 @@ from touchline.cli.bench import BENCHMARKS, bench
 from touchline.cli.calibrate import calibrate
 from touchline.cli.check import check
 from touchline.cli.demo import demo
+from touchline.cli.explained import for_help
 from touchline.cli.export import export
 from touchline.cli.init import init
 from touchline.cli.label import label
@@ -133,7 +134,7 @@ def _run(command: Callable[..., int], name: str, arguments: list[str]) -> int:
     import tyro
 
     try:
-        return int(tyro.cli(command, prog=f"touchline {name}", args=arguments))
+        return int(tyro.cli(for_help(command), prog=f"touchline {name}", args=arguments))
     except SystemExit as stop:  # help, or arguments that cannot be understood
         return stop.code if isinstance(stop.code, int) else 2
 

@@ -12,7 +12,7 @@ Name = Literal["fig4", "fig5", "fig6", "applications"]
 
 
 def reproduce(
-    names: Positional[tuple[Name, ...]] = (),
+    names: Annotated[Positional[tuple[Name, ...]], arg(metavar="NAME ...")] = (),
     /,
     *,
     out: Annotated[Path, arg(metavar="DIR")],
@@ -27,9 +27,9 @@ def reproduce(
     Exit status: 0 everything that must hold holds, 1 something does not, 2 bad input.
 
     Args:
-        names: The experiments; default: all.
+        names: The experiments: fig4, fig5, fig6, applications. Default: all.
         out: Directory for the results; files of the same name in it are replaced.
-        seed: Of everything random: the same seed gives the same numbers.
+        seed: Seed of all that is random: the same seed gives the same numbers.
     """
     from touchline.reproduce.run import reproduce as run
     from touchline.reproduce.run import summary_text

@@ -19,10 +19,10 @@ def simulate(
     speed: Annotated[float | None, arg(metavar="RAD/S")] = None,
     force: Annotated[float | None, arg(metavar="N")] = None,
     seed: int = 0,
-    rate: float = 1000.0,
-    physics: float = 4000.0,
+    rate: Annotated[float, arg(metavar="HZ")] = 1000.0,
+    physics: Annotated[float, arg(metavar="HZ")] = 4000.0,
     noise: bool = True,
-    model_error: float = 0.0,
+    model_error: Annotated[float, arg(metavar="SHARE")] = 0.0,
 ) -> int:
     """Simulates a touched arm with MuJoCo; writes what its sensors report, and the truth.
 
@@ -51,14 +51,14 @@ def simulate(
         scenario: What happens; see above.
         out: The log: .parquet, .csv or .csv.gz.
         robot: A robot.yaml, a URDF or MJCF, or the name of a robot.
-        seconds: Duration; default: the scenario's.
-        speed: Of the fastest joint [rad/s]; 0: the arm is held; default: the scenario's.
-        force: Of each touch [N]; default: the scenario's.
-        seed: Of motions, places and noise.
-        rate: Of the log [Hz]; divides physics.
-        physics: Rate of the physics [Hz].
-        noise: White noise and quantization of ordinary sensors.
-        model_error: 1 sigma of the relative error of the real arm's inertias.
+        seconds: Duration [s]. Default: the scenario's.
+        speed: Speed of the fastest joint [rad/s]; 0: the arm is held. Default: the scenario's.
+        force: Force of each touch [N]. Default: the scenario's.
+        seed: Seed of motions, places and noise.
+        rate: Samples per second [Hz]; divides --physics.
+        physics: Steps of the physics per second [Hz].
+        noise: Whether sensors have the noise and quantization of ordinary ones.
+        model_error: How far the simulated arm's inertias are off, as a share of them (1 sigma).
     """
     from touchline.logs import write_table
     from touchline.model.robot import load_robot

@@ -12,7 +12,7 @@ from touchline.numbers import check_least, check_positive
 def teach(
     robot: Annotated[Positional[str], arg(metavar="ROBOT")],
     /,
-    name: str,
+    name: Annotated[str, arg(metavar="NAME")],
     out: Annotated[Path, arg(metavar="ROBOT")],
     log: Annotated[Path | None, arg(metavar="LOG")] = None,
     live: Annotated[str | None, arg(metavar="SOURCE")] = None,
@@ -30,14 +30,14 @@ def teach(
 
     Args:
         robot: A robot.yaml.
-        name: Of the button in `interface`. What was taught for it before in other postures stays.
+        name: Name of the button in `interface`. What it was taught in other postures stays.
         out: The new robot.yaml; may be the same file.
         kind: A button, or a toggle that each touch turns on or off.
         log: A recording of the touches: a table (.parquet, .csv, .csv.gz) or a rosbag2.
         live: Instead of a recording the running robot, as `touchline live --source` takes it. It
             has to stand still and untouched for the first second.
-        touches: Only the first so many touches count.
-        duration: With --live: the touches are over after so long [s]. Ctrl-C ends it earlier.
+        touches: Only so many touches count, the first ones. Default: all.
+        duration: How long touches are waited for with --live [s]. Ctrl-C ends it earlier.
     """
     from touchline.errors import InputError
     from touchline.model.robot import load_robot

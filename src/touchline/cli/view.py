@@ -12,7 +12,7 @@ def view(
     /,
     robot: Annotated[str | None, arg(metavar="ROBOT")] = None,
     out: Annotated[Path | None, arg(metavar="DIR")] = None,
-    host: str = "127.0.0.1",
+    host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1",
     port: int = 8080,
     browser: bool = True,
 ) -> int:
@@ -25,13 +25,13 @@ def view(
     around the time shown. It is served on this machine alone.
 
     Args:
-        recording: Directory with results of `touchline analyze`, or a log as it takes them.
-        robot: A robot.yaml, a URDF or MJCF, or the name of a robot (sara). Results
-            know the robot they were made with; a log needs it.
+        recording: Directory with the results of `touchline analyze`, or a log.
+        robot: A robot.yaml, a URDF or MJCF, or the name of a robot. Needed for a log;
+            results know the robot that they were made with.
         out: Where the results of a log are kept; without it they are thrown away at the end.
-        host: Address at which the page is served. Another than 127.0.0.1 lets other machines see
-            it: it needs the token that is then printed.
-        port: The first port that is tried.
+        host: Address at which the page is served. With any but 127.0.0.1 other machines can see
+            it; they need the token that is then printed.
+        port: The first port that is tried; the next ones follow.
         browser: Open the page in the browser.
     """
     import tempfile

@@ -129,8 +129,14 @@ def guess_description(mechanism: Mechanism, model: Path) -> Guess:
             locked[joint] = (_rest(mechanism, joint), "a wheel carries no torque signal")
     observed = tuple(name for name in free if name not in locked)
     family = family_of([mechanism.name, model.stem, *model.parent.parts[-2:]], free)
-    name = re.sub(r"[^\w-]+", "-", mechanism.name or model.stem)
-    return Guess(name, model, family, observed, locked, tuple(cautions(mechanism)))
+    return Guess(
+        robot_name(mechanism, model), model, family, observed, locked, tuple(cautions(mechanism))
+    )
+
+
+def robot_name(mechanism: Mechanism, model: Path) -> str:
+    """Return the name that a robot has where its description gives none: the model's."""
+    return re.sub(r"[^\w-]+", "-", mechanism.name or model.stem)
 
 
 def family_of(names: Iterable[str], joints: Iterable[str]) -> Family:

@@ -51,7 +51,8 @@ def read_model(path: Path | str) -> tuple[RobotDescription, Mechanism, guesses.G
 def read_robot_data(data: dict[Any, Any], path: Path) -> tuple[RobotDescription, Mechanism]:
     """Read what a `robot.yaml` at `path` holds, or would hold; see `read_robot_file`."""
     file, problems = structure(data)
-    problems += _missing_keys(file, problems)
+    if file.model is None and not any(problem.startswith("model: ") for problem in problems):
+        problems.append("model: is missing")
     folders, folder_problems = _package_folders(file, path.parent)
     problems += folder_problems
     model, mechanism, model_problems = _read_model(file, path, folders)
@@ -65,7 +66,7 @@ def read_robot_data(data: dict[Any, Any], path: Path) -> tuple[RobotDescription,
     lines = [f"{path}: {problem}" for problem in dict.fromkeys(problems)] + model_problems
     if lines or mechanism is None:
         raise InputError(lines)
-    description = draft.description()
+    description = draft.description(file.name or guesses.robot_name(mechanism, Path(str(model))))
     return description, apply_corrections(mechanism, description)
 
 
@@ -89,13 +90,6 @@ def load_mechanism(path: Path | str, package_dirs: Sequence[Path] = ()) -> Mecha
     if tag == "robot":
         return load_urdf(path, package_dirs)
     raise InputError(f"{path}: the root element is <{tag}>; a URDF has <robot>, an MJCF <mujoco>")
-
-
-def _missing_keys(file: RobotFile, problems: list[str]) -> list[str]:
-    missing = [key for key in ("name", "model") if getattr(file, key) is None]
-    wrong = tuple(f"{key}: " for key in missing)
-    noted = {problem.split(":")[0] for problem in problems if problem.startswith(wrong)}
-    return [f"{key}: is missing" for key in missing if key not in noted]
 
 
 def _package_folders(file: RobotFile, base: Path) -> tuple[tuple[Path, ...], list[str]]:
@@ -181,12 +175,12 @@ class _Draft:
             return [f"learned_rest: {problem}" for problem in error.problems]
         return []
 
-    def description(self) -> RobotDescription:
-        """Return the description; only without problems."""
+    def description(self, name: str) -> RobotDescription:
+        """Return the description of a robot of that name; only without problems."""
         file = self.file
         joints, sensors = self.bandwidth
         return RobotDescription(
-            name=str(file.name),
+            name=name,
             model=Path(str(self.model)),
             joints=tuple(_joint(joint, self.rest.get(joint.name)) for joint in self.joints),
             sensors=tuple(self.sensors),

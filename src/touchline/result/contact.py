@@ -48,17 +48,18 @@ class Contact(Value):
         event: number of the event that it belongs to.
         level: "contact" or "collision"; "contact" until the contrary is known.
         status: "located", "ambiguous", "not_separable" or "wrench_only".
-        wrench: (6,) [N, Nm] on the segment, world axes, about the world origin; None on `root`.
-        link: the link that carries the point, and `body` the rigid body it belongs to.
-        body_probability: of that body, 0 to 1.
-        position: (3,) [m] in world.
-        force: (3,) [N] on the robot, world axes.
-        covariance: (3, 3) [m2] of the position.
+        wrench: (6,) [N, Nm] what acts on the segment, world axes, about the world origin; None on
+            `root`.
+        link: the link that carries the point, and `body` the rigid body that it belongs to.
+        body_probability: how likely that body is touched, 0 to 1.
+        position: (3,) [m] the touched point in world.
+        force: (3,) [N] the force on the robot, world axes.
+        covariance: (3, 3) [m2] covariance of the position.
         candidates: other explanations, best first.
         decided: whether the level is more than a default.
         zone: "structure", "end_effector" or "handle"; None while that is open.
         clamped: whether forces on two sides oppose each other; None where that is not known.
-        rate: at which the force grows [N/s].
+        rate: how fast the force grows [N/s].
         rank: where no equation is left over, for one contact (joint torques alone) or for several
             that begin together: how many independent ones there are, for the `unknowns` (two for
             each place, three for each force). With fewer than unknowns no place is named.

@@ -25,24 +25,24 @@ class Event(Value):
         level: "contact" or "collision": how it began, or a blow while it lasted.
         detected: time at which the test fired [s], not the onset.
         cleared: time at which it ended [s]; None while it lasts.
-        status: as of a `Contact`, over the event.
+        status: "located", "ambiguous", "not_separable" or "wrench_only", over the whole event.
         link: the link that carries the point, of the rigid `body`.
-        body_probability: of that body, 0 to 1.
-        position: (3,) [m] in world at `time_of_position`, from all strong samples.
-        position_link: (3,) [m] the same in the frame of `link`.
-        time_of_position: the last strong sample [s].
+        body_probability: how likely that body was touched, 0 to 1.
+        position: (3,) [m] the touched point in world at `time_of_position`, from strong samples.
+        position_link: (3,) [m] the same point in the frame of `link`.
+        time_of_position: time of the last strong sample [s].
         position_std: root of the trace of its covariance [m].
         candidates: all explanations, best first, at `time_of_position`.
         joint: the most distal loaded joint; None where no torque tells.
-        force: (3,) [N] in world, mean over the strong samples; None on `root`.
+        force: (3,) [N] the force on the robot, world axes, mean of strong samples; None on `root`.
         force_peak: largest force [N]; None on `root`.
         torque_peak: largest external torque [Nm] on `joint`.
         decided: when the level was decided [s]; None while it is a default.
         zone: "structure", "end_effector" or "handle"; None while that is open.
         clamped: whether forces on two sides opposed each other; None where that is not known.
         rate: largest rate of the segment's force [N/s].
-        rank: where no equation is left over: independent ones at hand, for the `unknowns`.
-        widget: of the robot's `interface` that it was on; None for none, or if nobody looked.
+        rank: where no equation is left over, the number of independent ones for the `unknowns`.
+        widget: the widget of `interface` that was touched; None for none, or if nobody looked.
     """
 
     id: int

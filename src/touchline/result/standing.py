@@ -16,15 +16,16 @@ class Standing:
     """How far one signal of the detector has shown that the arm is not as told.
 
     Attributes:
-        segment: that it belongs to.
+        segment: segment that the signal belongs to.
         signal: "JOINT" for a joint's torque, "SENSOR.fx" for a wrench in that sensor's frame.
-        unit: "N" or "Nm" of the next four.
-        threshold: that a touch must exceed.
-        start: stood there when observation began, and still a while later: a touch, or an error of
-            the model or a bias; 0 where no more than the threshold did.
-        now: stands there now, since the start or since a touch, and does not change; 0 likewise.
+        unit: "N" or "Nm", of the next four values.
+        threshold: what a touch must exceed.
+        start: what stood there when observation began, and still a while later. It was a touch, an
+            error of the model, or a bias. 0 where it did not exceed the threshold.
+        now: what stands there now and does not change, since the start or since a touch. 0 where
+            it does not exceed the threshold.
         seen: one sigma of the residual's noise, when it was largest against what was told.
-        noise: of that to the sigma that is told; 1 where nothing speaks against what is told.
+        noise: ratio of that to the sigma that is told; 1 where nothing speaks against it.
     """
 
     segment: str
