@@ -17,7 +17,7 @@ from pathlib import Path
 from touchline.cli.bench import BENCHMARKS
 from touchline.cli.explained import default_text, explanation, types_of
 from touchline.cli.main import COMMANDS
-from touchline.health import Health
+from touchline.health import HEALTH_MEANING, Health
 from touchline.model.meanings import MEANINGS, accepted_keys
 from touchline.report.outputs import CONTACT_SCHEMA
 from touchline.result.contact import Candidate, Contact
@@ -296,7 +296,10 @@ def results() -> str:
         ],
     ]
     assert {row[0].strip("`") for row in candidate} == {f.name for f in fields(Candidate)}
-    health = [[str(int(bit)), f"`{(bit.name or '').lower()}`", why] for bit, why in health_bits()]
+    health = [
+        [str(int(bit)), f"`{(bit.name or '').lower()}`", plain(HEALTH_MEANING[bit])]
+        for bit in Health
+    ]
     return (
         "# Results\n\n"
         + NOTE
@@ -359,15 +362,6 @@ def kind_of(annotation: object) -> str:
         if part in text:
             return word
     return "text"
-
-
-def health_bits() -> Iterable[tuple[Health, str]]:
-    """Each bit with the comment beside it in the code."""
-    source = inspect.getsource(Health)
-    for bit in Health:
-        match = re.search(rf"^    {bit.name} = \d+  # (.*)$", source, re.MULTILINE)
-        assert match is not None, f"{bit.name} has no comment"
-        yield bit, match[1][:1].upper() + match[1][1:] + "."
 
 
 def command_line() -> str:

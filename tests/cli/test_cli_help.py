@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`--help` reads well: lines are broken by the terminal, defaults stand where they tell something."""
+"""`--help` reads well: the terminal breaks lines, and a default stands where it tells something."""
 
 from pathlib import Path
 from typing import Literal

@@ -351,7 +351,7 @@ def test_what_is_not_known_is_said_in_words():
     event = Event(id=0, segment="base", level="contact", detected=1.0, status="not_separable")
     event.rank, event.unknowns = 7, 10
     assert event_where(event) == "several touches, or a twist"
-    assert event_place(event) == "several touches, or a twist (not_separable)"
+    assert event_place(event) == "several touches, or a twist (not separable)"
     words = event_doubt(event)
     assert "One push on base cannot explain" in words and "(7 equations, 10 unknowns)" in words
     assert "two contacts or more" in words
@@ -364,12 +364,16 @@ def test_what_is_not_known_is_said_in_words():
     assert "any of the marked places" in event_doubt(event)
     event.status = "wrench_only"
     assert "its place is not" in event_doubt(event)
-    assert event_place(event) == "(wrench_only)"
+    assert event_place(event) == "(wrench only)"
     ambiguous = event.replace(status="ambiguous", link="link4", body_probability=0.617)
     assert event_place(ambiguous) == "link4 (ambiguous, 62 %)"
     event.status, event.link = "located", "link1"
     assert event_doubt(event) == "" and event_where(event) == "link1"
     assert event_place(event) == "link1"
+    event.body_probability = 0.999
+    assert event_place(event) == "link1"
+    event.body_probability = 0.93
+    assert event_place(event) == "link1 (93 %)"
 
 
 def test_the_arm_is_drawn_as_it_stood(robot):

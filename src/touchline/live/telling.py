@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """One line for everything that happens while a robot runs."""
 
-import numpy as np
-
 from touchline.live.connection import Notice
 from touchline.live.session import Session
+from touchline.report.facts import event_place
 from touchline.result.event import Event
 from touchline.touch.stroke import Stroke
 from touchline.touch.touch import TouchEvent
@@ -54,19 +53,19 @@ def summary_lines(session: Session, events: int, now: float) -> list[str]:
 
 
 def _where(event: Event) -> str:
+    place = event_place(event)
     if event.link is not None:
-        share = f" ({100 * event.body_probability:.0f} %)" if event.body_probability else ""
-        return f"on {event.link}{share}"
-    if event.candidates:
-        return f"perhaps on {event.candidates[0].link}, segment {event.segment}"
-    return f"on segment {event.segment}"
+        return f"on {place}"
+    perhaps = f", perhaps on {event.candidates[0].link}" if event.candidates else ""
+    return f"on segment {event.segment}{perhaps}: {place}"
 
 
 def _size(event: Event) -> str:
     if event.force_peak is not None:
         force = f", up to {event.force_peak:.1f} N"
         if event.position is not None and event.link is not None:
-            force += f" at {np.array2string(np.asarray(event.position), precision=3)}"
+            x, y, z = event.position
+            force += f" at ({x:.3f}, {y:.3f}, {z:.3f}) m"
         return force
     if event.torque_peak is not None and event.joint is not None:
         return f", up to {event.torque_peak:.2f} Nm on {event.joint}"

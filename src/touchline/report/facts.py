@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from touchline.detector.thresholds import Thresholds
-from touchline.health import Health
+from touchline.health import HEALTH_MEANING
 from touchline.model.robot import Robot
 from touchline.report.statistics import Statistics
 from touchline.result.event import Event
@@ -14,21 +14,7 @@ from touchline.result.kinds import Watch
 
 UNWATCHED = (Watch.DEGRADED, Watch.BLIND)
 
-HEALTH_MEANING = {
-    Health.SETTLING: "less than 5/K after the start, a gap or a reset; no event begins",
-    Health.GAP: "a step in time too long to integrate over; the filters restart",
-    Health.BAD_TIME: "the time stamp repeats or goes back; the sample is ignored",
-    Health.MISSING: "a signal that should be there is missing",
-    Health.NON_FINITE: "a signal is infinite or absurdly large",
-    Health.SATURATED: "a reading is at the end of its range",
-    Health.SENSOR_EXCLUDED: "a sensor has been absent for longer than a gap",
-    Health.MODEL_LIMIT: "a joint is outside its limits in the model",
-    Health.PERIOD: "stamps are not as far apart as expected; thresholds do not fit",
-    Health.NO_ROOM: "more events at a time than there is room for; the oldest was ended",
-    Health.FAULTY: "a channel reports what cannot be; it is held or left out",
-    Health.OFFSET: "what stands there without a touch exceeds a threshold",
-    Health.NOISY: "a residual is noisier than the description tells",
-}
+SURE = 0.995  # a probability from here on is not told: it would read 100 %
 
 
 @dataclass(frozen=True)
@@ -122,13 +108,11 @@ def event_where(event: Event) -> str:
 
 
 def event_place(event: Event) -> str:
-    """The same, with status and probability where the event is not located."""
-    where = event_where(event)
-    if event.status == "located":
-        return where
-    sure = event.body_probability if event.link is not None else None
-    doubt = str(event.status) if sure is None else f"{event.status}, {100 * sure:.0f} %"
-    return f"{where} ({doubt})".lstrip()
+    """The same, with its status where the event is not located, and its probability if not 1."""
+    doubts = [] if event.status == "located" else [str(event.status).replace("_", " ")]
+    if event.link is not None and (event.body_probability or 1.0) < SURE:
+        doubts.append(f"{100 * (event.body_probability or 0.0):.0f} %")
+    return f"{event_where(event)} ({', '.join(doubts)})".lstrip() if doubts else event_where(event)
 
 
 def event_doubt(event: Event) -> str:
