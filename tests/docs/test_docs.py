@@ -117,7 +117,7 @@ def test_python_examples_print_what_stands_below_them(page):
 def test_python_examples_of_other_pages_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for page in PLAIN:
-        if page == README or page.name == "tutorial.md":
+        if page == README or page.name == "tutorial.md" or page.parent.name == "howto":
             continue
         for source in code(page.read_text(), "python"):
             exec(compile(source, str(page), "exec"), {})
@@ -139,6 +139,35 @@ def test_the_steps_of_the_tutorial(tmp_path, monkeypatch, capsys):
         assert main(arguments) in ((0, 1) if arguments[0] == "check" else (0,)), line
     assert (tmp_path / "results" / "report.html").exists()
     assert "what can be felt" in capsys.readouterr().out
+
+
+SHORTER = {"--seconds 60": "--seconds 2 --rate 200", "--duration 6": "--duration 2"}
+
+
+@pytest.mark.parametrize("name", ["calibrate", "live", "react", "interface"])
+def test_the_steps_of_how_to_pages(name, tmp_path, monkeypatch, capsys):
+    """All blocks in the page's order; only `calibrate`, which takes a minute, is left out."""
+    text = (REPOSITORY / "docs" / "howto" / f"{name}.md").read_text()
+    monkeypatch.chdir(tmp_path)
+    printed = ""
+    for language, block in re.findall(r"^```(\w+)\n(.*?)^```", text, re.DOTALL | re.MULTILINE):
+        if language == "yaml":
+            (tmp_path / "my-arm.yaml").write_text(block)
+        elif language == "sh" and block.startswith("touchline calibrate "):
+            shutil.copy(SARA / "robot.yaml", tmp_path)
+        elif language == "sh":
+            for long, short in SHORTER.items():
+                block = block.replace(long, short)
+            for line in block.splitlines():
+                program, *arguments = shlex.split(line)
+                assert program == "touchline"
+                assert main(arguments) in ((0, 1) if arguments[0] == "check" else (0,)), line
+        elif language == "python":
+            capsys.readouterr()
+            exec(compile(block, name, "exec"), {})
+            printed = capsys.readouterr().out
+        else:
+            assert printed == block
 
 
 def written(page: str) -> str:

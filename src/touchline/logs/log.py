@@ -18,6 +18,7 @@ from touchline.logs.prepare import Preparation
 from touchline.logs.source import Source
 from touchline.logs.writer import mend_table
 from touchline.model.description import RobotDescription
+from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
 
 TABLES = (".parquet", ".csv", ".csv.gz")
@@ -142,12 +143,20 @@ def _recorded_live(path: Path) -> bool:
     return False
 
 
-def read_log(path: Path | str, description: RobotDescription) -> Samples:
-    """All samples at once.
+def read_log(path: Path | str, robot: Robot | RobotDescription) -> Samples:
+    """Read all samples of a recording at once.
+
+    Args:
+        path: a table (.parquet, .csv, .csv.gz) or a rosbag2 (.mcap, .db3, or its folder).
+        robot: the robot, or its description.
+
+    Returns:
+        `time` (N,) [s], `q`, `qd`, `tau` (N, n) and `wrench` (N, k, 6), NaN where not measured.
 
     Raises:
         InputError: as `open_log` and `Log.chunks`.
     """
+    description = robot.description if isinstance(robot, Robot) else robot
     with open_log(path, description) as log:
         chunks = list(log.chunks())
     if not chunks:
