@@ -25,7 +25,7 @@ format: .venv/ready
 	.venv/bin/ruff check --fix .
 	.venv/bin/ruff format .
 
-docs: .venv/docs
+docs: .venv/ready
 	$(PYTHON) scripts/make_reference.py
 	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict --quiet
 
@@ -42,10 +42,6 @@ clean:
 
 .venv/demo: pyproject.toml scripts/setup.sh $(CORE)
 	scripts/setup.sh demo
-
-.venv/docs: .venv/ready
-	$(PYTHON) -m pip install --quiet --disable-pip-version-check --group docs
-	touch $@
 
 .venv/ready: pyproject.toml scripts/setup.sh $(CORE)
 	scripts/setup.sh

@@ -52,5 +52,5 @@ obtain chromium sh -c 'command -v chromium || command -v google-chrome' || echo 
 obtain npm command -v npm && npm install --silent --no-audit --no-fund --prefix .venv/npm \
   axe-core@4 >/dev/null 2>&1 || echo \
   "touchline: no axe-core, so the accessibility of pages is not tested; it needs npm" >&2
-pip --editable ".[all]" --group test --group check
+pip --editable ".[all]" --group test --group check --group docs
 touch .venv/demo .venv/ready
