@@ -7,7 +7,8 @@ Makes a virtual environment of this Python in a temporary folder, installs the w
 and the model collections, and runs `touchline` with an empty PATH: `demo`, then `init`, `analyze`
 for each robot. Nothing is written by hand. A robot whose model is not on this machine is told and
 left out; the names that end in `_mj` come from the cache of robot_descriptions (MuJoCo Menagerie),
-`DIR/...` from the recordings that docs/contributing.md names. Ends with status 1 if a step fails.
+other paths are below DIR: the recordings that docs/contributing.md names, and a clone of
+franka_description. Ends with status 1 if a step fails.
 """
 
 import argparse
@@ -20,7 +21,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-COLLECTIONS = ("example-robot-data", "robot_descriptions")
+COLLECTIONS = ("example-robot-data", "robot_descriptions", "xacro")
 LIMIT = 600  # s for one command
 SECONDS = 4  # of a simulated recording
 ABSENT = ("no such file", "is not there; fetch it once", "no robot of this name")
@@ -37,7 +38,7 @@ class Case:
 
 CASES = (
     Case("xArm7", ("xarm7_mj", "xarm7")),
-    Case("FR3", ("fr3_mj",)),
+    Case("FR3", ("fr3_mj", "franka_description/robots/fr3/fr3.urdf.xacro")),
     Case("iiwa14", ("iiwa14_mj",)),
     Case("UR5e MJCF", ("ur5e_mj",)),
     Case("UR10, currents", ("ur10_robot",), "panda_ur10_rosbag2/ur10_exciting_trajectory.db3"),

@@ -222,6 +222,31 @@ def test_a_xacro_is_expanded(tmp_path):
         tl.load_robot(path)
 
 
+def test_a_xacro_finds_packages_around_it(tmp_path, monkeypatch):
+    """In a workspace without ROS: its own package, whatever its folder is called, and others."""
+    pytest.importorskip("xacro")
+    arm, tool = tmp_path / "src" / "arm-main", tmp_path / "src" / "tool_description"
+    for folder, name in ((arm, "arm_description"), (tool, "tool_description")):
+        (folder / "urdf").mkdir(parents=True)
+        (folder / "package.xml").write_text(f"<package><name>{name}</name></package>")
+    text = chain(tmp_path, 2).read_text()
+    names = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
+    (tool / "urdf" / "tool.xacro").write_text(
+        f'<robot {names}><xacro:property name="half" value="0.25"/></robot>'
+    )
+    head = f'<robot name="arm" {names}>'
+    for package, file in (("arm_description", "own.xacro"), ("tool_description", "tool.xacro")):
+        head += f'<xacro:include filename="$(find {package})/urdf/{file}"/>'
+    (arm / "urdf" / "own.xacro").write_text(f"<robot {names}/>")
+    path = arm / "urdf" / "arm.urdf.xacro"
+    path.write_text(text.replace('<robot name="arm">', head).replace("0 0 .3", "0 0 ${2*half}"))
+    robot = tl.load_robot(path)
+    assert robot.mechanism.joints["j1"].T_parent_joint[2, 3] == pytest.approx(0.5)
+    tool.rename(tmp_path / "elsewhere")
+    with pytest.raises(tl.InputError, match="package 'tool_description' not found: install it"):
+        tl.load_robot(path)
+
+
 def test_names_of_robot_descriptions_come_from_its_cache_alone(tmp_path, monkeypatch):
     pytest.importorskip("robot_descriptions")
     monkeypatch.setenv("ROBOT_DESCRIPTIONS_CACHE", str(tmp_path))

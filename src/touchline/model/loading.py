@@ -82,7 +82,7 @@ def load_mechanism(path: Path | str, package_dirs: Sequence[Path] = ()) -> Mecha
         InputError: the file is neither, or what is wrong with it.
     """
     path = Path(path)
-    tag = parse_xml(path).tag
+    tag = parse_xml(path, package_dirs).tag
     if tag == "mujoco":
         from touchline.model.mjcf import load_mjcf
 

@@ -2,6 +2,7 @@
 """Where a model's files are: relative paths, `file://`, `package://` and `robot:NAME`."""
 
 import os
+import re
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -20,7 +21,7 @@ def resolve(uri: str, folder: Path, package_dirs: Sequence[Path] = ()) -> Path:
     """Return the existing file that a model or mesh URI means.
 
     `package://NAME/x` is looked up as DIR/NAME/x, then DIR/x, for each of `package_dirs`; then in
-    a folder NAME above `folder`; then in the installed packages (`installed_shares`).
+    the packages around `folder` (`_around`); then in the installed ones (`installed_shares`).
 
     Args:
         uri: `package://NAME/x`, `file:///x`, an absolute path, or a path relative to `folder`.
@@ -88,16 +89,52 @@ def _resolve_package(rest: str, folder: Path, package_dirs: Sequence[Path]) -> P
     package, _, inside = rest.partition("/")
     inside = unquote(inside)
     roots = [Path(entry) / part for entry in package_dirs for part in (package, ".")]
-    roots += [parent for parent in (folder, *folder.parents) if parent.name == package]
-    roots += installed_shares(package)
+    roots += [*_around(package, folder), *installed_shares(package)]
     for root in roots:
         if (root / inside).is_file():
             return root / inside
     if any(root.is_dir() and root.name == package for root in roots):
         raise FileNotFoundError(f"package '{package}' has no file '{inside}'")
+    raise _missing(package, package_dirs)
+
+
+def package_folder(package: str, folder: Path, package_dirs: Sequence[Path] = ()) -> Path:
+    """Return the folder of a package, as `$(find NAME)` of a xacro in `folder` means it.
+
+    Raises:
+        PackageMissingError: it is nowhere.
+    """
+    roots = [Path(entry) / package for entry in package_dirs]
+    roots += [Path(entry) for entry in package_dirs if _is_package(Path(entry), package)]
+    for root in (*roots, *_around(package, folder), *installed_shares(package)):
+        if root.is_dir():
+            return root
+    raise _missing(package, package_dirs)
+
+
+def _around(package: str, folder: Path) -> Iterator[Path]:
+    """Yield the package if `folder` is in it, or in one beside it, as in a ROS workspace."""
+    folder = folder.resolve()
+    for parent in (folder, *folder.parents):
+        if parent.name == package or _is_package(parent, package):
+            yield parent
+        if _is_package(parent / package, package):
+            yield parent / package
+
+
+def _is_package(folder: Path, package: str) -> bool:
+    """Whether the package.xml in a folder has this name."""
+    try:
+        text = (folder / "package.xml").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return False
+    return re.search(rf"<name>\s*{re.escape(package)}\s*</name>", text) is not None
+
+
+def _missing(package: str, package_dirs: Sequence[Path]) -> PackageMissingError:
     hint = f"`pip install {PYPI_DATA[package]}`" if package in PYPI_DATA else "install it"
     where = ", ".join(str(entry) for entry in package_dirs) or "none"
-    raise PackageMissingError(
+    return PackageMissingError(
         f"package '{package}' not found: {hint}, or name the folder it is in under package_dirs "
         f"(now: {where})"
     )

@@ -25,6 +25,7 @@ from touchline.suggest import did_you_mean
 DESCRIPTIONS = (".yaml", ".yml")
 MODELS = (".urdf", ".xml", ".mjcf", ".xacro")
 EXAMPLE_DATA = "example-robot-data"
+DESCRIPTIONS_PACKAGE = "robot_descriptions"
 
 
 @dataclass(frozen=True)
@@ -87,9 +88,9 @@ def example_models() -> dict[str, Path]:
 
 def _cached_model(name: str) -> Path | None:
     """Return the model of robot_descriptions by the name of its module, if its cache has it."""
-    if "/" in name or find_spec("robot_descriptions") is None:
+    package = DESCRIPTIONS_PACKAGE
+    if "/" in name or find_spec(package) is None:
         return None
-    package = "robot_descriptions"
     modules = (name, f"{name}_description", f"{name}_mj_description")
     module = next((m for m in modules if m.isidentifier() and _has_module(package, m)), None)
     if module is None:
@@ -138,6 +139,8 @@ def _unknown(name: str, shipped: list[str], examples: list[str]) -> str:
         f"{name}: no such file, and no robot of this name; with Touchline come "
         f"{', '.join(shipped)}{did_you_mean(name, known)}"
     )
-    if not examples:
-        return f"{message}; more names come with `pip install {EXAMPLE_DATA}`"
-    return f"{message}; {EXAMPLE_DATA} has {len(examples)} more, such as {', '.join(examples[:3])}"
+    if examples:
+        message += f"; {EXAMPLE_DATA} has {len(examples)} more, such as {', '.join(examples[:3])}"
+    absent = [] if examples else [EXAMPLE_DATA]
+    absent += [] if find_spec(DESCRIPTIONS_PACKAGE) else [DESCRIPTIONS_PACKAGE]
+    return f"{message}; more names come with: pip install {' '.join(absent)}" if absent else message

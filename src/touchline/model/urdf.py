@@ -4,17 +4,21 @@
 Reference: http://wiki.ros.org/urdf/XML. Materials, transmissions, sensors and the like are skipped.
 """
 
+import sys
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import Any
+from unittest import mock
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from touchline.errors import InputError
 from touchline.model.mechanism import Array, Joint, Link, Mechanism, Mimic
+from touchline.model.packages import package_folder
 from touchline.model.plausibility import mechanism_warnings
 from touchline.model.topology import find_root, resolve_mimics
 from touchline.model.urdf_elements import Reader, named
@@ -38,7 +42,7 @@ def load_urdf(path: Path | str, package_dirs: Sequence[Path] = ()) -> Mechanism:
             a warning of the mechanism.
     """
     path = Path(path)
-    robot = parse_xml(path)
+    robot = parse_xml(path, package_dirs)
     reader = Reader(path, package_dirs)
     if robot.tag != "robot":
         raise InputError(f"{path}: the root element is <{robot.tag}>; a URDF's is <robot>")
@@ -55,28 +59,41 @@ def load_urdf(path: Path | str, package_dirs: Sequence[Path] = ()) -> Mechanism:
     return _mechanism(reader, robot, links, joints)
 
 
-def parse_xml(path: Path) -> Element:
+def parse_xml(path: Path, package_dirs: Sequence[Path] = ()) -> Element:
     """Return the root element of an XML file; a `.xacro` is expanded by the package xacro.
+
+    Args:
+        path: the file.
+        package_dirs: folders in which `$(find NAME)` of a xacro is NAME.
 
     Raises:
         InputError: the file cannot be read, or line and column of the first error in it.
     """
     text = read_bytes(path)
     try:
-        return ElementTree.fromstring(_expanded(path) if path.suffix == ".xacro" else text)
+        return ElementTree.fromstring(
+            _expanded(path, package_dirs) if path.suffix == ".xacro" else text
+        )
     except ElementTree.ParseError as error:
         line, column = error.position
         what = str(error).split(":")[0]
         raise InputError(f"{path}:{line}:{column + 1}: not well-formed XML: {what}") from None
 
 
-def _expanded(path: Path) -> str:
+def _expanded(path: Path, package_dirs: Sequence[Path]) -> str:
     try:
         xacro: Any = import_module("xacro")
     except ModuleNotFoundError:
         raise InputError(f"{path}: a xacro needs the package xacro: pip install xacro") from None
+    # xacro asks ROS for packages; here they are found without it.
+    index, packages = ModuleType("ament_index_python"), ModuleType("ament_index_python.packages")
+    vars(packages)["get_package_share_directory"] = lambda package: str(
+        package_folder(package, path.parent, package_dirs)
+    )
+    vars(index)["packages"] = packages
     try:
-        return xacro.process_file(str(path)).toxml()
+        with mock.patch.dict(sys.modules, {index.__name__: index, packages.__name__: packages}):
+            return xacro.process_file(str(path)).toxml()
     except Exception as error:  # the package raises many kinds
         what = " ".join(str(error).split())
         raise InputError(f"{path}: xacro cannot expand it: {what}") from None
