@@ -7,10 +7,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from touchline.arrays import Array
 
 COLUMN, PAGE = 3.45, 7.1  # widths [inch]
 INK, FAINT = "#22262b", "#8d949c"

@@ -4,11 +4,11 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from touchline import _core as core
+    import touchline._core as core
 else:
     try:
-        from touchline import _core_avx2 as core
+        import touchline._core_avx2 as core
     except ImportError:  # not built, or a processor without AVX2
-        from touchline import _core as core
+        import touchline._core as core
 
 __all__ = ["core"]

@@ -12,9 +12,9 @@ from html import escape
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from touchline.arrays import Array
+
 Decode = Callable[[Array, Any], Any]
 
 

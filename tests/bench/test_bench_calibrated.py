@@ -4,8 +4,8 @@
 import pytest
 
 from touchline.bench.calibrated import PUSHES, WRONGS, Arm
-from touchline.bench.localization.arm import load_arm
 from touchline.cli import main
+from touchline.trials.arms import load_arm
 
 
 @pytest.mark.parametrize("wrong", WRONGS[:2], ids=lambda wrong: wrong.name)

@@ -11,12 +11,6 @@ from touchline.bench.detection import classical as detection_classical
 from touchline.bench.detection import files as detection_files
 from touchline.bench.detection.classical import FastClassical, less_baseline
 from touchline.bench.detection.drawing import draw
-from touchline.bench.detection.free_motion import (
-    MotionMaker,
-    generator,
-    imperfect,
-    random_trajectory,
-)
 from touchline.bench.detection.outcome import Outcome
 from touchline.bench.detection.pushes import AFTER, BEFORE, PushMaker, random_pushes
 from touchline.bench.detection.tables import alarm_table, delay_table
@@ -27,6 +21,12 @@ from touchline.detector.tail import Tail
 from touchline.observer.classical import ClassicalObserver
 from touchline.observer.dynamics import from_world, inverse_dynamics
 from touchline.observer.observer import Observer
+from touchline.trials.free_motion import (
+    MotionMaker,
+    generator,
+    imperfect,
+    random_trajectory,
+)
 
 
 @pytest.fixture(scope="module")

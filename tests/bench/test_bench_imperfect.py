@@ -6,8 +6,8 @@ import pytest
 
 from touchline.bench.imperfect.faults import FAULTS, PAYLOAD
 from touchline.bench.imperfect.trial import Trials
-from touchline.bench.localization.arm import load_arm
 from touchline.cli import main
+from touchline.trials.arms import load_arm
 
 
 @pytest.fixture(scope="module")

@@ -8,22 +8,22 @@ import pytest
 from oracle import PinocchioTwin
 
 import touchline as tl
-from touchline.bench.localization.arm import TIERS, load_arm
-from touchline.bench.localization.cell import Cell
 from touchline.bench.localization.columns import wilson
 from touchline.bench.localization.course import hands_table
 from touchline.bench.localization.credibility import mixture_level
-from touchline.bench.localization.hands import in_cone, tremor
 from touchline.bench.localization.matching import distances, match
 from touchline.bench.localization.run import Plan, main, run_plan
-from touchline.bench.localization.scene import make_scene
 from touchline.bench.localization.segment_table import segment_tables
 from touchline.bench.localization.surface_map import SurfaceMap
 from touchline.bench.localization.trial import pair_rank, run_trial
 from touchline.bench.localization.trials_file import write_trials
-from touchline.bench.touches import TouchSampler, sample_on_each, touch_loads
 from touchline.errors import InputError
 from touchline.localizer.skin import Skin
+from touchline.trials.arms import TIERS, load_arm
+from touchline.trials.cell import Cell
+from touchline.trials.hands import in_cone, tremor
+from touchline.trials.scene import make_scene
+from touchline.trials.touches import TouchSampler, sample_on_each, touch_loads
 
 
 def panda(tier=0):

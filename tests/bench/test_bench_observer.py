@@ -11,8 +11,7 @@ from robots import describe, random_mechanism, random_robot
 
 from touchline.bench.observer import run as bench
 from touchline.bench.observer.discretization import discretization_errors, filtered, fixed_sensor
-from touchline.bench.observer.motion import fast_motion, pushed_link
-from touchline.bench.observer.run import main, plain, run_benchmark, two_sensor_arm
+from touchline.bench.observer.run import main, plain, run_benchmark
 from touchline.bench.observer.timing import Candidate, measure
 from touchline.bench.pinocchio_peer import PinocchioObserver
 from touchline.bench.urdf import robot_urdf, sensor_link
@@ -21,6 +20,7 @@ from touchline.model.description import JointDescription, SensorDescription
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import gravity_loads
 from touchline.observer.observer import Observer
+from touchline.trials.fast_motion import fast_motion, pushed_link, two_sensor_arm
 
 
 @pytest.fixture(scope="module")

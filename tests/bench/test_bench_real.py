@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 
 from touchline.bench.matching import match
 from touchline.bench.real.judged import Touched, judge_free, judge_touched
-from touchline.bench.real.recordings import Recording, at_rate
 from touchline.cli import main
 from touchline.model.robot import load_robot
 from touchline.observer.samples import Samples
 from touchline.result.contact import Candidate
 from touchline.result.event import Event
+from touchline.trials.real_recordings import Recording, at_rate
 
 
 def spans(*intervals):

@@ -5,9 +5,14 @@ import numpy as np
 import pytest
 
 import touchline as tl
-from touchline.bench.reliability.faults import FAULTS, channels_of, injected
 from touchline.bench.reliability.judge import judge, listen
-from touchline.bench.reliability.recordings import (
+from touchline.bench.reliability.run import tables
+from touchline.simulation.contacts import Profile, ScriptedContact
+from touchline.simulation.noise import SensorNoise
+from touchline.simulation.scenario import scripted
+from touchline.simulation.scene import Run
+from touchline.trials.faults import FAULTS, channels_of, injected
+from touchline.trials.recordings import (
     FORCE,
     MODEL_ERROR,
     PHASES,
@@ -17,11 +22,6 @@ from touchline.bench.reliability.recordings import (
     SPEED,
     record,
 )
-from touchline.bench.reliability.run import tables
-from touchline.simulation.contacts import Profile, ScriptedContact
-from touchline.simulation.noise import SensorNoise
-from touchline.simulation.scenario import scripted
-from touchline.simulation.scene import Run
 
 AT_ONCE = ("spike", "spikes", "rail", "NaN", "infinite", "absurd")
 

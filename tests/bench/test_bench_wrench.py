@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from touchline.bench.touches import Touch, TouchSampler, resting_signals
 from touchline.bench.wrench import methods as wrench_methods
 from touchline.bench.wrench import run as wrench
 from touchline.bench.wrench.log import Log
@@ -31,6 +30,7 @@ from touchline.observer.dynamics import contact_loads
 from touchline.observer.joint_momentum import tool_wrench
 from touchline.observer.observer import Observer
 from touchline.observer.samples import Samples
+from touchline.trials.touches import Touch, TouchSampler, resting_signals
 
 RESTING = np.array([0.4, 0.9, -0.5, -1.2, 0.6, 0.8, 0.3])
 PEERS = [pytest.param(m, id=m.name) for m in METHODS]

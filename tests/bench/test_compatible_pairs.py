@@ -4,7 +4,6 @@
 import numpy as np
 import pytest
 
-from touchline.bench.localization.cell import Cell
 from touchline.bench.localization.compatible import (
     CompatiblePairs,
     SurfacePoints,
@@ -12,11 +11,12 @@ from touchline.bench.localization.compatible import (
     exact_readings,
     scatter,
 )
-from touchline.bench.localization.scene import FRICTION, arm_and_skin, make_scene
 from touchline.bench.localization.touched import last_contacts
-from touchline.bench.localization.trial import make_pipeline, pair_rank
+from touchline.bench.localization.trial import pair_rank
 from touchline.errors import InputError
 from touchline.observer.dynamics import contact_loads
+from touchline.trials.cell import Cell
+from touchline.trials.scene import FRICTION, arm_and_skin, make_pipeline, make_scene
 
 PAIRS = {7: (4, 14, 20), 8: (0, 3, 17), 9: (2, 16, 31)}  # rank, and runs of the benchmark
 CELL = Cell("panda", 2, 0, "together")

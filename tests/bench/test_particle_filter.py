@@ -6,16 +6,16 @@ import pytest
 from scipy.optimize import lsq_linear
 
 import touchline as tl
-from touchline.bench.localization.cell import Cell
 from touchline.bench.localization.line_rules import first_entry, nearest_to_line
 from touchline.bench.localization.particle_filter import (
     ParticleFilter,
     least_misfit,
     tempered_weights,
 )
-from touchline.bench.localization.scene import arm_and_skin, make_scene
 from touchline.bench.localization.trial import run_trial
 from touchline.localizer.skin import Skin
+from touchline.trials.cell import Cell
+from touchline.trials.scene import arm_and_skin, make_scene
 
 
 @pytest.mark.parametrize("columns", [4, 8, 12])

@@ -9,12 +9,6 @@ import pytest
 from free_motion import free_motion
 
 import touchline as tl
-from touchline.bench.detection.free_motion import (
-    MotionMaker,
-    generator,
-    imperfect,
-    random_trajectory,
-)
 from touchline.calibrate.noise import NoiseMeter
 from touchline.calibrate.run import _check_tails, calibrate
 from touchline.cli.main import main
@@ -28,6 +22,12 @@ from touchline.model.robot import Robot
 from touchline.model.robot_file import write_description
 from touchline.model.values import METHODS
 from touchline.model.yaml_file import read_yaml
+from touchline.trials.free_motion import (
+    MotionMaker,
+    generator,
+    imperfect,
+    random_trajectory,
+)
 
 RATE = 500.0
 TEXT = """\

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 import touchline as tl
-from touchline.bench.interface.hand import find_pad, middle_of, press, signals_of
 from touchline.check.findings import Findings
 from touchline.check.interface import check_interface
 from touchline.localizer.skin import Skin
 from touchline.model.description import WidgetDescription
 from touchline.model.robot import Robot
 from touchline.touch import Touch
+from touchline.trials.finger import find_pad, middle_of, press, signals_of
 
 ON, BESIDE = (-0.0, -0.04, 0.163), (0.0, -0.035, 0.153)  # on the surface of link4
 

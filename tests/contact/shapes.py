@@ -3,7 +3,6 @@
 
 import numpy as np
 
-from touchline.bench.touches import Touch, resting_signals
 from touchline.localizer.skin import Skin
 from touchline.model.description import (
     JointDescription,
@@ -15,6 +14,7 @@ from touchline.model.mechanism import Geometry, Inertia, Joint, Link, Mechanism
 from touchline.model.robot import Robot
 from touchline.model.transforms import pose, rotation_rpy
 from touchline.observer.observer import Observer
+from touchline.trials.touches import Touch, resting_signals
 
 BODY = Inertia(1.0, np.zeros(3), np.eye(3) * 0.01)
 

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 import touchline as tl
-from touchline.bench.classification.interactions import BEGIN, InteractionSampler
-from touchline.bench.touches import TouchSampler
 from touchline.localizer.skin import Skin
+from touchline.trials.interactions import BEGIN, InteractionSampler
+from touchline.trials.touches import TouchSampler
 
 
 @pytest.fixture(scope="module")

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import touchline as tl
-from touchline.bench.touches import TouchSampler, resting_signals
 from touchline.detector.detector import Detector
 from touchline.detector.limits import siegmund
 from touchline.detector.thresholds import make_thresholds, without_limits
 from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
+from touchline.trials.touches import TouchSampler, resting_signals
 
 METHODS = ("rows", "scaled", "chi2", "glrt", "cusum")
 

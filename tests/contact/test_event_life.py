@@ -6,8 +6,8 @@ import pytest
 from shapes import chain
 from timeline import Push, ramp, signals
 
-from touchline.bench.touches import Signals
 from touchline.pipeline.pipeline import Pipeline
+from touchline.trials.touches import Signals
 
 Q = np.array([0.3, -0.5, 0.8, 0.4, -0.6, 0.5])
 ROBOT = chain((0.3,) * 6)

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from shapes import box, chain, measured, still
 
-from touchline.bench.touches import Touch, resting_signals
 from touchline.localizer.localizer import Localizer
 from touchline.localizer.skin import Skin
 from touchline.pipeline.pipeline import Pipeline
 from touchline.result.contact import Contact
+from touchline.trials.touches import Touch, resting_signals
 
 CUBE = box(0.2, 0.2, 0.2)
 PLACE, PULL = np.array([0.03, -0.05, 0.1]), np.array([4.0, 3.0, 20.0])

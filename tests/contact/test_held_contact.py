@@ -4,9 +4,8 @@
 import numpy as np
 import pytest
 
-from touchline.bench.localization.scene import FRICTION, arm_and_skin
-from touchline.bench.localization.trial import make_pipeline
-from touchline.bench.touches import TouchSampler, resting_signals
+from touchline.trials.scene import FRICTION, arm_and_skin, make_pipeline
+from touchline.trials.touches import TouchSampler, resting_signals
 
 # Two-sided for the pitch of the wrench, one-sided for chi2, 4 sigma each (`pitch_limit`).
 STATED = 6.3e-5 + 3.2e-5

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from shapes import chain
 
-from touchline.bench.touches import Touch, resting_signals
 from touchline.localizer.skin import Skin
 from touchline.pipeline.pipeline import Pipeline
+from touchline.trials.touches import Touch, resting_signals
 
 Q = np.array([0.3, -0.5, 0.8, 0.4, -0.6, 0.5, 0.7])
 # In the frame of the link: place and force of pushes on boxes 8 cm thick.

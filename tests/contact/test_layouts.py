@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from shapes import box, chain, measured, still, turned
 
 import touchline as tl
-from touchline.bench.touches import TouchSampler, resting_signals
 from touchline.localizer.localizer import Localizer
 from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
 from touchline.observer.observer import Observer
+from touchline.trials.touches import TouchSampler, resting_signals
 
 CUBE = box(0.2, 0.2, 0.2)
 PLACE, PUSH = np.array([0.03, -0.05, 0.1]), np.array([4.0, 3.0, -20.0])

@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from shapes import chain, measured, sphere, still
 
-from touchline.bench.touches import Touch, resting_signals
 from touchline.localizer.localizer import Localizer
 from touchline.model.transforms import move_wrench, pose, rotation_rpy
 from touchline.observer.observer import Observer
 from touchline.result.line import line_at, line_point, pitch, pitch_score
+from touchline.trials.touches import Touch, resting_signals
 
 vectors = arrays(float, 3, elements=st.floats(-5, 5, width=32))
 

@@ -4,9 +4,9 @@
 import numpy as np
 import pytest
 
-from touchline.bench.localization.scene import FRICTION, arm_and_skin
-from touchline.bench.touches import TouchSampler, resting_signals
 from touchline.pipeline.pipeline import Pipeline
+from touchline.trials.scene import FRICTION, arm_and_skin
+from touchline.trials.touches import TouchSampler, resting_signals
 
 RUNS, BEGIN, DURATION, PERIOD = 60, 0.6, 1.1, 2e-3
 

@@ -6,11 +6,11 @@ import pytest
 from shapes import BODY, box, chain, describe, measured, still, turned
 
 import touchline as tl
-from touchline.bench.touches import TouchSampler, resting_signals
 from touchline.localizer.localizer import Localizer
 from touchline.localizer.skin import Skin
 from touchline.model.mechanism import Link, Mechanism
 from touchline.observer.observer import Observer
+from touchline.trials.touches import TouchSampler, resting_signals
 
 
 def locate(robot, q, loads, segment="base", rng=None, **options):

@@ -7,11 +7,6 @@ import numpy as np
 import pytest
 
 import touchline as tl
-from touchline.bench.localization.cell import Cell
-from touchline.bench.localization.course import follow_course
-from touchline.bench.localization.scene import make_scene, told_and_real
-from touchline.bench.localization.trial import make_pipeline, run_trial
-from touchline.bench.touches import TouchSampler, resting_signals
 from touchline.detector.detector import Detection, Detector
 from touchline.detector.model_drift import WAY, guess_drift
 from touchline.detector.thresholds import expect_drift, make_thresholds, without_limits
@@ -21,7 +16,9 @@ from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot
 from touchline.model.transforms import move_wrench
 from touchline.observer.dynamics import gravity_loads
-from touchline.pipeline.pipeline import Pipeline
+from touchline.trials.cell import Cell
+from touchline.trials.scene import make_pipeline, make_scene, told_and_real
+from touchline.trials.touches import TouchSampler, resting_signals
 
 OFF = Cell("sara", tier=1, speed=1.0, model_error=0.02)
 CONSTANT, SPEED, ACCELERATION = 0.3, 0.05, 0.02
@@ -46,22 +43,6 @@ def drift_of(robot, q, qd, *drift):
     signals = np.arange(len(q)) * 1e-3, q, qd, weight.torque, weight.wrench.reshape(-1, k, 6)
     assert signals[3].shape == (len(q), n)
     return found.run(*signals)[1].drift, thresholds.rows
-
-
-def test_one_touch_of_a_wrong_model_in_motion_is_one():
-    """Masses and inertias are 2 % off: the same touches, without what is known of that."""
-    for run in (0, 30):
-        trial = run_trial(OFF, run)
-        assert trial.found
-        assert trial.course.samples > 400
-        assert trial.course.several == trial.course.wrong == 0
-        robot, _, skin = told_and_real(OFF, run)
-        thresholds = expecting(make_thresholds(robot), 0.0, 0.0, 0.0)
-        blind = Pipeline(robot, skin=skin, torque_error=0.0, friction=0.5, thresholds=thresholds)
-        scene = make_scene(OFF, run)
-        s = scene.signals
-        blind.run(s.time, s.q, s.qd, s.tau, s.wrench)
-        assert follow_course(blind, scene).several > 100
 
 
 def test_an_arm_at_rest_keeps_what_its_baseline_took_out(sara):
@@ -172,16 +153,6 @@ def test_an_error_that_lasts_does_not_average_away(run):
     event, sample, off = judged(replace(OFF, model_error=0.0), run)
     assert event < 0.6 * sample
     assert off < 4.0 * event
-
-
-def test_places_that_are_held_get_no_surer_than_the_model_allows():
-    """Two contacts, 0.1 s apart, held for half a second beside each other."""
-    for run in range(4):
-        trial = run_trial(replace(OFF, contacts=2), run)
-        assert trial.course.several == 0
-        errors = np.array([touch.error for touch in trial.touches])
-        assert np.median(errors) > 3e-4
-        assert (errors < 4.0 * np.array([touch.std for touch in trial.touches])).all()
 
 
 def test_an_axis_of_a_smaller_sensor_errs_with_the_wrench_of_its_segment():

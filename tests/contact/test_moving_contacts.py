@@ -4,12 +4,12 @@
 import numpy as np
 import pytest
 
-from touchline.bench.localization.arm import load_arm
-from touchline.bench.localization.moving import carried, moving_signals
-from touchline.bench.touches import TouchSampler
 from touchline.errors import InputError
 from touchline.localizer.skin import Skin
 from touchline.pipeline.pipeline import Pipeline
+from touchline.trials.arms import load_arm
+from touchline.trials.moving import carried, moving_signals
+from touchline.trials.touches import TouchSampler
 
 ONSET, END = 0.52, 0.62  # s: after settling and a quiet time
 

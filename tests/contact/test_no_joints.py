@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import touchline as tl
-from touchline.bench.touches import TouchSampler, resting_signals
 from touchline.cli.main import main
+from touchline.trials.touches import TouchSampler, resting_signals
 
 URDF = """<robot name="probe">
   <link name="flange"/>

@@ -6,11 +6,11 @@ import pytest
 from shapes import box, chain, measured, still
 
 import touchline as tl
-from touchline.bench.touches import TouchSampler, resting_signals
 from touchline.localizer.localizer import Localizer
 from touchline.localizer.skin import Skin
 from touchline.observer.observer import Observer
 from touchline.simulation.scenario import three_touches
+from touchline.trials.touches import TouchSampler, resting_signals
 
 PLACE, PUSH = np.array([0.03, -0.05, 0.1]), np.array([4.0, 3.0, -20.0])
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import touchline as tl
-from touchline.bench.localization.arm import load_arm
-from touchline.bench.touches import resting_signals
 from touchline.detector.residual_noise import residual_noise
 from touchline.model.robot import Robot
+from touchline.trials.arms import load_arm
+from touchline.trials.touches import resting_signals
 
 
 def with_noisy_velocities(robot, qd):

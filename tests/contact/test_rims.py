@@ -4,9 +4,8 @@
 import numpy as np
 import pytest
 
-from touchline.bench.localization.cell import Cell
-from touchline.bench.localization.scene import make_scene, told_and_real
-from touchline.bench.localization.trial import make_pipeline
+from touchline.trials.cell import Cell
+from touchline.trials.scene import make_pipeline, make_scene, told_and_real
 
 
 @pytest.mark.parametrize(("arm", "tier", "run"), [("sara", 1, 59), ("sara", 2, 59)])

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.bench.touches import Signals, add_noise, resting_signals, touch_loads
 from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
 from touchline.pipeline.pipeline import Pipeline
+from touchline.trials.touches import Signals, add_noise, resting_signals, touch_loads
 
 Array = NDArray[np.float64]
 

@@ -6,8 +6,6 @@ import pytest
 from motion import Recording, ramp
 from robots import describe, random_mechanism
 
-from touchline.bench.observer.motion import fast_motion
-from touchline.bench.observer.run import two_sensor_arm
 from touchline.errors import InputError
 from touchline.model.description import Friction, JointDescription, SensorDescription
 from touchline.model.robot import Robot
@@ -24,6 +22,7 @@ from touchline.observer.dynamics import (
     point_jacobian,
 )
 from touchline.observer.observer import Observer
+from touchline.trials.fast_motion import fast_motion, two_sensor_arm
 
 K = 50.0
 TIME = np.arange(0, 0.8, 1e-3)

@@ -14,10 +14,10 @@ from motion import Recording, ramp
 from robots import describe, random_mechanism
 
 import touchline as tl
-from touchline.bench.touches import resting_signals
 from touchline.health import Health
 from touchline.model.robot import Robot
 from touchline.simulation.scenario import three_touches
+from touchline.trials.touches import resting_signals
 
 ROOT = Path(__file__).parents[2]
 DATA = Path(os.environ.get("TOUCHLINE_DATA", ROOT.parent / "shared" / "data"))

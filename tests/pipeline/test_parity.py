@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 
 import touchline as tl
-from touchline.bench.reliability.faults import channels_of
-from touchline.bench.reliability.recordings import record
 from touchline.result.kinds import Fault
 from touchline.simulation.contacts import Profile, ScriptedContact
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scenario import scripted
 from touchline.simulation.scene import Run
+from touchline.trials.faults import channels_of
+from touchline.trials.recordings import record
 
 BEGIN = 0.6  # s
 RAMP = 40.0  # N/s: no step that a gate would see

@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 
 import touchline as tl
-from touchline.bench.real.recordings import read_free, read_touched
-from touchline.bench.reliability.recordings import robot_named
 from touchline.observer.samples import Samples
 from touchline.simulation import scenario
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scene import Run
+from touchline.trials.real_recordings import read_free, read_touched
+from touchline.trials.recordings import robot_named
 
 FOLDER = Path(__file__).parent
 DATA = Path(os.environ.get("TOUCHLINE_DATA", FOLDER.parents[2] / "shared" / "data"))

@@ -4,8 +4,6 @@
 import numpy as np
 import pytest
 
-from touchline.bench.reaction.guiding import guide, handle_point
-from touchline.bench.reaction.trial import Case, measure, pressing, reactor
 from touchline.model.description import PolicyDescription, PolicyRule
 from touchline.pipeline.pipeline import Pipeline
 from touchline.reaction.reactor import Reactor
@@ -16,6 +14,8 @@ from touchline.simulation.noise import SensorNoise
 from touchline.simulation.obstacle import TOUCHES, Body
 from touchline.simulation.scene import Run, impedance, make_plant
 from touchline.simulation.simulator import Rates, run
+from touchline.trials.guiding import guide, handle_point
+from touchline.trials.reacting import Case, measure, pressing, reactor
 
 SECONDS = 0.5
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import touchline as tl
-from touchline.bench.interface.hand import find_pad, middle_of, press, signals_of
 from touchline.cli.main import main
 from touchline.live.connection import Connection
 from touchline.live.session import Session
@@ -17,6 +16,7 @@ from touchline.localizer.skin import Skin
 from touchline.logs import write_table
 from touchline.model.yaml_file import read_yaml
 from touchline.report.analysis import analyze
+from touchline.trials.finger import find_pad, middle_of, press, signals_of
 
 TIME = np.arange(0.0, 4.2, 1e-3)
 BEGINS = (1.5, 2.4, 3.3)  # s; the first second is untouched, as a live robot's has to be

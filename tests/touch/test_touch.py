@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import touchline as tl
-from touchline.bench.interface.hand import find_pad, project, rising, signals_of, sliding
 from touchline.localizer.skin import Skin
 from touchline.model.description import WidgetDescription
 from touchline.model.robot import Robot
 from touchline.touch import Recognizer, Touch
 from touchline.touch.teach import as_yaml, teach
+from touchline.trials.finger import find_pad, project, rising, signals_of, sliding
 
 TIME = np.arange(0.0, 2.2, 1e-3)
 

@@ -6,19 +6,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
-from touchline.bench.detection.free_motion import (
-    MotionMaker,
-    Trajectory,
-    imperfect,
-    random_trajectory,
-)
-from touchline.bench.localization.arm import load_arm
-from touchline.bench.localization.wrong_model import RATE, with_thresholds
+from touchline.arrays import Array
 from touchline.bench.tables import Row, aligned
-from touchline.bench.touches import TouchSampler
 from touchline.calibrate.noise import measure_noise
 from touchline.calibrate.run import growth
 from touchline.detector.thresholds import make_thresholds
@@ -31,8 +22,15 @@ from touchline.observer.dynamics import contact_loads
 from touchline.observer.samples import Samples
 from touchline.pipeline.pipeline import Pipeline
 from touchline.result.event import Event
-
-Array = NDArray[np.float64]
+from touchline.trials.arms import load_arm
+from touchline.trials.free_motion import (
+    MotionMaker,
+    Trajectory,
+    imperfect,
+    random_trajectory,
+)
+from touchline.trials.touches import TouchSampler
+from touchline.trials.wrong_model import RATE, with_thresholds
 
 NOISE = 1  # tier of the localization benchmark: 0.05 N, 0.01 Nm, 0.05 Nm
 MINUTES = 2  # of motion for the calibration

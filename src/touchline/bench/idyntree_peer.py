@@ -11,9 +11,7 @@ import warnings
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from touchline.arrays import Array
 from touchline.bench.urdf import node_link, robot_urdf
 from touchline.errors import InputError
 from touchline.model.robot import Robot
@@ -21,8 +19,6 @@ from touchline.model.robot import Robot
 with warnings.catch_warnings():  # its types lack a __module__; as an error that ends Python
     warnings.simplefilter("ignore")
     import idyntree.swig as idyntree
-
-Array = NDArray[np.float64]
 
 
 class IdyntreeEstimator:

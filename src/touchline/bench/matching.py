@@ -2,9 +2,8 @@
 """One event to one touch: which event is which touch, and what is left over on both sides."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from touchline.arrays import Array
 
 MARGIN = 0.1  # s; a glove and an arm do not feel a touch at the same instant
 

@@ -8,12 +8,10 @@ gravity of all rows come from three calls. Needs `pip install pin`.
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.bench.urdf import robot_urdf, sensor_joint
 from touchline.model.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 class PinocchioObserver:

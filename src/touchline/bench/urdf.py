@@ -4,13 +4,11 @@
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.mechanism import Inertia
 from touchline.model.robot import Robot
 from touchline.model.tree import Node
-
-Array = NDArray[np.float64]
 
 
 def robot_urdf(robot: Robot, free_sensors: bool = False) -> str:

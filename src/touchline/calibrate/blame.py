@@ -5,7 +5,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from touchline.calibrate.quiet import Suspicion
 from touchline.detector.calibration import Residuals, watching, with_methods
@@ -15,8 +14,6 @@ from touchline.model.description import RowCalibration
 from touchline.model.robot import Robot
 from touchline.observer.observer import Observer
 from touchline.observer.samples import Samples
-
-Array = NDArray[np.float64]
 
 STILL = 0.01  # rad/s; slower joints stand still
 FAR, OFTEN = 6.0, 0.06  # robust sigmas, and the share of the time that is spent beyond them

@@ -5,15 +5,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.calibrate.run import Calibration, Thresholds
 from touchline.detector.calibration import Statistics
 from touchline.detector.tail import Tail, alarm_levels
 from touchline.errors import InputError
 from touchline.model.values import METHODS
-
-Array = NDArray[np.float64]
 
 ENDINGS = ".svg", ".png", ".pdf"
 LEFT_OUT = 0.3  # of the tail's range, below its beginning, that is shown as well

@@ -4,14 +4,12 @@
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.identify.noise_meter import NoiseMeter
 from touchline.model.description import AXES, Noise
 from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
-
-Array = NDArray[np.float64]
 
 
 def measure_noise(robot: Robot, recordings: Iterable[Iterable[Samples]]) -> Noise:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.identify.choice import CORRELATED
 from touchline.identify.evidence import Evidence, gather
@@ -22,8 +22,6 @@ from touchline.model.robot import Robot
 from touchline.model.surface import mechanism_surfaces
 from touchline.observer.dynamics import inverse_dynamics
 from touchline.observer.samples import Samples
-
-Array = NDArray[np.float64]
 
 SECONDS = 40.0
 RATE = 100.0  # samples a second

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from touchline.calibrate.blame import find_blame, often_off
 from touchline.calibrate.held_out import HeldOut, judge, split
@@ -39,8 +38,6 @@ from touchline.model.robot import Robot, load_robot
 from touchline.model.robot_file import write_description
 from touchline.model.values import METHODS
 from touchline.model.yaml_file import read_yaml
-
-Array = NDArray[np.float64]
 
 LEAST_SECONDS = 20.0  # shorter recordings have no tail
 MOST_LEFT_OUT = 0.3  # of the time; where more seems touched nobody can tell what is usual

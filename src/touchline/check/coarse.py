@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.check.findings import Findings
 from touchline.check.fit import MOMENT_FACTORS, factor_words, robust_line
 from touchline.check.joints import (
@@ -30,8 +30,6 @@ from touchline.check.windows import Windows
 from touchline.check.wrenches import check_wrenches
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import gravity_loads
-
-Array = NDArray[np.float64]
 
 OFF = 0.35  # of a row's size: beyond it something coarse may be wrong with its sign or order
 WEIGHTS_OFF = 0.05  # the same, of weights

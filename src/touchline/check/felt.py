@@ -4,15 +4,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.check.findings import Findings
 from touchline.detector.residual_noise import residual_noise
 from touchline.detector.thresholds import RowThreshold, make_thresholds
 from touchline.localizer.skin import Patch, Skin
 from touchline.model.robot import Robot
-
-Array = NDArray[np.float64]
 
 POSTURES, PLACES = 60, 12  # drawn: 720 pushes on a link
 SHARE = 0.95  # of the pushes are found

@@ -4,9 +4,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from touchline.arrays import Array
 
 UNREAL = 1e12  # in any unit: no reading of a sensor
 TUKEY = 4.7  # standard deviations beyond which a point does not count (95 % efficiency)

@@ -15,8 +15,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.check.findings import Findings
 from touchline.check.recording import check_recording
 from touchline.logs import write_table
@@ -25,8 +25,6 @@ from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot, load_robot
 from touchline.observer.observer import Observer
 from touchline.observer.samples import Samples
-
-Array = NDArray[np.float64]
 
 SECONDS, RATE = 20.0, 100.0  # of a recording; s, Hz
 UNKNOWN = 0.015  # relative error of the arms' inertias

@@ -6,8 +6,8 @@ from itertools import combinations
 from math import erf, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.check.felt import NOISE_SIGMAS, POINT_RANK, POSTURES, SHARE, screw_of
 from touchline.check.findings import Findings
 from touchline.detector.residual_noise import residual_noise
@@ -19,8 +19,6 @@ from touchline.model.robot import Robot
 from touchline.observer.observer import Observer
 from touchline.touch.touch import SURE, make_widget
 from touchline.touch.widget import DEPTH, Widget
-
-Array = NDArray[np.float64]
 
 SETTLED = 200  # samples after which an observer has settled
 SAMPLES = 6000  # points of a link's surface that are looked at: one in 0.2 cm2 of a forearm

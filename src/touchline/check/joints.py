@@ -4,7 +4,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from touchline.check.findings import Findings
 from touchline.check.fit import (
@@ -17,8 +16,6 @@ from touchline.check.fit import (
 )
 from touchline.check.windows import Windows
 from touchline.model.robot import Robot
-
-Array = NDArray[np.float64]
 
 MOVED = 0.02  # rad/s or m/s; slower says nothing of a velocity's sign
 OFF = 0.1  # a velocity's factor may be off by this much

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.check.averages import averaged
 from touchline.check.findings import Findings
 from touchline.identify.evidence import Evidence, gather
@@ -21,8 +21,6 @@ from touchline.model.robot import Robot
 from touchline.model.transforms import combine_inertias
 from touchline.observer.dynamics import gravity_loads
 from touchline.observer.samples import Samples
-
-Array = NDArray[np.float64]
 
 MOST = 400_000  # samples that are looked at
 RATE = 100.0  # Hz; loads change slowly beside it, and quicker samples are averaged

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import gravity_loads
 from touchline.observer.samples import Samples
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -2,15 +2,13 @@
 """Noise figures beside the noise of a recording."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.check.findings import Findings
 from touchline.check.seen import Seen
 from touchline.model.description import AXES
 from touchline.model.robot import Robot
 from touchline.model.yaml_file import read_yaml
-
-Array = NDArray[np.float64]
 
 OFF = 1.5  # times the figure in use; thresholds follow from it
 ODD = 2.0  # times what is usual among the joints: one that stands out is told by itself

@@ -9,12 +9,10 @@ whatever touches, and only a fault can fill it.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.description import AXES
 from touchline.model.robot import Robot
-
-Array = NDArray[np.float64]
 
 CONFIGURATIONS = 24
 VISIBLE = 0.02  # of a unit fault; less is nothing beside noise and model errors

@@ -5,14 +5,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.check.findings import Findings
 from touchline.model.description import AXES
 from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
-
-Array = NDArray[np.float64]
 
 ENOUGH = 50  # samples before a constant signal is called dead
 FEW = 0.005  # of the samples may be missing, late or at the end of the range

@@ -2,12 +2,10 @@
 """The time stamps of a recording: rate, jitter, gaps, and stamps that repeat or go back."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.check.findings import Findings
 from touchline.tuning import DEFAULTS
-
-Array = NDArray[np.float64]
 
 GAP = DEFAULTS["observer.gap_periods"]  # periods; the observer starts anew after a longer step
 FEW = 0.005

@@ -8,14 +8,12 @@ arm for external: its residuals are the readings to be expected while nothing to
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.description import Friction
 from touchline.model.robot import Robot
 from touchline.observer.observer import Observer
 from touchline.observer.samples import Samples
-
-Array = NDArray[np.float64]
 
 SECONDS, ROWS = 0.25, 8  # at least so long and so many samples is a window
 MOST = 4000

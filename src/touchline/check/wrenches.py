@@ -6,16 +6,14 @@ from dataclasses import dataclass
 from itertools import permutations, product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.check.findings import Findings
 from touchline.check.fit import FORCE_FACTORS, MOMENT_FACTORS, factor_words
 from touchline.check.model import outboard_mass
 from touchline.check.windows import Windows
 from touchline.model.description import SensorDescription
 from touchline.model.robot import Robot
-
-Array = NDArray[np.float64]
 
 LEAST_WEIGHT = 0.5  # N; a lighter load says nothing
 MASS_OFF, MASS_OFF_KG = 0.05, 0.05

@@ -9,16 +9,14 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.classifier.zones import Zones
 from touchline.detector.thresholds import RowThreshold, Thresholds
 from touchline.model.robot import Robot
 from touchline.native import core
 from touchline.observer.observer import Estimate, Observer
 from touchline.tuning import DEFAULTS
-
-Array = NDArray[np.float64]
 
 NOISE_RATIO = 2.0  # contact thresholds per window of the rate that noise may make
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.detector.detector import Detector
 from touchline.detector.tail import LEAST_PEAKS, Tail, count_clusters, fit_tail
 from touchline.detector.thresholds import (
@@ -25,8 +26,6 @@ from touchline.model.robot import Robot
 from touchline.model.values import METHODS
 from touchline.observer.observer import Observer
 from touchline.observer.samples import Samples
-
-Array = NDArray[np.float64]
 
 BLOCK = 0.02  # s, over which the largest value of a statistic is kept
 GAP = 0.2  # s; alarms closer than this are one

@@ -6,9 +6,8 @@ from collections.abc import Iterable
 from statistics import NormalDist
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from touchline.arrays import Array
 
 STEPS = 200  # of the bisection, which ends at the last bit
 

@@ -5,16 +5,14 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.detector.residual_noise import native_noise
 from touchline.detector.thresholds import Thresholds, make_thresholds
 from touchline.model.robot import Robot
 from touchline.native import core
 from touchline.observer.observer import Estimate, Observer
 from touchline.value import Value
-
-Array = NDArray[np.float64]
 
 
 class Level(IntEnum):

@@ -6,11 +6,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.detector.chi_square import chi_square_limit, normal_limit
 from touchline.model.description import DetectionDescription, TailDescription
 from touchline.tuning import DEFAULTS
-
-Array = NDArray[np.float64]
 
 CUSUM_SHIFT = DEFAULTS["detector.cusum_shift"]
 

@@ -6,14 +6,12 @@ rows follows from inverse dynamics of arms that are off at random, in random pos
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import inverse_dynamics
 from touchline.tuning import DEFAULTS
-
-Array = NDArray[np.float64]
 
 ARMS, POSES = 6, 32  # that are drawn
 WAY = DEFAULTS["detector.drift_way"]  # rad

@@ -2,12 +2,10 @@
 """What the noise of the signals leaves in the filtered residuals, at worst over the postures."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.robot import Robot
 from touchline.native import core
-
-Array = NDArray[np.float64]
 
 CONFIGURATIONS = 64  # sampled for the largest effect of noise
 

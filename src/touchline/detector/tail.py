@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from touchline.arrays import Array
 from touchline.model.description import TailDescription
-
-Array = NDArray[np.float64]
 
 PEAKS, PEAKS_PER_HOUR = 50, 60.0  # the tail begins where there are so many
 LEAST_PEAKS = 20

@@ -4,8 +4,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.detector.limits import sum_limits, theoretical, threshold
 from touchline.detector.model_drift import guess_drift
 from touchline.detector.residual_noise import residual_noise
@@ -18,8 +18,6 @@ from touchline.model.description import (
 )
 from touchline.model.robot import Robot
 from touchline.tuning import DEFAULTS
-
-Array = NDArray[np.float64]
 
 SIGMAS = 6.0  # contact thresholds lie this many standard deviations of the residual out
 FORCE_FLOOR, MOMENT_FLOOR, TORQUE_FLOOR = 0.5, 0.1, 0.1  # N, Nm, Nm: models are not better

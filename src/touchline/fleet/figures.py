@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from touchline.folder import replaced_file
 from touchline.health import Health
-from touchline.report.analysis import EPOCH
+from touchline.report.outcome import EPOCH
 from touchline.report.outputs import ESTIMATES, EVENTS
 
 FIGURES = "figures.json"

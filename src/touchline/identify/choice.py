@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.identify.evidence import WIDTHS, Evidence
 from touchline.identify.fit import (
     BodyChange,
@@ -20,8 +21,6 @@ from touchline.identify.fit import (
 )
 from touchline.identify.payload import SETTLED, guess_payload, seen_leaves
 from touchline.identify.touches import usual_scatter
-
-Array = NDArray[np.float64]
 
 FOLDS = 5  # parts of each recording, one after the other
 BLOCK = 1.0  # s; residuals farther apart are taken as independent

@@ -11,13 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.identify.choice import Chooser
 from touchline.identify.evidence import Evidence
 from touchline.identify.fit import Equations, column_of
 from touchline.identify.regressor import body_vector
 from touchline.model.robot import Robot
-
-Array = NDArray[np.float64]
 
 SURE = 4.0  # standard errors
 LEAST = 3e-4  # s; a shorter delay is left alone

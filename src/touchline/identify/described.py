@@ -5,8 +5,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.identify.fit import Solution, link_vector, main_links
 from touchline.identify.identification import Identification
 from touchline.identify.payload import payload_link
@@ -23,8 +23,6 @@ from touchline.model.mechanism import Link
 from touchline.model.robot import Robot
 from touchline.model.transforms import combine_inertias, move_inertia
 from touchline.model.tree import invert
-
-Array = NDArray[np.float64]
 
 UNCHANGED = 1e-3  # steps of `PhysicalBody` below it: no data told anything of the link
 SMALLEST = 1e-9  # in SI units; smaller figures are rounding errors

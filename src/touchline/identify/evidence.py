@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.identify.regressor import Rows, body_vector, momentum_regressors, rows_of
 from touchline.identify.smoothing import Steps, derivative, make_steps, mean, settled, smooth
 from touchline.model.description import Friction
@@ -19,8 +20,6 @@ from touchline.model.robot import Robot
 from touchline.observer.dynamics import posture
 from touchline.observer.readings import read_torque, read_wrench
 from touchline.observer.samples import Samples
-
-Array = NDArray[np.float64]
 
 BANDWIDTH = 20.0  # rad/s; faster says more of noise and delays than of the model
 PER_CONSTANT = 2.5  # equations that are kept in each time constant of the filter

@@ -7,14 +7,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.identify.evidence import Evidence
 from touchline.identify.physical import PhysicalBody
 from touchline.identify.regressor import PARAMETERS, body_vector
 from touchline.model.corrections import load_inertia
 from touchline.model.robot import Robot
 from touchline.model.transforms import move_inertia
-
-Array = NDArray[np.float64]
 
 BIAS, BIAS_SHARE = 1.0, 0.1  # 1 sigma of a bias: N or Nm, or this part of the largest reading
 STEPS = 30  # of Gauss and Newton at most

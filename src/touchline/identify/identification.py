@@ -6,13 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.identify.choice import Chooser
 from touchline.identify.evidence import Evidence
 from touchline.identify.fit import Problem, Solution, applied
 from touchline.identify.touches import find_touches, stretches
-
-Array = NDArray[np.float64]
 
 LEAST_SECONDS = 2.0  # of settled, untouched data; less tells an offset at best
 HELD_OUT = 3  # every third recording, or the last third of each

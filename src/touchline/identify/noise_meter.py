@@ -4,9 +4,8 @@
 from math import comb
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from touchline.arrays import Array
 
 ORDER = 3  # of the differences: they take out what is smooth over four samples
 FAR = 8.0  # differences so many robust sigmas out are jumps, not noise

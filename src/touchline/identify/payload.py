@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.identify.evidence import PER_CONSTANT, Evidence, gather
 from touchline.identify.fit import BodyChange, Equations, Problem, Solution
@@ -18,8 +18,6 @@ from touchline.model.transforms import move_inertia
 from touchline.model.tree import invert
 from touchline.observer.samples import Samples
 from touchline.suggest import unknown
-
-Array = NDArray[np.float64]
 
 LIGHTEST = 0.03  # kg; less is left to the links' own corrections
 SURE = 4.0  # standard errors of the mass

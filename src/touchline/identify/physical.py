@@ -12,11 +12,9 @@ about 2 s of themselves, and centres by s of the body's radius of gyration.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.identify.regressor import PARAMETERS
-
-Array = NDArray[np.float64]
 
 LEAST_RADIUS = 0.005  # m; bodies are taken as at least so wide about their centre
 _LOWER = np.tril_indices(4, -1)

@@ -16,11 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.mechanism import Inertia
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import Posture, posture
-
-Array = NDArray[np.float64]
 
 PARAMETERS = 10  # of one body: m, hx, hy, hz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz
 _INERTIA_AT = ((0, 1, 2), (1, 3, 4), (2, 4, 5))  # which of the six stands where

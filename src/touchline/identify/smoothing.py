@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.tuning import DEFAULTS
-
-Array = NDArray[np.float64]
 
 LONGEST = DEFAULTS["observer.gap_periods"]  # longer intervals are not integrated over
 SETTLING = DEFAULTS["observer.settled_steps"]  # time constants after a start

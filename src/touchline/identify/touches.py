@@ -4,9 +4,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.identify.evidence import Evidence
-
-Array = NDArray[np.float64]
 
 QUIET = 0.4  # of the instants at least are untouched, and tell the usual scatter
 FAR = 8.0  # usual sigmas; what a good fit leaves seldom lies so far out

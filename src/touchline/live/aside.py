@@ -294,7 +294,7 @@ def settle() -> None:
 
 def main(number: int) -> int:
     """The reading process: `number` is that of its socket; standard input says what to read."""
-    from touchline.live.sources import own_source
+    from touchline.live.schemes import own_source
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the program that started it
     link = socket.socket(fileno=number)

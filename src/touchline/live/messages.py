@@ -13,8 +13,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.live.rcl import Rcl
 from touchline.live.sample import Sample, whole_nanoseconds
 from touchline.live.session import Session
@@ -24,8 +24,6 @@ from touchline.native import core
 from touchline.pipeline.pipeline import Result
 from touchline.result.contact import Contact
 from touchline.touch.touch import TouchEvent
-
-Array = NDArray[np.float64]
 
 METRES_PER_NEWTON = 0.01  # length of arrows
 SHAFT, HEAD, POINT = 0.008, 0.02, 0.02  # m

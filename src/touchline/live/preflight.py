@@ -4,16 +4,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.detector.thresholds import make_thresholds
 from touchline.live.sample import Sample
 from touchline.logs.period import typical_period
 from touchline.model.description import AXES
 from touchline.model.robot import Robot
 from touchline.observer.observer import Observer
-
-Array = NDArray[np.float64]
 
 SECONDS = 1.0  # s that are looked at
 LEAST = 20  # samples without which nothing can be said

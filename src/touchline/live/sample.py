@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from touchline.arrays import Array
 from touchline.model.robot import Robot
 
-Array = NDArray[np.float64]
 NANO = 1e-9
 
 

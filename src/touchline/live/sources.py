@@ -1,51 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """From the address of a source to the source."""
 
-from collections.abc import Callable
-
 from touchline.live.aside import ReadAside
 from touchline.live.connection import Connection
-from touchline.live.source import Address, Source, parse_address
+from touchline.live.schemes import own_source, parsed
+from touchline.live.source import Source
 from touchline.model.robot import Robot, load_robot
-
-
-def _simulated(address: Address, robot: Robot) -> Source:
-    from touchline.live.simulated import SimulatedArm
-
-    return SimulatedArm(address, robot)
-
-
-def _replayed(address: Address, robot: Robot) -> Source:
-    from touchline.live.replayed import ReplayedLog
-
-    return ReplayedLog(address, robot)
-
-
-def _ur(address: Address, robot: Robot) -> Source:
-    from touchline.live.ur import UrArm
-
-    return UrArm(address, robot)
-
-
-def _ros(address: Address, robot: Robot) -> Source:
-    from touchline.live.ros import RosTopics
-
-    return RosTopics(address, robot)
-
-
-def _franka(address: Address, robot: Robot) -> Source:
-    from touchline.live.franka import FrankaArm
-
-    return FrankaArm(address, robot)
-
-
-SCHEMES: dict[str, tuple[str, Callable[[Address, Robot], Source]]] = {
-    "sim": ("sim://", _simulated),
-    "replay": ("replay://LOG?speed=1", _replayed),
-    "ros2": ("ros2://", _ros),
-    "ur": ("ur://HOST[:PORT]", _ur),
-    "franka": ("franka://HOST", _franka),
-}
 
 
 def make_source(source: str, robot: Robot) -> Source:
@@ -58,23 +18,9 @@ def make_source(source: str, robot: Robot) -> Source:
         InputError: the address is of no known kind, or cannot be a source of this robot.
     """
     own = own_source(source, robot)
-    if _parsed(source).scheme == "franka":
+    if parsed(source).scheme == "franka":
         return ReadAside(source, robot, tuple(s.name for s in own.streams), own.period)
     return own
-
-
-def own_source(source: str, robot: Robot) -> Source:
-    """The same, to be read by this process.
-
-    Raises:
-        InputError: as `make_source`.
-    """
-    address = _parsed(source)
-    return SCHEMES[address.scheme][1](address, robot)
-
-
-def _parsed(source: str) -> Address:
-    return parse_address(source, {name: form for name, (form, _) in SCHEMES.items()})
 
 
 def connect(source: str, robot: Robot | str) -> Connection:

@@ -4,8 +4,9 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from touchline.arrays import Array
 from touchline.detector.detector import Detection
 from touchline.detector.residual_noise import native_noise
 from touchline.detector.thresholds import Thresholds
@@ -17,8 +18,6 @@ from touchline.native import core
 from touchline.observer.observer import Estimate, Observer
 from touchline.result.contact import Contact
 from touchline.result.native import Names
-
-Array = NDArray[np.float64]
 
 RULES = ("likelihood", "paper")
 TORQUE_ERROR = 0.02  # a joint's torque sensor is no better, and a touch is no point

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from touchline.arrays import Array
 from touchline.localizer.skin import Skin
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

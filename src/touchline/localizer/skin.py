@@ -4,14 +4,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from touchline.arrays import Array
 from touchline.model.robot import Robot
 from touchline.model.surface import Surface, mechanism_surfaces
 from touchline.model.tree import invert
 from touchline.native import core
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

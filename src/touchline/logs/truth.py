@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.logs.parquet import damages, first_line
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -3,20 +3,59 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from touchline.model.description import AXES
-from touchline.model.tree import Node
+from touchline.model.description import AXES, RobotDescription
+from touchline.model.mechanism import Mechanism
+from touchline.model.tree import Node, Place
 from touchline.native import core
 
-if TYPE_CHECKING:
-    from touchline.model.robot import Robot
+
+class Kernelled(Protocol):
+    """What a kernel needs to know of a robot: a `Robot` is one."""
+
+    @property
+    def description(self) -> RobotDescription:
+        """What `robot.yaml` says."""
+        ...
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The model."""
+        ...
+
+    @property
+    def nodes(self) -> Sequence[Node]:
+        """The tree, a parent before its children."""
+        ...
+
+    @property
+    def places(self) -> Mapping[str, Place]:
+        """Where each link is."""
+        ...
+
+    @property
+    def gravity(self) -> NDArray[np.float64]:
+        """(3,) in world [m/s2]."""
+        ...
+
+    @property
+    def joint_names(self) -> Sequence[str]:
+        """In the order of all arrays."""
+        ...
+
+    @property
+    def sensor_names(self) -> Sequence[str]:
+        """In the order of all arrays."""
+        ...
 
 
 def native_observer(
-    robot: Robot, method: str, discretization: str, bandwidth: float | None
+    robot: Kernelled, method: str, discretization: str, bandwidth: float | None
 ) -> core.Observer:
     """A native observer; `bandwidth` [rad/s] overrides the description's."""
     return core.Observer(
@@ -46,7 +85,7 @@ def native_node(node: Node) -> core.Node:
     )
 
 
-def joint_row(robot: Robot, index: int, bandwidth: float | None) -> core.JointRow:
+def joint_row(robot: Kernelled, index: int, bandwidth: float | None) -> core.JointRow:
     """A joint with its channel; `bandwidth` [rad/s] overrides the description's."""
     joint = robot.description.joints[index]
     row = core.JointRow()
@@ -68,7 +107,7 @@ def joint_row(robot: Robot, index: int, bandwidth: float | None) -> core.JointRo
     return row
 
 
-def sensor_row(robot: Robot, index: int, bandwidth: float | None) -> core.SensorRow:
+def sensor_row(robot: Kernelled, index: int, bandwidth: float | None) -> core.SensorRow:
     """A sensor with its channels; `bandwidth` [rad/s] overrides the description's."""
     sensor = robot.description.sensors[index]
     row = core.SensorRow()

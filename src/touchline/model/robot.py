@@ -9,15 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.description import RobotDescription
 from touchline.model.kernel import native_observer
 from touchline.model.mechanism import Mechanism
 from touchline.model.tree import Node, Place, TreeBuilder
 from touchline.native import core
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.description import SensorDescription
 from touchline.model.mechanism import Inertia, Joint, Mechanism
 from touchline.model.transforms import (
@@ -21,8 +21,6 @@ from touchline.model.transforms import (
     pose_rpy,
     rotation_to_axis,
 )
-
-Array = NDArray[np.float64]
 
 
 @dataclass

@@ -8,8 +8,9 @@ joint residual is that of `JointMomentumObserver`. Offline and in numpy.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import (
@@ -41,8 +42,6 @@ __all__ = [
     "classical_error",
     "tool_wrench",
 ]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,12 @@ simply adds to its parent's; `[linear; angular]` and `[force; moment]`.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from touchline.arrays import Array
 from touchline.model.mechanism import Inertia
 from touchline.model.robot import Robot
 from touchline.model.tree import Node
-
-Array = NDArray[np.float64]
 
 AHEAD, BEHIND = np.array([1, 2, 0]), np.array([2, 0, 1])  # axes after and before each
 

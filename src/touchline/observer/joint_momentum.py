@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import (
@@ -22,8 +23,6 @@ from touchline.observer.dynamics import (
 from touchline.observer.observer import DISCRETIZATIONS
 from touchline.observer.readings import read_torque
 from touchline.tuning import DEFAULTS
-
-Array = NDArray[np.float64]
 
 TUSTIN_LIMIT = DEFAULTS["observer.tustin_steps"]  # K dt up to which `automatic` takes Tustin's rule
 # As the extended observer: steps of up to so many median ones are no gap; a gap is integrated over

@@ -6,11 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from touchline.arrays import Array
 from touchline.model.robot import Robot
 from touchline.native import core
 from touchline.value import Value, told_shortly
-
-Array = NDArray[np.float64]
 
 view = core.view
 

@@ -5,13 +5,11 @@ The same rules as the native core's (`signals.hpp`), for the baselines.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.description import AXES
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import Posture, gravity_loads
-
-Array = NDArray[np.float64]
 
 
 def read_torque(robot: Robot, q: Array, qd: Array, tau: Array) -> Array:

@@ -7,8 +7,9 @@ from pathlib import Path
 from weakref import ref
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from touchline.arrays import Array
 from touchline.detector.detector import Detection
 from touchline.detector.thresholds import Thresholds, expect_drift, make_thresholds
 from touchline.localizer.localizer import (
@@ -35,8 +36,6 @@ from touchline.result.reset import ResetChange, estimate_names, resets_in
 from touchline.result.standing import Standing
 from touchline.suggest import unknown
 from touchline.tuning import DEFAULTS, Tuning, native_tuning
-
-Array = NDArray[np.float64]
 
 REST = DEFAULTS["observer.rest_window"]  # s that an arm must have stood still before a tare
 

@@ -4,8 +4,8 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.detector.detector import Detection
 from touchline.native import core
 from touchline.observer.observer import Estimate
@@ -16,8 +16,6 @@ from touchline.result.kinds import Happened, Watch
 from touchline.result.native import Names
 from touchline.result.reset import Reset, resets_of
 from touchline.value import Value, lazily
-
-Array = NDArray[np.float64]
 
 HAPPENED = tuple(Happened)  # in the order of the core
 WATCH = tuple(Watch)  # likewise

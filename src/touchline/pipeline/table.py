@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.result.contact import Contact
 from touchline.result.native import CONTACT, Names, names_of
 from touchline.value import Field
-
-Array = NDArray[np.float64]
 
 LEFT_OUT = "-"  # a number of a field that has no column
 

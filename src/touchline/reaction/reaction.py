@@ -16,12 +16,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.reaction.state import State
 from touchline.result.contact import Contact
 
-Array = NDArray[np.float64]
 Reaction = Callable[[Contact, State], Array]
 
 SERVO_TIME = 5e-3  # s in which a velocity is taken on, torque limits permitting

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.model.description import PolicyDescription
 from touchline.model.robot import Robot
@@ -23,8 +24,6 @@ from touchline.reaction.reaction import (
 from touchline.reaction.state import Since, State
 from touchline.result.contact import Contact
 from touchline.suggest import unknown
-
-Array = NDArray[np.float64]
 
 OWN = "own:"  # begins the name of a user's own reaction in `policy`
 

@@ -5,11 +5,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.robot import Robot
-
-Array = NDArray[np.float64]
 
 RATE_STEP = 1e-5  # s over which the momentum's change along the motion is taken
 

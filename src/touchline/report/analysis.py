@@ -2,17 +2,15 @@
 """The main job on a recording: log in, estimates, contacts, events and report out."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from touchline.check.felt import felt
 from touchline.check.recording import glance
-from touchline.detector.thresholds import Thresholds
 from touchline.errors import InputError
 from touchline.folder import ResultsFolder
 from touchline.logs import Log, open_log
@@ -24,12 +22,13 @@ from touchline.observer.observer import METHODS
 from touchline.observer.samples import Samples
 from touchline.pipeline.pipeline import Pipeline
 from touchline.report.beside import Beside
-from touchline.report.comparison import Comparison, compare_log
+from touchline.report.comparison import compare_log
 from touchline.report.curves import Curves
 from touchline.report.event_pictures import EventPoses
 from touchline.report.event_windows import EventWindows
 from touchline.report.facts import watch_warnings
 from touchline.report.faint import faint_lines
+from touchline.report.outcome import Analysis, Report
 from touchline.report.outputs import (
     ANALYSIS,
     NAMES,
@@ -40,66 +39,11 @@ from touchline.report.outputs import (
     write_text,
 )
 from touchline.report.statistics import Statistics
-from touchline.result.event import Event
 from touchline.result.kinds import Watch
-from touchline.result.standing import Standing, standing_lines, unlike_told
-
-Report = Literal["full", "summary", "none"]
+from touchline.result.standing import standing_lines, unlike_told
 
 CHUNK = 1 << 13  # samples; bounds the memory, and stays in the cache
 LOOKED_AT = 20_000  # samples that are checked for wrong units, signs and weights
-EPOCH = 1e6  # s; stamps beyond it are dates
-
-
-@dataclass(frozen=True)
-class Analysis:
-    """What came out of a recording.
-
-    Attributes:
-        robot: the robot.
-        log: path of the recording.
-        out: directory with the results.
-        method: of the observer.
-        bandwidth: that overrides the description's [rad/s], or None.
-        period: median time between the first samples [s].
-        thresholds: of the detection.
-        statistics: of all samples.
-        curves: for plots; without traces where there is no page.
-        events: all events.
-        poses: how the robot stood at each of them; none where there is no page.
-        windows: the curves around them; none where there is no page.
-        comparisons: of the events with the truth of a simulated log.
-        standing: what stood on the arm without a touch, and its noise.
-        faint: touches, true or felt, that lie below what can be felt on their link, a line each.
-        report: which page there is: "full", "summary" or "none".
-        warnings: what the user should know.
-        losses: those that tell of parts of the recording that could not be read.
-    """
-
-    robot: Robot
-    log: Path
-    out: Path
-    method: str
-    bandwidth: float | None
-    period: float
-    thresholds: Thresholds
-    statistics: Statistics
-    curves: Curves
-    events: list[Event]
-    poses: EventPoses
-    windows: EventWindows
-    comparisons: list[Comparison]
-    standing: tuple[Standing, ...]
-    faint: list[str]
-    report: Report
-    warnings: list[str]
-    losses: list[str]
-
-    @property
-    def origin(self) -> float:
-        """From where the report counts time [s]: 0, or the first sample where stamps are dates."""
-        first = self.statistics.clock.first
-        return first if abs(first) > EPOCH else 0.0
 
 
 def analyze(

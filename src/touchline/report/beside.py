@@ -7,12 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.report.outputs import ESTIMATES, EVENTS
-
-Array = NDArray[np.float64]
 
 ROWS = 1 << 13  # at a time; bounds the memory
 

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from touchline.logs.truth import TrueContact, read_truth
 from touchline.result.event import Event
 
-Array = NDArray[np.float64]
 MATCH = 0.3  # s; a test may fire this long after the contact began
 
 

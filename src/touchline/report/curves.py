@@ -4,8 +4,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.detector.detector import Detection
 from touchline.errors import InputError
 from touchline.observer.observer import Estimate
@@ -13,8 +13,6 @@ from touchline.observer.samples import Samples
 from touchline.pipeline.pipeline import Pipeline
 from touchline.report.beside import Beside
 from touchline.report.traces import Traces
-
-Array = NDArray[np.float64]
 
 LOGGED = (("positions", "rad"), ("velocities", "rad/s"), ("torques", "in logged units"))
 ABSURD = 1e6  # rad, rad/s, N, Nm: no reading, as in the core

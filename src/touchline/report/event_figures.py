@@ -9,11 +9,11 @@ from html import escape
 
 import numpy as np
 
-from touchline.report.analysis import Analysis
 from touchline.report.event_pictures import caption, event_pictures, event_scene, truth_of
 from touchline.report.event_windows import Window
 from touchline.report.facts import event_doubt
 from touchline.report.html import note, section
+from touchline.report.outcome import Analysis
 from touchline.report.picture import SIGMAS
 from touchline.report.plots import joined, plot
 from touchline.report.render.skin import native_skin, robot_skin

@@ -2,11 +2,10 @@
 """Two pictures of an event: where the arm was touched, and how hard."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Floats
 from touchline.model.robot import Robot
 from touchline.report.comparison import Comparison
 from touchline.report.figure import svg_picture
@@ -14,8 +13,6 @@ from touchline.report.picture import Scene
 from touchline.report.render.camera import Size
 from touchline.report.views import views_of_contact
 from touchline.result.event import Event
-
-Array = NDArray[np.floating[Any]]
 
 SIZE = (520, 390)
 WORTH_DRAWING = 0.03  # probability of a candidate
@@ -25,9 +22,9 @@ class EventPoses:
     """Remembers, while a recording streams by, how the arm stood at each event."""
 
     def __init__(self) -> None:
-        self._poses: dict[int, Array] = {}
+        self._poses: dict[int, Floats] = {}
 
-    def add(self, time: Array, q: Array, events: Sequence[Event]) -> None:
+    def add(self, time: Floats, q: Floats, events: Sequence[Event]) -> None:
         """Take N samples: `time` (N,) [s], `q` (N, n), and the events found so far."""
         usable = np.flatnonzero(np.isfinite(time) & np.isfinite(q).all(axis=1))
         if not len(usable):
@@ -39,12 +36,12 @@ class EventPoses:
                 nearest = usable[np.abs(time[usable] - wanted).argmin()]
                 self._poses[event.id] = np.array(q[nearest], float)
 
-    def get(self, event: Event) -> Array | None:
+    def get(self, event: Event) -> Floats | None:
         """Joint positions (n,) at an event; None where they are not known."""
         return self._poses.get(event.id)
 
 
-def truth_of(event: Event, comparisons: Sequence[Comparison]) -> list[tuple[Array, Array]]:
+def truth_of(event: Event, comparisons: Sequence[Comparison]) -> list[tuple[Floats, Floats]]:
     """Point and force of the true contact that an event found, at the event's time."""
     found = [row for row in comparisons if row.event is event]
     time = event.time_of_position or event.detected
@@ -65,7 +62,7 @@ def event_pictures(scene: Scene, event: Event, size: Size = SIZE) -> str:
 
 
 def event_scene(
-    robot: Robot, event: Event, q: Array, truth: Sequence[tuple[Array, Array]] | None = None
+    robot: Robot, event: Event, q: Floats, truth: Sequence[tuple[Floats, Floats]] | None = None
 ) -> Scene:
     """What the pictures of an event show.
 
@@ -88,7 +85,7 @@ def event_scene(
     return scene
 
 
-def _position(robot: Robot, event: Event, q: Array) -> Array | None:
+def _position(robot: Robot, event: Event, q: Floats) -> Floats | None:
     """The event's point (3,) in world, on the link as it stands at `q`."""
     if event.position_link is None or event.link is None:
         return event.position
@@ -96,7 +93,7 @@ def _position(robot: Robot, event: Event, q: Array) -> Array | None:
     return T[:3, :3] @ event.position_link + T[:3, 3]
 
 
-def _disc(scene: Scene, event: Event, position: Array) -> Array | None:
+def _disc(scene: Scene, event: Event, position: Floats) -> Floats | None:
     """A covariance (3, 3) [m2] along the surface with the trace that the event tells."""
     if event.position_std is None or event.link is None:
         return None
@@ -122,7 +119,7 @@ def _show_doubt(scene: Scene, event: Event) -> None:
         scene.add_contact(where, event.force, is_point=False)
 
 
-def _middle(scene: Scene, links: set[str], force: Array, points: list[Array]) -> Array:
+def _middle(scene: Scene, links: set[str], force: Floats, points: list[Floats]) -> Floats:
     """A place (3,) for the arrow of a force whose point is not known."""
     if points:
         return np.asarray(points[0])

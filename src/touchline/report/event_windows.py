@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.report.traces import Traces
 from touchline.result.event import Event
 
-Array = NDArray[np.float64]
 Array32 = NDArray[np.float32]
 
 PIECES = 512

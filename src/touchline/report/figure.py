@@ -5,15 +5,13 @@ import base64
 from dataclasses import dataclass, replace
 from html import escape
 from io import BytesIO
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Floats
 from touchline.report.picture import COLOURS, Scene
 from touchline.report.render.camera import Camera, Size
-
-Array = NDArray[np.floating[Any]]
 
 APART = 13.0  # pixels between an arrow's tail and its label
 LINE = 19.0  # pixels between lines of text
@@ -80,7 +78,7 @@ def labels(scene: Scene, camera: Camera, size: Size = (640, 640)) -> list[Label]
     return placed
 
 
-def _beside(tail: Array, out: Array, text: str, colour: str, size: Size) -> Label:
+def _beside(tail: Floats, out: Floats, text: str, colour: str, size: Size) -> Label:
     """A label beyond an arrow's tail, inside the picture."""
     length = float(np.linalg.norm(out))
     out = out / length if length > 4 else np.array([0.9, -0.44])

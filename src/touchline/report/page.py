@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from touchline import __version__
-from touchline.report.analysis import Analysis
 from touchline.report.beside import Beside
 from touchline.report.comparison import HEAD, cells, verdict
 from touchline.report.curves import Panel
@@ -18,6 +17,7 @@ from touchline.report.event_figures import figures
 from touchline.report.facts import event_where, health_facts, joint_facts, segment_facts
 from touchline.report.html import Cell, note, section, table
 from touchline.report.lanes import lanes
+from touchline.report.outcome import Analysis
 from touchline.report.outputs import strict
 from touchline.report.plots import joined, plot
 from touchline.report.robot_section import robot_section

@@ -3,12 +3,12 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from touchline import _render
+from touchline.arrays import Floats
 from touchline.figure import CANDIDATE, FELT, TRUE
 from touchline.model.robot import Robot
 from touchline.report.render import solids
@@ -17,8 +17,6 @@ from touchline.report.render.png import png_bytes
 from touchline.report.render.skin import Piece, Triangles, native_skin, robot_skin
 
 __all__ = ["Camera", "Mark", "Scene", "png_bytes"]
-
-Array = NDArray[np.floating[Any]]
 
 SIGMAS = 2.0  # of the drawn ellipsoid
 FORCE_SCALE, SHORTEST, LONGEST = 0.010, 0.09, 0.42  # m/N, m, m, for an arm of 1.5 m
@@ -30,7 +28,7 @@ MAP, SMALL_MAP = 512, 256  # pixels across the shadow map, and across that of a 
 SKY, FLOOR = "#f8f9fb", "#e4e8ed"
 
 
-def linear(colour: str) -> Array:
+def linear(colour: str) -> Floats:
     """A colour (3,) as light, from its name `#rrggbb` in sRGB."""
     value = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
     return value**2.2
@@ -49,10 +47,10 @@ class Mark:
         is_point: whether the point is known; without, the arrow only stands for the force.
     """
 
-    position: Array
-    force: Array | None
+    position: Floats
+    force: Floats | None
     kind: str
-    covariance: Array | None
+    covariance: Floats | None
     label: str
     is_point: bool = True
 
@@ -65,7 +63,7 @@ class Scene:
         q: (n,) joint positions [rad or m].
     """
 
-    def __init__(self, robot: Robot, q: Array) -> None:
+    def __init__(self, robot: Robot, q: Floats) -> None:
         self.robot = robot
         self.q = np.array(q, float)
         self.marks: list[Mark] = []
@@ -88,7 +86,7 @@ class Scene:
         return float(np.linalg.norm(high - low)) if self.pieces else 1.0
 
     @cached_property
-    def outline(self) -> Array:
+    def outline(self) -> Floats:
         """Points (N, 3) [m] of the robot that lie farthest out, in world."""
         parts = [
             piece.outline @ T[:3, :3].T + T[:3, 3]
@@ -96,7 +94,7 @@ class Scene:
         ]
         return np.vstack(parts) if parts else np.zeros((0, 3))
 
-    def normal_at(self, link: str, point: Array) -> Array | None:
+    def normal_at(self, link: str, point: Floats) -> Floats | None:
         """Unit normal (3,) of a link's surface nearest to a point (3,) [m], both in world."""
         best, normal = np.inf, None
         for piece, T in zip(self.pieces, self._poses, strict=True):
@@ -116,10 +114,10 @@ class Scene:
 
     def add_contact(
         self,
-        position: Array,
-        force: Array | None,
+        position: Floats,
+        force: Floats | None,
         kind: str = "estimate",
-        covariance: Array | None = None,
+        covariance: Floats | None = None,
         label: str | None = None,
         is_point: bool = True,
     ) -> None:
@@ -149,7 +147,7 @@ class Scene:
         """Tint a link; `strength` from 0 to 1."""
         self._tints[link] = strength
 
-    def arrow(self, mark: Mark) -> tuple[Array, Array]:
+    def arrow(self, mark: Mark) -> tuple[Floats, Floats]:
         """Tail and tip (3,) [m] of a mark's arrow; the tip is the contact."""
         if mark.force is None:
             return mark.position, mark.position
@@ -157,7 +155,7 @@ class Scene:
         length = np.clip(FORCE_SCALE * size, SHORTEST, LONGEST) * self._unit
         return mark.position - mark.force / size * length, mark.position
 
-    def points(self) -> Array:
+    def points(self) -> Floats:
         """Points (N, 3) [m] that a picture should show: the robot and the arrows."""
         ends = [end for mark in self.marks for end in self.arrow(mark)]
         return np.vstack([self.outline, *ends])
@@ -172,7 +170,7 @@ class Scene:
         ]
         return canvas.image(self._albedo(), fine, linear(SKY), linear(FLOOR), layers)
 
-    def _albedo(self) -> Array:
+    def _albedo(self) -> Floats:
         colours = []
         for piece in self.pieces:
             base = linear(TRIM if piece.trim else SHELL)

@@ -7,18 +7,16 @@ from html import escape
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Floats
 from touchline.report.curves import Curve, Panel
-
-Array = NDArray[np.floating[Any]]
 
 GAP = 3.0  # periods without a sample
 STEPS = 2000  # of the vertical range; the paths are in whole steps
 LEFT, RIGHT, TOP, BOTTOM = 58, 10, 8, 20  # pixels around the curves, as in report.js
 
 
-def curve_path(low: Array, high: Array, least: float, largest: float, join: int = 0) -> str:
+def curve_path(low: Floats, high: Floats, least: float, largest: float, join: int = 0) -> str:
     """A curve as an SVG path of whole numbers, which a script can read back.
 
     x counts pieces of time, y steps downwards from the top of the range. Each piece goes from one
@@ -53,7 +51,7 @@ def joined(width: float, period: float) -> int:
 
 
 def value_range(
-    lows: Sequence[Array], highs: Sequence[Array], limit: float | None
+    lows: Sequence[Floats], highs: Sequence[Floats], limit: float | None
 ) -> tuple[float, ...]:
     """Least and largest value that a plot shows: all of its curves, zero, and its limit."""
     least = min([0.0, *(float(np.fmin.reduce(v, initial=np.inf)) for v in lows)])
@@ -67,7 +65,7 @@ def value_range(
 
 def plot(
     panel: Panel,
-    curves: Sequence[tuple[Array, Array]],
+    curves: Sequence[tuple[Floats, Floats]],
     span: tuple[float, float],
     shaded: Sequence[tuple[float, float, str]] = (),
     size: tuple[int, int] = (640, 120),

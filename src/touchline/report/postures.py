@@ -4,12 +4,10 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.logs import TableWriter
 from touchline.model.robot import Robot
-
-Array = NDArray[np.float64]
 
 RATE = 100.0  # postures per second, at most; a replay goes straight between them
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from touchline.model.description import JointDescription, SensorDescription
 from touchline.model.robot import Robot
-from touchline.report.analysis import Analysis
 from touchline.report.facts import detection_fact
 from touchline.report.html import Cell, section, table, text
+from touchline.report.outcome import Analysis
 
 
 def robot_section(analysis: Analysis) -> str:

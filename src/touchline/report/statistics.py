@@ -6,12 +6,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.detector.detector import Detection
 from touchline.health import Health
 from touchline.observer.observer import Estimate
 from touchline.result.kinds import Watch
-
-Array = NDArray[np.float64]
 
 
 class Moments:

@@ -3,7 +3,6 @@
 
 import numpy as np
 
-from touchline.report.analysis import Analysis
 from touchline.report.facts import (
     detection_fact,
     event_place,
@@ -11,6 +10,7 @@ from touchline.report.facts import (
     joint_facts,
     segment_facts,
 )
+from touchline.report.outcome import Analysis
 from touchline.report.outputs import CONTACTS, ESTIMATES, EVENTS, REPORT
 
 MOST_EVENTS = 40

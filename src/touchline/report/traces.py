@@ -7,7 +7,7 @@ The pieces widen as the recording goes on, so that memory does not grow with its
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from touchline.arrays import Array
 
 ROUNDING = 1e-3  # of a piece, at first
 ASTRAY = 1.0  # s; a stamp that is further ahead of a later one is wrong

@@ -1,15 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """From where a contact is seen well."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Floats
 from touchline.report.picture import Mark, Scene
 from touchline.report.render.camera import Camera
-
-Array = NDArray[np.floating[Any]]
 
 AZIMUTHS = np.deg2rad(np.arange(0, 360, 30))
 ELEVATIONS = np.deg2rad([10.0, 30.0])
@@ -37,7 +34,7 @@ def views_of_contact(scene: Scene, aspect: float = 1.0) -> tuple[Camera, Camera]
     return Camera.framing(points, first, aspect), Camera.framing(points, second, aspect)
 
 
-def sees(scene: Scene, point: Array, directions: Array) -> NDArray[np.bool_]:
+def sees(scene: Scene, point: Floats, directions: Floats) -> NDArray[np.bool_]:
     """Whether nothing of the robot lies between a point and far eyes, (D,).
 
     Args:
@@ -53,14 +50,14 @@ def _off(scene: Scene) -> float:
     return OFF * scene.extent / 1.5
 
 
-def _directions() -> Array:
+def _directions() -> Floats:
     """Directions (N, 3) from the robot to where the camera may be."""
     azimuth, elevation = (x.ravel() for x in np.meshgrid(AZIMUTHS + 0.35, ELEVATIONS))
     level = np.cos(elevation)
     return np.column_stack([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])
 
 
-def _scores(scene: Scene, directions: Array) -> Array:
+def _scores(scene: Scene, directions: Floats) -> Floats:
     """How good the views from directions (D, 3) are."""
     scores = -0.8 * np.abs(np.arcsin(directions[:, 2]) - PREFERRED)
     # The arm from its side: spread out rather than foreshortened.
@@ -74,7 +71,7 @@ def _scores(scene: Scene, directions: Array) -> Array:
     return scores
 
 
-def _mark_scores(scene: Scene, mark: Mark, directions: Array) -> Array:
+def _mark_scores(scene: Scene, mark: Mark, directions: Floats) -> Floats:
     """How well a mark is seen: its point unhidden, its arrow unhidden and from the side."""
     tail, tip = scene.arrow(mark)
     scores = 1.5 * sees(scene, tip, directions)

@@ -5,16 +5,17 @@
 arm while the tool touches the workpiece.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.figure import thin
 from touchline.model.robot import Robot, load_robot
 from touchline.observer.joint_momentum import JointMomentumObserver, tool_wrench
 from touchline.reproduce.aim import place_along
-from touchline.reproduce.experiment import Check, Experiment, Row, Table, Tick
+from touchline.reproduce.experiment import Check, Drawing, Experiment, Row, Table, Tick
 from touchline.reproduce.replay import FORCE, Replay
 from touchline.simulation.contacts import Profile, ScriptedContact, ScriptedForces
 from touchline.simulation.control import JointImpedance, Setpoint, Trajectory, hold
@@ -22,8 +23,6 @@ from touchline.simulation.noise import SensorNoise
 from touchline.simulation.places import PlaceFinder
 from touchline.simulation.scene import Run, simulate
 from touchline.simulation.setup import Setup, read_setup
-
-Array = NDArray[np.float64]
 
 STEPS = 2
 SECONDS = 5.0
@@ -138,10 +137,8 @@ def tool_moment(application: Application, wrench: Array) -> Array:
     return wrench[:, 3:] - np.cross(tip, wrench[:, :3])
 
 
-def run(seed: int, tick: Tick) -> Experiment:
-    """Runs the experiment."""
-    from touchline.reproduce.applications_drawing import drawings
-
+def run(seed: int, tick: Tick, drawings: Callable[..., dict[str, Drawing]]) -> Experiment:
+    """Runs the experiment; `drawings` makes its pictures."""
     robot = load_robot("sara-full")
     parts = []
     for make in (screw, teaching):

@@ -4,8 +4,8 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.figure import (
     COLORS,
     PAGE,
@@ -19,8 +19,6 @@ from touchline.reproduce.applications import Application, tool_moment
 from touchline.reproduce.arm_view import ArmView
 from touchline.reproduce.experiment import Drawing
 from touchline.reproduce.replay import FORCE
-
-Array = NDArray[np.float64]
 
 NAMES = {
     "screw": ("(a) Screwing", "Elbow: force"),

@@ -5,12 +5,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from touchline.arrays import Array
 from touchline.model.robot import Robot
 from touchline.model.surface import mechanism_surfaces
-
-Array = NDArray[np.float64]
 
 PLAIN, DARK = np.array([0.93, 0.935, 0.945]), np.array([0.50, 0.53, 0.57])
 LIGHT = np.array([0.25, 0.5, 0.83])  # direction towards the light: right, towards us, up

@@ -7,12 +7,10 @@ Metres and radians weigh alike, as is usual where a condition number of a 6 x n 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import point_jacobian
-
-Array = NDArray[np.float64]
 
 TRIALS, FINALISTS = 4000, 2
 STEP = 1e-6  # of the difference quotients [rad]

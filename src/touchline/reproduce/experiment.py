@@ -5,10 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+from touchline.arrays import Array
 
-Array = NDArray[np.float64]
 Tick = Callable[[str], None]  # called at the end of each step of the work, with its name
 Row = Mapping[str, str | float | int | None]
 

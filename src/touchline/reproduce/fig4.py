@@ -6,20 +6,19 @@ the joint's torque sensor does not see. Inside the arm it cancels, so the extern
 force-torque sensor is zero throughout, and whatever a method reports there is its error.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.figure import thin
 from touchline.observer.classical import ClassicalObserver
 from touchline.observer.observer import Observer
 from touchline.reproduce.conditioning import EndEffector
-from touchline.reproduce.experiment import Check, Experiment, Row, Table, Tick
+from touchline.reproduce.experiment import Check, Drawing, Experiment, Row, Table, Tick
 from touchline.reproduce.passage import BEST, SINGULAR, Passage, passage
-
-Array = NDArray[np.float64]
 
 AMPLITUDE = 10.0  # of the disturbance [Nm]
 JOINT = 4  # joint 5, counted from 0
@@ -115,10 +114,8 @@ def rows(outcome: Outcome) -> list[Row]:
     ]
 
 
-def run(seed: int, tick: Tick) -> Experiment:
-    """Runs the experiment."""
-    from touchline.reproduce.fig4_drawing import drawings
-
+def run(seed: int, tick: Tick, drawings: Callable[..., dict[str, Drawing]]) -> Experiment:
+    """Runs the experiment; `drawings` makes its pictures."""
     way = passage(seed, SPAN)
     tick("motion")
     outcomes = []

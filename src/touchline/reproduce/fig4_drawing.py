@@ -4,8 +4,8 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.figure import (
     COLORS,
     COLUMN,
@@ -22,8 +22,6 @@ from touchline.figure import (
 from touchline.reproduce.experiment import Drawing, Row
 from touchline.reproduce.fig4 import JOINT, Outcome
 from touchline.reproduce.passage import BEST, SINGULAR
-
-Array = NDArray[np.float64]
 
 FORCE, MOMENT = slice(0, 3), slice(3, 6)
 CEILING = 1e4  # of the drawn condition number

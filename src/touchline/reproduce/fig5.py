@@ -6,17 +6,16 @@ forces. While the arm springs back the other push goes on, which is when the pap
 ghost.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.figure import thin
-from touchline.reproduce.experiment import Check, Experiment, Row, Table, Tick
+from touchline.reproduce.experiment import Check, Drawing, Experiment, Row, Table, Tick
 from touchline.reproduce.overlapping import Pushes, pushed
 from touchline.reproduce.replay import FORCE, Replay
-
-Array = NDArray[np.float64]
 
 STEPS = 1
 STRUCTURE, HAND = "base", "wrist"  # the segments
@@ -78,10 +77,8 @@ def point_errors(replay: Replay, segment: str) -> Array:
     return np.where(strong, error, np.nan)
 
 
-def run(seed: int, tick: Tick) -> Experiment:
-    """Runs the experiment."""
-    from touchline.reproduce.fig5_drawing import drawings
-
+def run(seed: int, tick: Tick, drawings: Callable[..., dict[str, Drawing]]) -> Experiment:
+    """Runs the experiment; `drawings` makes its pictures."""
     pushes = pushed(seed)
     tick("pushes")
     after = recoils(pushes)

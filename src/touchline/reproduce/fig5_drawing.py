@@ -4,7 +4,6 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from touchline.figure import (
     COLORS,
@@ -31,8 +30,6 @@ from touchline.reproduce.fig5 import (
 from touchline.reproduce.fig5 import ghost as ghost_of
 from touchline.reproduce.overlapping import Pushes
 from touchline.reproduce.replay import FORCE, Replay
-
-Array = NDArray[np.float64]
 
 TONES = {STRUCTURE: "#1f5d94", HAND: "#c8602c"}
 NAMES = {STRUCTURE: "structure", HAND: "end effector"}

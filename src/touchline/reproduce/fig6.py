@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The paper's figure 6: single and multiple contacts where joint torques alone do not suffice."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.robot import Robot, load_robot
 from touchline.reproduce.aim import place_along
-from touchline.reproduce.experiment import Check, Experiment, Row, Table, Tick
+from touchline.reproduce.experiment import Check, Drawing, Experiment, Row, Table, Tick
 from touchline.reproduce.replay import Replay
 from touchline.reproduce.wrench_routes import METHODS, NAMES, Routes
 from touchline.simulation.contacts import Profile, ScriptedContact
@@ -20,8 +21,6 @@ from touchline.simulation.scenario import base_touch, scripted, three_touches
 from touchline.simulation.scene import Run
 from touchline.simulation.setup import read_setup
 from touchline.simulation.truth import Simulated
-
-Array = NDArray[np.float64]
 
 PUSHES = 12  # on each link
 STRENGTH = 20.0  # of all pushes [N]
@@ -122,10 +121,8 @@ def verdicts(routes: Routes, row: int) -> list[Verdict]:
     return out
 
 
-def run(seed: int, tick: Tick) -> Experiment:
-    """Runs the experiment."""
-    from touchline.reproduce.fig6_drawing import drawings
-
+def run(seed: int, tick: Tick, drawings: Callable[..., dict[str, Drawing]]) -> Experiment:
+    """Runs the experiment; `drawings` makes its pictures."""
     robot = load_robot("sara-full")
     cases = []
     for name in CASES:

@@ -6,14 +6,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.figure import save
 from touchline.folder import make_folder
 from touchline.reproduce.experiment import Experiment, Row
 from touchline.reproduce.page import page_text
-
-Array = NDArray[np.float64]
 
 
 def write_experiment(experiment: Experiment, out: Path) -> None:

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.robot import load_robot
 from touchline.reproduce.aim import place_along
 from touchline.reproduce.replay import Replay
@@ -20,8 +20,6 @@ from touchline.simulation.setup import read_setup
 from touchline.simulation.shapes import CollisionShapes
 from touchline.simulation.simulator import run as run_plant
 from touchline.simulation.truth import Simulated
-
-Array = NDArray[np.float64]
 
 SECONDS = 4.5
 CLEAR = 0.35  # how far a ball is drawn back, out of the way of the arm [m]

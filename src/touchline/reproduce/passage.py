@@ -5,14 +5,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.robot import Robot, load_robot
 from touchline.reproduce.conditioning import EndEffector, best_conditioned, nearby_singularity
 from touchline.reproduce.prescribed import Motion, Wave, coupling, prescribed_motion
 from touchline.simulation.setup import read_setup
-
-Array = NDArray[np.float64]
 
 RATE = 1000.0  # Hz
 BEST, SINGULAR = 2.0, 6.0  # when the arm passes these configurations [s]

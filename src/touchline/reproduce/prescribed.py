@@ -9,12 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.robot import Robot
 from touchline.simulation.plant import Plant
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

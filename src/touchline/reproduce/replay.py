@@ -7,13 +7,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.robot import Robot
 from touchline.observer.observer import Estimate, Observer
 from touchline.pipeline.pipeline import Pipeline
 from touchline.result.event import Event
 from touchline.simulation.truth import Simulated, filter_truth
-
-Array = NDArray[np.float64]
 
 FORCE = slice(0, 3)
 GRACE = 0.1  # an event may outlast its contact by this much [s], for the filters to empty

@@ -53,7 +53,8 @@ def reproduce(names: Sequence[str], out: Path, seed: int = 0) -> list[Experiment
                 bar.set_description(f"{name}: {what}")
                 bar.update()
 
-            experiment = module.run(seed, tick)
+            drawings = import_module(f"{module.__name__}_drawing").drawings
+            experiment = module.run(seed, tick, drawings)
             write_experiment(experiment, out)
             tick("written")
             experiments.append(experiment)

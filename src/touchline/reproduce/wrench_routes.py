@@ -7,13 +7,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.localizer.skin import Skin
 from touchline.observer.classical import ClassicalObserver
 from touchline.observer.joint_momentum import tool_wrench
 from touchline.reproduce.replay import FORCE, Replay
 from touchline.simulation.truth import filter_truth
-
-Array = NDArray[np.float64]
 
 METHODS = ("eq5", "classical", "ours")
 NAMES = {"eq5": "joint torques, (5)", "classical": "classical, (6)", "ours": "ours"}

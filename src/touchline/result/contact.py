@@ -4,14 +4,12 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.result.kinds import ContactLevel, Status
 from touchline.result.line import line_point
 from touchline.result.native import CONTACT, decoders
 from touchline.value import Value, lazily
-
-Array = NDArray[np.float64]
 
 UNKNOWNS = 5  # of one contact
 

@@ -5,14 +5,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.result.contact import Candidate, least_contacts
 from touchline.result.kinds import ContactLevel, Happened, Status
 from touchline.result.native import EVENT, decoders
 from touchline.value import Value, lazily
-
-Array = NDArray[np.float64]
 
 
 @dataclass(kw_only=True, eq=False, repr=False)

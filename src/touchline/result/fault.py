@@ -5,13 +5,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.description import AXES
 from touchline.native import core
 from touchline.result.kinds import Fault
-
-Array = NDArray[np.float64]
 
 FAULTS = tuple(Fault(name) for name in core.FAULTS)  # in the order of the core
 

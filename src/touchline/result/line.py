@@ -2,9 +2,9 @@
 """The line of force action of a wrench, and whether one force alone can make it."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from touchline.arrays import Array
 
 
 def line_point(wrench: ArrayLike) -> Array:

@@ -5,14 +5,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from touchline.arrays import Array
 from touchline.native import core
 from touchline.result.kinds import ContactLevel, Status, Zone
 from touchline.value import Decode, Field
-
-Array = NDArray[np.float64]
 
 CONTACT = Field.table(core.CONTACT_FIELDS)
 EVENT = Field.table(core.EVENT_FIELDS)

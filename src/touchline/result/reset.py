@@ -4,10 +4,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from touchline.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.robot import Robot
 from touchline.pipeline.pipeline import Pipeline, Result
 from touchline.reaction.reactor import Command, Reactor
@@ -20,8 +20,6 @@ from touchline.simulation.noise import SensorNoise
 from touchline.simulation.plant import Plant
 from touchline.simulation.readings import Readings
 from touchline.simulation.sensing import sense
-
-Array = NDArray[np.float64]
 
 
 class LiveSensors:

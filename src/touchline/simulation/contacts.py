@@ -5,11 +5,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from touchline.arrays import Array
 from touchline.simulation.plant import Plant
 
-Array = NDArray[np.float64]
 SHAPES = ("step", "ramp", "smooth", "half_sine")
 
 

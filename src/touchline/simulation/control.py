@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from touchline.arrays import Array
 from touchline.simulation.plant import Plant
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

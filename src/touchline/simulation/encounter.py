@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
@@ -25,8 +25,6 @@ from touchline.simulation.shapes import CollisionShapes
 from touchline.simulation.simulator import Contacts, Rates, run
 from touchline.simulation.touchable import TouchableSurface
 from touchline.simulation.truth import Truth
-
-Array = NDArray[np.float64]
 
 HIT_TIME = 0.15  # s: the observer has settled by then
 PUSH_ON = 0.15  # s that the robot's own motion goes on at full speed after that

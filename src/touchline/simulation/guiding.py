@@ -11,8 +11,8 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
 from touchline.simulation.contacts import Touch, cross, no_touch
@@ -22,8 +22,6 @@ from touchline.simulation.plant import Plant
 from touchline.simulation.readings import Readings
 from touchline.simulation.sensing import sense
 from touchline.simulation.setup import Setup
-
-Array = NDArray[np.float64]
 
 STIFFNESS, DAMPING = 400.0, 25.0  # N/m, N s/m of a hand and arm
 STRONGEST = 80.0  # N that the person applies

@@ -4,12 +4,10 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.simulation.contacts import Forces, Touch, no_touch
 from touchline.simulation.plant import Plant
-
-Array = NDArray[np.float64]
 
 RISE = 0.03  # s; no hand's force jumps
 GONE = 0.05  # N; a released hand that weak has left

@@ -7,15 +7,13 @@ touched point moves along with that centre and does not turn about it.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.simulation.contacts import ScriptedContact, cross
 from touchline.simulation.plant import Plant
 from touchline.simulation.readings import Readings
 from touchline.simulation.setup import Setup
 from touchline.simulation.truth import Truth
-
-Array = NDArray[np.float64]
 
 
 def can_hold(plant: Plant, log_rate: float) -> bool:

@@ -10,15 +10,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.extras import need
 from touchline.model.mechanism import Inertia, Joint, Mechanism
 from touchline.model.robot import Robot
 from touchline.model.transforms import joint_motion, pose_rpy
 
-Array = NDArray[np.float64]
 Addition = Callable[[Any, dict[str, Any]], None]
 
 

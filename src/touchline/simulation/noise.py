@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
 from touchline.simulation.readings import Readings
 
-Array = NDArray[np.float64]
 NOISE_RATE = 1000.0  # Hz at which the sigmas hold; white noise grows with the root of the rate
 
 
@@ -54,8 +54,6 @@ class SensorNoise:
 
     def disturb(self, robot: Robot, readings: Readings, rng: np.random.Generator) -> Readings:
         """Readings with noise, offsets, drift, cross-talk and delay."""
-        from touchline.simulation.sensing import delayed
-
         time = readings.time
         wrench = delayed(time, self._mixed(readings.wrench, rng), self.wrench_delay)
         wrench = wrench + self._six(time, wrench.shape, rng)
@@ -132,3 +130,18 @@ class SensorNoise:
         turning = np.array([joints[name].kind == "revolute" for name in robot.joint_names])
         step = 2 * np.pi / 2**self.position_bits
         return np.where(turning, step * np.round(q / step), q)
+
+
+def delayed(time: Array, values: Array, delay: float) -> Array:
+    """What is logged at t when it is `delay` [s] late: linear between samples, held at the start.
+
+    Args:
+        time: (N,) [s].
+        values: (N, ...).
+        delay: [s].
+    """
+    if delay == 0.0:
+        return np.array(values)
+    flat = values.reshape(len(time), -1)
+    late = [np.interp(time - delay, time, column) for column in flat.T]
+    return np.column_stack(late).reshape(values.shape)

@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from touchline.model.transforms import rotation_to_axis
 from touchline.simulation.contacts import Touch, no_touch
@@ -24,7 +24,6 @@ from touchline.simulation.pressing import (
     strength,
 )
 
-Array = NDArray[np.float64]
 NAME = "obstacle"
 PAD_MASS, PAD_RADIUS = 0.1, 0.03  # kg, m
 PAD_STIFFNESS = 1e5  # N/m between pad and robot

@@ -5,14 +5,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.model.robot import Robot
 from touchline.simulation.control import Trajectory
 from touchline.simulation.touchable import CLEARANCE, SurfacePoint, TouchableSurface
 
-Array = NDArray[np.float64]
 FRICTION = 0.4  # a scripted force stays within this cone while it acts
 INSTANTS = 7  # at which that is verified
 TRIES = 20_000

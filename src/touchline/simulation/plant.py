@@ -12,14 +12,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.extras import need
 from touchline.model.mechanism import Mechanism
 from touchline.model.robot import Robot
 from touchline.simulation.mujoco_model import Addition, build_model
 
-Array = NDArray[np.float64]
 HOLDING_FREQUENCY = 25.0  # rad/s of a joint on springs of its own
 FASTEST_DECAY = 1.5  # of a damper, per step; Runge-Kutta's limit is 2.8
 

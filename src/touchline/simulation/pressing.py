@@ -11,13 +11,12 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.simulation.contacts import NOTHING, Touch, cross
 from touchline.simulation.plant import Plant
 from touchline.simulation.shapes import OTHER, ROBOT
 
-Array = NDArray[np.float64]
 Force = tuple[Array, Array]  # point and force, (3,) each
 
 IMPEDANCE = 0.02

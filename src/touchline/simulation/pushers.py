@@ -7,8 +7,9 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from touchline.arrays import Array
 from touchline.simulation.contacts import Touch, no_touch
 from touchline.simulation.mujoco_model import quaternion
 from touchline.simulation.plant import Plant
@@ -20,7 +21,6 @@ from touchline.simulation.pressing import (
     strength,
 )
 
-Array = NDArray[np.float64]
 CONTACT_DAMPING = 0.05  # ratio; the rail damps too, and more would make touching down a jump
 
 

@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
@@ -26,7 +26,6 @@ from touchline.simulation.touchable import (
 )
 from touchline.simulation.truth import Simulated, Truth
 
-Array = NDArray[np.float64]
 PAUSE = 1.0  # s between two pushes of one log, over which no filter integrates
 TRIES = 10_000
 

@@ -5,11 +5,9 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.simulation.plant import Plant, Reading
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.model.robot import Robot
 from touchline.simulation.contacts import Profile, ScriptedContact, ScriptedForces
@@ -23,7 +23,6 @@ from touchline.simulation.shapes import CollisionShapes
 from touchline.simulation.touchable import structure, structure_links, touchable_links
 from touchline.simulation.truth import Simulated
 
-Array = NDArray[np.float64]
 PUSHER_TRIES = 100
 ROUGHNESS, ROUGH_WITHIN = 5e-4, 0.012  # m by which colliding shapes may stand off, how far around
 

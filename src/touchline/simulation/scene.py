@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot
 from touchline.simulation.control import (
@@ -24,7 +24,6 @@ from touchline.simulation.setup import Setup
 from touchline.simulation.simulator import Contacts, Rates, run
 from touchline.simulation.truth import Simulated
 
-Array = NDArray[np.float64]
 Tracking = ComputedTorque | JointImpedance
 
 

@@ -4,15 +4,13 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.description import AXES, JointDescription, SensorDescription
 from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
-from touchline.simulation.noise import SensorNoise
+from touchline.simulation.noise import SensorNoise, delayed
 from touchline.simulation.readings import Readings
-
-Array = NDArray[np.float64]
 
 
 def sense(
@@ -77,18 +75,3 @@ def _sensor_log(sensor: SensorDescription, s: int, readings: Readings) -> Array:
     shown = delayed(readings.time, shown, sensor.delay)
     shown[:, [axis not in sensor.axes for axis in AXES]] = np.nan
     return shown
-
-
-def delayed(time: Array, values: Array, delay: float) -> Array:
-    """What is logged at t when it is `delay` [s] late: linear between samples, held at the start.
-
-    Args:
-        time: (N,) [s].
-        values: (N, ...).
-        delay: [s].
-    """
-    if delay == 0.0:
-        return np.array(values)
-    flat = values.reshape(len(time), -1)
-    late = [np.interp(time - delay, time, column) for column in flat.T]
-    return np.column_stack(late).reshape(values.shape)

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.model.robot import Robot
 
-Array = NDArray[np.float64]
 FILE = "simulation.yaml"  # beside the model
 
 

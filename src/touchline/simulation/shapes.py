@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.mechanism import Geometry, Mechanism
 from touchline.model.surface import Surface, link_surface
 from touchline.simulation.mujoco_model import Addition, quaternion
 
-Array = NDArray[np.float64]
 PIECES = 20  # of a link at most
 MIN_TRIANGLES = 4
 ROBOT, OTHER = 1, 2  # who collides: robot with others, never among themselves

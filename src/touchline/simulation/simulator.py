@@ -11,15 +11,13 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.simulation.contacts import Touch
 from touchline.simulation.control import Controller
 from touchline.simulation.plant import Plant
 from touchline.simulation.readings import Readings
 from touchline.simulation.truth import Truth, TruthRecorder
-
-Array = NDArray[np.float64]
 
 
 class Contacts(Protocol):

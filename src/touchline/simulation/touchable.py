@@ -7,8 +7,8 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.model.robot import Robot
 from touchline.model.surface import link_surface
@@ -16,7 +16,6 @@ from touchline.model.transforms import rotation_to_axis
 from touchline.simulation.mujoco_model import build_model
 from touchline.simulation.shapes import surfaces_for_rays
 
-Array = NDArray[np.float64]
 CLEARANCE = 0.03  # m free along the outward normal
 STEP_OFF = 1e-5  # m from a surface before a ray looks for the next
 

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.observer.samples import Samples
 from touchline.simulation.contacts import Touch
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

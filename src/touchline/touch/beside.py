@@ -11,12 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.localizer.localizer import TORQUE_ERROR
 from touchline.model.robot import Robot
-
-Array = NDArray[np.float64]
 
 STEPS = 40  # of a path that are compared; between them a parabola tells
 WAVER = 0.3  # of its force, 1 sigma: how much a hand that holds the arm wavers

@@ -5,11 +5,9 @@ from dataclasses import dataclass, field
 from math import erf, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.touch.grip import CLEAR, MISS
-
-Array = NDArray[np.float64]
 
 SHORTEST = 0.03  # s; no finger presses for less: what is as short is a doubt of the localizer
 TAP = 0.3  # s; a shorter press is a tap

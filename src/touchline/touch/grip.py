@@ -10,9 +10,8 @@ from collections import deque
 from operator import itemgetter
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from touchline.arrays import Array
 
 PAUSE = 0.005  # s between two looks: a hand closes in some 50 ms
 STEADY = 0.1  # s for which the hand has to hold: a finger that slides or lifts is never so still

@@ -2,9 +2,8 @@
 """Digits as they are commonly written in one stroke: examples until a user's own are learnt."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from touchline.arrays import Array
 
 # Corners of the strokes, u to the right and v up, in the order in which they are written.
 DIGITS: dict[str, tuple[tuple[tuple[float, float], ...], ...]] = {

@@ -12,12 +12,9 @@ from dataclasses import dataclass
 from math import lgamma
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array, Mask
 from touchline.localizer.skin import Patch, Skin
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 POINTS = 200  # pushes on each link: some 2 cm apart on a forearm
 CONE = 0.3  # rad: one sigma, in two directions, between a push and the surface's normal

@@ -4,11 +4,10 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from touchline.arrays import Array
 from touchline.touch.stroke import Stroke, resampled
-
-Array = NDArray[np.float64]
 
 POINTS = 16  # of a normalized stroke; with 32 as many digits of unseen writers are read
 DIRECTIONS = 1.0  # weight of directions beside places; half and double: 0.2 % fewer are read

@@ -10,12 +10,10 @@ from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.touch.gesture import EASING, LIFTED
 from touchline.touch.spot import AVERAGE, BEFORE, LEAST_STEP, LIKELIER, TorqueSpots
-
-Array = NDArray[np.float64]
 
 BLOCK = 0.01  # s, over which torques are averaged before anything else
 EDGE = 3  # blocks, over which the beginning and the end of a touch are looked for

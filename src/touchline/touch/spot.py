@@ -11,13 +11,11 @@ this hand wavers on this spot, from the touches that taught it.
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.localizer.skin import Skin
 from touchline.model.description import TaughtTouch
 from touchline.touch.pushes import Directions, Mask, Pushes, log_sum
-
-Array = NDArray[np.float64]
 
 WAVER_FORCE = np.geomspace(0.02, 0.4, 7)  # rad: a hand's direction wavers by one of these (1-23°)
 WAVER_PLACE = np.geomspace(0.001, 0.02, 7)  # m: its place by one of these, all equally likely

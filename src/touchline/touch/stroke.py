@@ -5,11 +5,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from touchline.arrays import Array
 from touchline.figure import FELT
-
-Array = NDArray[np.float64]
 
 SMOOTHING = 0.02  # s, 1 sigma; what a hand writes in 2 s has nothing quicker than some 0.1 s
 FIRM = 0.5  # of the median force; a finger that is only just landing or lifting writes nothing

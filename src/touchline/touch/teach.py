@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.model.description import TaughtTouch, WidgetDescription
 from touchline.model.robot import Robot
@@ -15,8 +15,6 @@ from touchline.pipeline.pipeline import Pipeline
 from touchline.result.event import Event
 from touchline.touch.spot import LEAST_STEP, POSTURE
 from touchline.touch.touch import TorqueStep, Touch
-
-Array = NDArray[np.float64]
 
 RADIUS = 0.02  # m, of a button about a fingertip's place at least
 SCATTER = 3.0  # standard deviations of the taught places that a button holds

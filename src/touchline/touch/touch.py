@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.detector.detector import Level
 from touchline.localizer.skin import Patch, Skin, in_link
 from touchline.model.description import WidgetDescription
@@ -26,8 +26,6 @@ from touchline.touch.spot import AVERAGE as TORQUE_AVERAGE
 from touchline.touch.spot import BEFORE, LIKELIER, TorqueSpots
 from touchline.touch.stroke import Stroke
 from touchline.touch.widget import Widget
-
-Array = NDArray[np.float64]
 
 DWELL = 0.03  # s; by then 99 % of the collisions are called so (docs/reaction.md), and no command
 FULL = 0.5  # of the largest step of a press; a smaller mean is of a force that rises or falls

@@ -5,12 +5,10 @@ from dataclasses import dataclass
 from math import erf
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.model.description import WidgetDescription
-
-Array = NDArray[np.float64]
 
 DEPTH = 0.03  # m; a touch farther than this from a pad's plane or a dial's is not on it
 

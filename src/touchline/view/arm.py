@@ -4,8 +4,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import mass_matrix
@@ -25,8 +25,6 @@ from touchline.view.faults import SensorFault
 from touchline.view.motion import Switched
 from touchline.view.reach import pressed
 from touchline.view.reacting import ReactingImpedance
-
-Array = NDArray[np.float64]
 
 PHYSICS, RATE = 2000.0, 1000.0  # Hz
 SPEED = 0.4  # rad/s of the fastest joint

@@ -5,15 +5,13 @@ from collections.abc import Sequence
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.robot import Robot
 from touchline.result.contact import Candidate, Contact
 from touchline.result.line import line_point
 from touchline.view.markers import ContactMarker
 from touchline.view.scene import RobotScene
-
-Array = NDArray[np.float64]
 
 PULL = (120, 124, 130)
 LIKELY, MOST_CANDIDATES = 0.03, 12  # candidates less probable, or more, are not shown

@@ -5,12 +5,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
-
-Array = NDArray[np.float64]
 
 OFFSET, TORQUE_OFFSET = 5.0, 3.0  # N, Nm
 DRIFT, LARGEST_DRIFT = 1.0, 10.0  # N/s, N

@@ -4,11 +4,9 @@
 from collections import deque
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.simulation.hands import Hand
-
-Array = NDArray[np.float64]
 
 SPEED = 0.12  # m/s; a mouse jumps, a finger does not
 FRICTION = 0.3  # by which it drags the surface along

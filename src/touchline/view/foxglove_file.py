@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.extras import need
 from touchline.folder import replaced_file
 from touchline.model.surface import Surface
@@ -25,8 +25,6 @@ from touchline.view.moments import (
 )
 from touchline.view.pose import quaternion_to, quaternions
 from touchline.view.replay import Replay
-
-Array = NDArray[np.float64]
 
 WORLD = "world"  # with "_" behind it where a link is called so
 SHAFT, HEAD, HEAD_SHARE, DOT = 0.012, 0.03, 0.25, 0.03  # m, m, of the length, m

@@ -6,9 +6,8 @@ from typing import Protocol
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from touchline.arrays import Array
 
 
 class Touching(Protocol):

@@ -4,9 +4,8 @@
 from collections import deque
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from touchline.arrays import Array
 
 SECONDS = 10.0
 ROWS_PER_SECOND = 25

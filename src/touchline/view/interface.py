@@ -6,8 +6,8 @@ from dataclasses import replace
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.localizer.skin import Skin
 from touchline.model.description import WidgetDescription
@@ -28,8 +28,6 @@ from touchline.view.methods import Felt
 from touchline.view.path import TaughtPath
 from touchline.view.server import PageServer
 from touchline.view.widgets import WidgetScene
-
-Array = NDArray[np.float64]
 
 PART = 10  # samples after which a finger is moved on
 FORCE, STIFFNESS = 8.0, 100.0  # N, %; the page begins with

@@ -6,13 +6,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.robot import Robot
 from touchline.result.contact import Contact
 from touchline.simulation.hands import Hand
 from touchline.simulation.truth import Truth
 from touchline.view.methods import Felt
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

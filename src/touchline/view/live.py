@@ -12,8 +12,8 @@ from html import escape
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.check.felt import felt as felt_on_links
 from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot, load_robot
@@ -30,8 +30,6 @@ from touchline.view.plots import WrenchPlots
 from touchline.view.readout import Speed, readout
 from touchline.view.scene import RobotScene, dress
 from touchline.view.server import PageServer
-
-Array = NDArray[np.float64]
 
 FRAME = 1.0 / 30.0  # s between two pictures
 READOUT, PLOTS = 0.2, 0.25  # s between two of them

@@ -6,13 +6,12 @@ from typing import Literal
 import numpy as np
 import trimesh
 import viser
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.figure import CANDIDATE, FELT, TRUE
 from touchline.view.moments import METRES_PER_NEWTON
 from touchline.view.pose import quaternion_to, quaternions
 
-Array = NDArray[np.float64]
 Colour = tuple[int, int, int]
 
 COLOURS: dict[str, Colour] = {

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.detector.detector import Detector
 from touchline.detector.thresholds import make_thresholds
 from touchline.errors import InputError
@@ -22,8 +22,6 @@ from touchline.observer.samples import Samples
 from touchline.pipeline.pipeline import Pipeline
 from touchline.result.contact import Contact
 from touchline.simulation.truth import filter_truth
-
-Array = NDArray[np.float64]
 
 LEVELS = ("contact", "collision")
 THINNED = 5  # of so many samples the classical way takes one

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.description import AXES
 from touchline.model.surface import Surface, link_surface
 from touchline.result.contact import Contact
 from touchline.result.event import Event
 from touchline.view.replay import Replay
 
-Array = NDArray[np.float64]
 Colour = tuple[int, int, int]
 
 RATE = 30.0  # Hz, of what is seen in space: as screens do

@@ -2,11 +2,9 @@
 """A pose or a motion about it, with a smooth way from one to the other."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.simulation.control import Setpoint, Trajectory
-
-Array = NDArray[np.float64]
 
 EASE = 2.0  # s from standing to moving, and back
 

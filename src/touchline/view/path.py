@@ -2,11 +2,9 @@
 """A path through taught postures, followed to and fro at a speed that may change."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.simulation.control import Setpoint
-
-Array = NDArray[np.float64]
 
 LEAST = 0.02  # rad; a posture nearer to the last one is the same
 

@@ -3,13 +3,10 @@
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 from viser import uplot
 
 from touchline.figure import X, Y, Z
 from touchline.view.history import SECONDS, History
-
-Array = NDArray[np.float64]
 
 COLOURS = (X, Y, Z)
 HEIGHT = 160  # pixels

@@ -2,9 +2,8 @@
 """Orientations as the page wants them."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from touchline.arrays import Array
 
 
 def quaternions(R: Array) -> Array:

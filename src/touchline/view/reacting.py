@@ -2,8 +2,8 @@
 """The arm's controller on the live page: its own impedance, until a reaction takes over."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.description import PolicyDescription, PolicyRule
 from touchline.model.robot import Robot
 from touchline.reaction.reactor import Reactor
@@ -12,8 +12,6 @@ from touchline.result.contact import Contact
 from touchline.simulation.control import JointImpedance
 from touchline.simulation.plant import Plant
 from touchline.view.motion import Switched
-
-Array = NDArray[np.float64]
 
 CALM = 1.0  # s without contact, after which what a collision called for ends
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.folder import is_unfinished, settle
 from touchline.logs.truth import TrueContact, read_truth
@@ -19,8 +19,6 @@ from touchline.model.robot import load_robot
 from touchline.result.contact import Candidate, Contact
 from touchline.result.event import Event
 from touchline.view.tables import TimedTable
-
-Array = NDArray[np.float64]
 
 NEEDED = ("estimates.parquet", "contacts.parquet", "postures.parquet", "events.json")
 ORIGIN = "analysis.json"

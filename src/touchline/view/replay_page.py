@@ -6,7 +6,6 @@ from threading import RLock
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
 from touchline.check.felt import felt
 from touchline.result.contact import Contact
@@ -19,8 +18,6 @@ from touchline.view.scene import RobotScene, dress
 from touchline.view.server import PageServer
 from touchline.view.signals import JOINTS, SignalPlot, force_on, signal_groups, torque_of
 from touchline.view.timeline import Timeline
-
-Array = NDArray[np.float64]
 
 EPOCH = 1e6  # s; stamps beyond it are dates, and the page counts from the first
 FRAME = 1 / 30  # s; between pictures

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.extras import need
 from touchline.folder import replaced_file
 from touchline.view.moments import (
@@ -23,8 +23,6 @@ from touchline.view.moments import (
 )
 from touchline.view.pose import quaternions
 from touchline.view.replay import Replay
-
-Array = NDArray[np.float64]
 
 TIMELINE = "time"
 RADIUS, DOT = 0.006, 0.015  # m

@@ -8,12 +8,12 @@ import trimesh
 import viser
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.mechanism import Geometry, Link
 from touchline.model.robot import Robot
 from touchline.model.surface import Surface, link_surface
 from touchline.view.pose import quaternions
 
-Array = NDArray[np.float64]
 Colour = tuple[int, int, int]
 
 SHELL, TRIM = (241, 242, 244), (93, 100, 109)

@@ -5,14 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 from viser import uplot
 
+from touchline.arrays import Array
 from touchline.figure import X, Y, Z
 from touchline.model.robot import Robot
 from touchline.view.replay import Replay
-
-Array = NDArray[np.float64]
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8d7cc0", "#7f868d", "#56b4e9", "#a6761d")
 AXES = {"x": X, "y": Y, "z": Z}

@@ -3,14 +3,12 @@
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 from viser import uplot
 
+from touchline.arrays import Array
 from touchline.result.event import Event
 from touchline.view.replay import Replay
 from touchline.view.signals import Box, now_series, with_now
-
-Array = NDArray[np.float64]
 
 CONTACT, COLLISION = "#e0a33a", "#d0503f"
 THICK = 0.33  # half of a bar, of the distance between rows

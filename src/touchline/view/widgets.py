@@ -6,12 +6,12 @@ import trimesh
 import viser
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.localizer.skin import Patch
 from touchline.touch.stroke import Stroke
 from touchline.touch.touch import Press, Touch
 from touchline.touch.widget import Widget
 
-Array = NDArray[np.float64]
 Colour = tuple[int, int, int]
 
 REST: dict[str, Colour] = {

@@ -16,16 +16,16 @@ from pathlib import Path
 
 import numpy as np
 
-from touchline.bench.classification.interactions import BEGIN, Interaction, InteractionSampler
 from touchline.bench.request import prepare_results
 from touchline.bench.tables import Row, aligned
-from touchline.bench.touches import TouchSampler
 from touchline.localizer.skin import Skin
 from touchline.model.description import ZONES
 from touchline.model.robot import Robot, load_robot
 from touchline.numbers import check_least
 from touchline.pipeline.pipeline import Pipeline
 from touchline.result.event import Event
+from touchline.trials.interactions import BEGIN, Interaction, InteractionSampler
+from touchline.trials.touches import TouchSampler
 
 KINDS = ("contact", "collision")
 CHUNK = 20

@@ -12,19 +12,16 @@ from itertools import count
 from time import thread_time_ns
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.bench.localization.arm import TIERS
-from touchline.bench.localization.cell import Begin, Cell
-from touchline.bench.localization.scene import arm_and_skin, make_scene
-from touchline.bench.localization.trial import make_pipeline
+from touchline.arrays import Array
 from touchline.bench.tables import Row, aligned
-from touchline.bench.touches import Signals, resting_signals
 from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
 from touchline.numbers import check_least
-
-Array = NDArray[np.float64]
+from touchline.trials.arms import TIERS
+from touchline.trials.cell import Begin, Cell
+from touchline.trials.scene import arm_and_skin, make_pipeline, make_scene
+from touchline.trials.touches import Signals, resting_signals
 
 BUDGET = 125.0  # us: the observer runs at 8 kHz on the robot (Iskandar et al., ICRA 2021)
 REPEATS = 3

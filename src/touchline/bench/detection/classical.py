@@ -14,13 +14,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.bench.detection.free_motion import (
-    MotionMaker,
-    Path,
-    Trajectory,
-    generator,
-    random_trajectory,
-)
+from touchline.arrays import Array
 from touchline.bench.detection.pushes import AFTER, BEFORE, PushMaker, random_pushes
 from touchline.bench.detection.work import (
     CALIBRATED,
@@ -37,8 +31,14 @@ from touchline.observer.classical import moved_mass
 from touchline.observer.dynamics import inverse_dynamics, mass_matrix, posture
 from touchline.observer.observer import Observer
 from touchline.observer.samples import Samples
+from touchline.trials.free_motion import (
+    MotionMaker,
+    Path,
+    Trajectory,
+    generator,
+    random_trajectory,
+)
 
-Array = NDArray[np.float64]
 _Recording = tuple[Trajectory, Samples]
 
 # The wrench as it comes, and low-passed once more with the bandwidth of the joint residual.

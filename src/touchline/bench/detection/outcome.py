@@ -4,13 +4,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.bench.detection.work import Setting, description
 from touchline.detector.calibration import Statistics, count_alarms
 from touchline.detector.tail import Tail
-
-Array = NDArray[np.float64]
 
 GOALS = {
     (1000.0, 1e-3): (20.0, 6e-3),

@@ -5,21 +5,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.bench.detection.free_motion import (
+from touchline.arrays import Array
+from touchline.localizer.skin import Skin
+from touchline.model.robot import Robot
+from touchline.observer.dynamics import contact_loads
+from touchline.observer.samples import Samples
+from touchline.trials.free_motion import (
     MotionMaker,
     Trajectory,
     generator,
     random_trajectory,
 )
-from touchline.bench.touches import Touch, TouchSampler
-from touchline.localizer.skin import Skin
-from touchline.model.robot import Robot
-from touchline.observer.dynamics import contact_loads
-from touchline.observer.samples import Samples
-
-Array = NDArray[np.float64]
+from touchline.trials.touches import Touch, TouchSampler
 
 BEFORE, AFTER = 1.5, 0.05  # s, of motion before and after the onset
 

@@ -7,15 +7,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.bench.detection.free_motion import (
-    MotionMaker,
-    generator,
-    imperfect,
-    random_trajectory,
-    with_noise,
-)
+from touchline.arrays import Array
 from touchline.bench.detection.pushes import AFTER, BEFORE, PushMaker, random_pushes
 from touchline.detector import calibration as cal
 from touchline.detector.detector import Detector
@@ -24,8 +17,13 @@ from touchline.model.description import RowCalibration
 from touchline.model.robot import Robot, load_robot
 from touchline.observer.observer import Observer
 from touchline.observer.samples import Samples
-
-Array = NDArray[np.float64]
+from touchline.trials.free_motion import (
+    MotionMaker,
+    generator,
+    imperfect,
+    random_trajectory,
+    with_noise,
+)
 
 METHODS = cal.METHODS
 ERROR = 0.02  # 1 sigma of the inertias

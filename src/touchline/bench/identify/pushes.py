@@ -6,8 +6,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.bench.identify.arms import Arm
 from touchline.calibrate.run import calibrate
 from touchline.logs import open_log, write_table
@@ -15,8 +15,6 @@ from touchline.model.robot import Robot, load_robot
 from touchline.observer.dynamics import contact_loads
 from touchline.observer.samples import Samples
 from touchline.pipeline.pipeline import Pipeline
-
-Array = NDArray[np.float64]
 
 FORCE, LASTS, RISE = 25.0, 0.5, 0.05  # N, s, s: of any direction
 BEYOND = 0.1  # m, of the place from the last joint along its axis

@@ -10,8 +10,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.bench.identify.arms import ARMS, KINOVA, Arm
 from touchline.bench.identify.pushes import FORCE, detect
 from touchline.errors import InputError
@@ -22,8 +22,6 @@ from touchline.identify.rest import grids_of, learn, regions_of
 from touchline.logs import open_log
 from touchline.model.robot import Robot, load_robot
 from touchline.observer.samples import Samples
-
-Array = NDArray[np.float64]
 
 CHUNK = 1 << 15
 

@@ -5,14 +5,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.mechanism import Inertia, Mechanism
 from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
-
-Array = NDArray[np.float64]
 
 PAYLOAD = 0.3  # kg, 5 cm out of the last link's origin
 SHIFT = 5e-3  # m, by which centres of mass are off

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 from touchline.bench.imperfect.faults import FAULTS
 from touchline.bench.imperfect.trial import Outcome, Trials
-from touchline.bench.localization.arm import load_arm
 from touchline.bench.tables import Row, aligned
+from touchline.trials.arms import load_arm
 
 ARMS = ("sara", "panda", "ur5")
 NOISE = 1  # tier of the localization benchmark: 0.05 N, 0.01 Nm, 0.05 Nm

@@ -5,19 +5,17 @@ from dataclasses import dataclass, replace
 from itertools import count
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.bench.detection.free_motion import MotionMaker, Trajectory, random_trajectory
+from touchline.arrays import Array
 from touchline.bench.imperfect.faults import Fault
-from touchline.bench.touches import Touch, TouchSampler
 from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import contact_loads
 from touchline.pipeline.pipeline import Pipeline
 from touchline.result.event import Event
 from touchline.result.kinds import Status
-
-Array = NDArray[np.float64]
+from touchline.trials.free_motion import MotionMaker, Trajectory, random_trajectory
+from touchline.trials.touches import Touch, TouchSampler
 
 RATE = 1000.0  # Hz
 SECONDS = 3.5  # of a trial

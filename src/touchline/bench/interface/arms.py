@@ -5,17 +5,15 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.bench.interface.hand import Finger, signals_of
-from touchline.bench.localization.wrong_model import wrong_model
+from touchline.arrays import Array
 from touchline.localizer.skin import Skin
 from touchline.model.description import WidgetDescription
 from touchline.model.robot import Robot
 from touchline.pipeline.pipeline import Pipeline
 from touchline.touch.touch import Touch, TouchEvent
-
-Array = NDArray[np.float64]
+from touchline.trials.finger import Finger, signals_of
+from touchline.trials.wrong_model import wrong_model
 
 ERROR = 0.02  # 1 sigma of the relative errors of masses and inertias
 COUNT = 4  # arms with errors of their own, which take turns
@@ -62,7 +60,7 @@ class Arm:
 
 @cache
 def arm(number: int, tier: int = 1) -> Arm:
-    """An arm with so much noise (`bench.localization.arm.TIERS`); numbers repeat after `COUNT`."""
+    """An arm with so much noise (`trials.arms.TIERS`); numbers repeat after `COUNT`."""
     if number >= COUNT:
         return arm(number % COUNT, tier)
     robot, real = wrong_model("panda", tier, ERROR, number, identified=True)

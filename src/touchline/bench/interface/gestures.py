@@ -5,11 +5,13 @@ import sys
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from touchline.bench.interface.arms import LINKS, PERIOD, arm
-from touchline.bench.interface.hand import (
+from touchline.bench.tables import Row
+from touchline.localizer.skin import Patch, Skin
+from touchline.model.description import WidgetDescription
+from touchline.trials.finger import (
     Finger,
     find_pad,
     middle_of,
@@ -17,11 +19,6 @@ from touchline.bench.interface.hand import (
     sliding,
     times,
 )
-from touchline.bench.tables import Row
-from touchline.localizer.skin import Patch, Skin
-from touchline.model.description import WidgetDescription
-
-Array = NDArray[np.float64]
 
 Made = tuple[list[Finger], float] | None  # fingers, and when the gesture ends [s]
 

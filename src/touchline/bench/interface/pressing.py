@@ -4,11 +4,15 @@
 import sys
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
+from touchline.arrays import Array
 from touchline.bench.interface.arms import LINKS, PERIOD, arm
-from touchline.bench.interface.hand import (
+from touchline.bench.tables import Row
+from touchline.localizer.skin import Skin
+from touchline.model.description import WidgetDescription
+from touchline.touch.widget import Widget
+from touchline.trials.finger import (
     Finger,
     find_pad,
     middle_of,
@@ -18,12 +22,6 @@ from touchline.bench.interface.hand import (
     sliding,
     times,
 )
-from touchline.bench.tables import Row
-from touchline.localizer.skin import Skin
-from touchline.model.description import WidgetDescription
-from touchline.touch.widget import Widget
-
-Array = NDArray[np.float64]
 
 RADIUS = 0.02  # m, of a button
 GAPS = {"3 cm between rims": 0.07, "1 cm between rims": 0.05}  # m, between two middles

@@ -7,18 +7,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
-from touchline.bench.real.recordings import Recording, read_touched, touched_files
+from touchline.arrays import Array
 from touchline.bench.tables import Row
 from touchline.errors import InputError
 from touchline.model.robot import Robot
 from touchline.pipeline.pipeline import Pipeline
 from touchline.touch.teach import teach
 from touchline.touch.touch import Touch, TouchEvent
-
-Array = NDArray[np.float64]
+from touchline.trials.real_recordings import Recording, read_touched, touched_files
 
 FIRST = "panda_touches"  # folder of the recordings that the rules were made with
 TAUGHT = 3  # touches that teach a spot

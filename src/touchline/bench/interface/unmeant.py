@@ -5,15 +5,12 @@ import sys
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
-from touchline.bench.detection.free_motion import MotionMaker, random_trajectory
+from touchline.arrays import Array
 from touchline.bench.interface.arms import LINKS, PERIOD, Arm, arm
-from touchline.bench.interface.hand import rising
 from touchline.bench.interface.pressing import RADIUS
 from touchline.bench.tables import Row
-from touchline.bench.touches import TouchSampler
 from touchline.detector.tail import poisson_interval
 from touchline.localizer.skin import Patch
 from touchline.model.description import WidgetDescription
@@ -21,8 +18,9 @@ from touchline.observer.dynamics import contact_loads
 from touchline.observer.samples import Samples
 from touchline.pipeline.pipeline import Pipeline
 from touchline.touch.touch import Touch
-
-Array = NDArray[np.float64]
+from touchline.trials.finger import rising
+from touchline.trials.free_motion import MotionMaker, random_trajectory
+from touchline.trials.touches import TouchSampler
 
 SECONDS = 60.0  # of a recording
 FIRST, PAUSE = 2.0, (1.0, 6.0)  # s until the first push, and between two

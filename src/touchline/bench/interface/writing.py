@@ -8,19 +8,17 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
+from touchline.arrays import Array
 from touchline.bench.interface.arms import LINKS, PERIOD, arm
-from touchline.bench.interface.hand import find_pad, sliding
-from touchline.bench.localization.arm import TIERS
 from touchline.bench.tables import Row
 from touchline.errors import InputError
 from touchline.figure import FELT, TRUE
 from touchline.touch.recognizer import Recognizer
 from touchline.touch.stroke import Stroke, resampled
-
-Array = NDArray[np.float64]
+from touchline.trials.arms import TIERS
+from touchline.trials.finger import find_pad, sliding
 
 WRITERS = 7494  # of the 10,992 pen digits, those of the 30 writers that a recognizer may learn from
 DIGIT = 0.05  # m, of the larger side

@@ -2,16 +2,14 @@
 """The baselines of the localization benchmark, on the same signals as our estimator."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.bench.localization.line_rules import first_entry, nearest_to_line
 from touchline.bench.localization.particle_filter import ParticleFilter
-from touchline.bench.touches import Signals
 from touchline.detector.detector import Detection
 from touchline.localizer.skin import Skin
 from touchline.observer.observer import Estimate
-
-Array = NDArray[np.float64]
+from touchline.trials.touches import Signals
 
 BASELINES = {
     "first": "first entry of the line (Iskandar et al., ICRA 2021)",

@@ -4,12 +4,10 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.bench.localization.touched import GROSS, NEAR, Touched
 from touchline.bench.tables import Row
-
-Array = NDArray[np.float64]
 
 TOUCHES: Row = (
     "body", "> 10 cm", "median", "p99", "RMS", "RMS found", "lag", "force", "90 % holds", "unsure",

@@ -15,14 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.bench.localization.touched import NEAR
-from touchline.bench.touches import Touch
 from touchline.localizer.skin import Patch, Skin
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import contact_loads
 from touchline.result.contact import Contact
-
-Array = NDArray[np.float64]
+from touchline.trials.touches import Touch
 
 MOST_FORCE = 100.0  # N: larger ones are not looked at
 ALONG = 40  # forces that are tried on a line of forces

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from touchline.bench.localization.arm import TIERS
 from touchline.bench.localization.columns import percent
-from touchline.bench.localization.scene import Scene
 from touchline.bench.localization.touched import NEAR, event_distances
 from touchline.bench.tables import Row, aligned
 from touchline.pipeline.pipeline import Pipeline
+from touchline.trials.arms import TIERS
+from touchline.trials.scene import Scene
 
 SHOWN = 0.02  # s after an onset: the filter shows most of the force
 HEAD: Row = (

@@ -11,9 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.result.contact import Contact
-
-Array = NDArray[np.float64]
 
 DRAWS = 2000
 LEAST_STD = 1e-6  # m; a sharper posterior is not meant

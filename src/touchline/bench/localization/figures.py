@@ -6,18 +6,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.bench.localization.arm import TIERS
+from touchline.arrays import Array
 from touchline.bench.localization.baselines import BASELINES
-from touchline.bench.localization.cell import Cell
-from touchline.bench.localization.scene import arm_and_skin
 from touchline.bench.localization.surface_map import SurfaceMap, framing
 from touchline.bench.localization.touched import NEAR
 from touchline.bench.localization.trial import Trial
 from touchline.figure import FAINT, PAGE, SHADES, new_figure, panel_label, save, styled
-
-Array = NDArray[np.float64]
+from touchline.trials.arms import TIERS
+from touchline.trials.cell import Cell
+from touchline.trials.scene import arm_and_skin
 
 SIZE = (520, 640)  # pixels of one view
 POSES = {

@@ -2,12 +2,10 @@
 """What the line of force action alone says: the classical rules, to be measured beside ours."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.localizer.skin import Skin
 from touchline.result.line import line_point
-
-Array = NDArray[np.float64]
 
 
 def first_entry(skin: Skin, q: Array, segment: str, wrench: Array) -> Array | None:

@@ -4,9 +4,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from touchline.arrays import Array
 
 
 def distances(places: Array, named: Sequence[Array | None]) -> Array:

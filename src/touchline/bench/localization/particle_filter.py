@@ -14,11 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.localizer.skin import Skin
 from touchline.model.transforms import rotation_to_axis
 from touchline.observer.dynamics import contact_loads
-
-Array = NDArray[np.float64]
 
 EDGES = 4  # of the friction pyramid
 PIVOTS = 16  # rounds of the quadratic program

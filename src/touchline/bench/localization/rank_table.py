@@ -5,9 +5,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from touchline.bench.localization.arm import TIERS
 from touchline.bench.localization.trial import UNKNOWNS, Trial
 from touchline.bench.tables import Row, aligned
+from touchline.trials.arms import TIERS
 
 
 def rank_table(trials: Iterable[Trial]) -> str:

@@ -16,17 +16,9 @@ from time import perf_counter
 
 import numpy as np
 
-from touchline.bench.localization.arm import ARMS
 from touchline.bench.localization.baselines import BASELINES
-from touchline.bench.localization.cell import Begin, Cell, Hands
 from touchline.bench.localization.course import course_table, hands_table
 from touchline.bench.localization.rank_table import rank_table
-from touchline.bench.localization.scene import (
-    arm_and_skin,
-    make_scene,
-    told_and_real,
-    touched_segments,
-)
 from touchline.bench.localization.segment_table import segment_tables
 from touchline.bench.localization.table import (
     baseline_table,
@@ -34,11 +26,20 @@ from touchline.bench.localization.table import (
     published,
     tables,
 )
-from touchline.bench.localization.trial import Trial, make_pipeline, run_trial
+from touchline.bench.localization.trial import Trial, run_trial
 from touchline.bench.localization.trials_file import write_trials
 from touchline.bench.request import prepare_results
 from touchline.errors import InputError
 from touchline.numbers import check_least
+from touchline.trials.arms import ARMS
+from touchline.trials.cell import Begin, Cell, Hands
+from touchline.trials.scene import (
+    arm_and_skin,
+    make_pipeline,
+    make_scene,
+    told_and_real,
+    touched_segments,
+)
 
 CHUNK = 25  # runs handed to a process at once
 TIMED = 6  # runs whose updates are timed

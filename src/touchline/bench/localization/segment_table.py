@@ -5,12 +5,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from touchline.bench.localization.arm import TIERS
-from touchline.bench.localization.cell import Cell
 from touchline.bench.localization.columns import TOUCHES, percent, rate_columns, touch_columns
 from touchline.bench.localization.touched import Touched
 from touchline.bench.localization.trial import Trial
 from touchline.bench.tables import Row, aligned
+from touchline.trials.arms import TIERS
+from touchline.trials.cell import Cell
 
 HEAD: Row = (
     "arm", "segment", "touched", "touches", "found", "95 % interval", "in the set",

@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline import _render
+from touchline.arrays import Array
 from touchline.localizer.skin import Skin
 from touchline.report.render.camera import Camera, Size
 from touchline.report.render.skin import smooth
-
-Array = NDArray[np.float64]
 
 NEIGHBOURS = 12  # points whose values make up the colour of a place
 MAP = 512  # pixels across the shadow map

@@ -5,9 +5,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from touchline.bench.localization.arm import TIERS
 from touchline.bench.localization.baselines import BASELINES
-from touchline.bench.localization.cell import Cell
 from touchline.bench.localization.columns import (
     TOUCHES,
     millimetres,
@@ -19,6 +17,8 @@ from touchline.bench.localization.columns import (
 from touchline.bench.localization.touched import GROSS, NEAR, Touched
 from touchline.bench.localization.trial import Trial
 from touchline.bench.tables import Row, aligned
+from touchline.trials.arms import TIERS
+from touchline.trials.cell import Cell
 
 HEAD: Row = (
     "contacts", "begin", "arm", "runs", "found", "95 % interval", "as event", "in the set",

@@ -6,18 +6,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.bench.localization.credibility import credibility
 from touchline.bench.localization.matching import distances, match
-from touchline.bench.localization.scene import Scene
-from touchline.bench.touches import Touch
 from touchline.model.robot import Robot
 from touchline.pipeline.pipeline import Pipeline
 from touchline.result.contact import Contact
 from touchline.result.event import Event
-
-Array = NDArray[np.float64]
+from touchline.trials.scene import Scene
+from touchline.trials.touches import Touch
 
 NEAR, GROSS = 0.0225, 0.1  # m: what counts as found, and as grossly wrong
 FAST = 0.2  # m/s: slower contacts tell nothing of lag

@@ -6,22 +6,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from touchline.bench.localization.baselines import baseline_places
-from touchline.bench.localization.cell import Cell
 from touchline.bench.localization.compatible import surface_shares
 from touchline.bench.localization.course import Course, follow_course
 from touchline.bench.localization.matching import distances, match
-from touchline.bench.localization.scene import (
-    FRICTION,
-    Scene,
-    make_scene,
-    told_and_real,
-)
 from touchline.bench.localization.touched import NEAR, Touched, judge, last_contacts
 from touchline.detector.detector import Detection
 from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
 from touchline.observer.observer import Estimate
-from touchline.pipeline.pipeline import Pipeline
+from touchline.trials.cell import Cell
+from touchline.trials.scene import (
+    FRICTION,
+    Scene,
+    make_pipeline,
+    make_scene,
+    told_and_real,
+)
 
 UNKNOWNS = 10  # of two contacts
 
@@ -113,24 +113,6 @@ def _baseline(
     apart = distances(scene.places[:, -1], named)
     mine = match(apart)
     return tuple(np.nan if k is None else float(apart[i, k]) for i, k in enumerate(mine))
-
-
-def make_pipeline(
-    robot: Robot, skin: Skin, rule: str = "likelihood", model_error: float = 0.0
-) -> Pipeline:
-    """The pipeline as the benchmark uses it.
-
-    It is told what is true of the benchmark: sensors err by the noise figures alone, how wrong the
-    model is (where calibration does not tell), and how large the friction cone is.
-    """
-    return Pipeline(
-        robot,
-        skin=skin,
-        rule=rule,
-        torque_error=0.0,
-        friction=FRICTION,
-        model_error=model_error,
-    )
 
 
 def pair_rank(robot: Robot, bodies: list[str]) -> int:

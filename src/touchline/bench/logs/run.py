@@ -15,13 +15,13 @@ import numpy as np
 
 from touchline.bench.logs.files import serialized, write_mcap, write_sqlite
 from touchline.bench.tables import Row, aligned
-from touchline.bench.touches import TouchSampler, touch_loads
 from touchline.localizer.skin import Skin
 from touchline.logs import open_log, write_table
 from touchline.memory import peak_megabytes
 from touchline.model.robot import Robot, load_robot
 from touchline.observer.observer import Observer
 from touchline.observer.samples import Samples
+from touchline.trials.touches import TouchSampler, touch_loads
 
 ROBOT = "sara-full"
 ROUNDS = 3

@@ -9,13 +9,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.bench.observer.motion import Motion, fast_motion
+from touchline.arrays import Array
 from touchline.model.robot import Robot
 from touchline.observer.observer import Observer
-
-Array = NDArray[np.float64]
+from touchline.trials.fast_motion import Motion, fast_motion
 
 
 @dataclass(frozen=True)

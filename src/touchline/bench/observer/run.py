@@ -15,14 +15,14 @@ from pathlib import Path
 import numpy as np
 
 from touchline.bench.observer.discretization import DiscretizationError, discretization_errors
-from touchline.bench.observer.motion import Motion, fast_motion, pushed_link
 from touchline.bench.observer.tables import error_table, timing_table
 from touchline.bench.observer.timing import Candidate, Timing, measure
 from touchline.errors import InputError
 from touchline.model.description import JointDescription, SensorDescription
-from touchline.model.robot import Robot, load_robot
+from touchline.model.robot import Robot
 from touchline.numbers import check_least
 from touchline.observer.observer import Observer
+from touchline.trials.fast_motion import Motion, fast_motion, pushed_link, two_sensor_arm
 
 BANDWIDTH = 100.0  # [rad/s]
 RUN_SAMPLES, SAMPLES = 8000, 250  # per round: of `run`, and of what takes one at a time
@@ -78,23 +78,6 @@ class ObserverBenchmark:
             raise InputError(f"output is '{path}', allowed endings: .json, .csv")
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
-
-
-def two_sensor_arm(bandwidth: float = BANDWIDTH) -> Robot:
-    """`sara-full` with the sensors at base and wrist alone.
-
-    Args:
-        bandwidth: K [rad/s] of all rows.
-    """
-    full = load_robot("sara-full")
-    sensors = full.description.sensors[:2]
-    description = replace(
-        full.description,
-        sensors=sensors,
-        bandwidth_joints=(bandwidth,) * len(full.joint_names),
-        bandwidth_sensors={sensor.name: bandwidth for sensor in sensors},
-    )
-    return Robot(description, full.mechanism)
 
 
 def run_benchmark(

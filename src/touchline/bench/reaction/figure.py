@@ -7,15 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from touchline.bench.reaction.trial import (
-    QUIET,
-    SCENES,
-    Case,
-    Trial,
-    encounter_of,
-    outcome_of,
-    pressing,
-)
 from touchline.figure import (
     FAINT,
     PAGE,
@@ -27,6 +18,15 @@ from touchline.figure import (
     styled,
 )
 from touchline.reaction.reaction import REACTIONS
+from touchline.trials.reacting import (
+    QUIET,
+    SCENES,
+    Case,
+    Trial,
+    encounter_of,
+    outcome_of,
+    pressing,
+)
 
 LOOKS = dict(zip(REACTIONS, (FAINT, *SHADES), strict=False))
 MARKERS = dict(zip(REACTIONS, "os^v", strict=True))

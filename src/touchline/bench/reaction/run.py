@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from touchline.bench.reaction.guiding import PART, Guided, guide, told
-from touchline.bench.reaction.trial import MASSES, QUIET, SCENES, SPRINGS, Case, Trial, cases, play
 from touchline.bench.request import prepare_results
 from touchline.bench.tables import Row, aligned
 from touchline.numbers import check_least
 from touchline.reaction.reaction import REACTIONS
+from touchline.trials.guiding import PART, Guided, guide, told
+from touchline.trials.reacting import MASSES, QUIET, SCENES, SPRINGS, Case, Trial, cases, play
 
 IN_TIME = 0.3  # s within which a clamping force is to be gone
 SAME = 1.005  # peaks that differ by less are the same

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.bench.matching import match
-from touchline.bench.real.recordings import Recording
 from touchline.pipeline.pipeline import Pipeline
 from touchline.result.event import Event
+from touchline.trials.real_recordings import Recording
 
 SET = 0.9  # of the probability, that the smallest set of links holds
 SURE = 0.9  # probability of the link named first

@@ -16,9 +16,9 @@ from touchline.bench.real.judged import (
     judge_free,
     judge_touched,
 )
-from touchline.bench.real.recordings import at_rate, read_free, read_touched, touched_files
 from touchline.bench.tables import Row, aligned
 from touchline.errors import InputError
+from touchline.trials.real_recordings import at_rate, read_free, read_touched, touched_files
 
 TOUCHED_HEAD = (
     "file",

@@ -5,18 +5,16 @@ from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.bench.reliability.faults import Channel, FaultType, injected
-from touchline.bench.reliability.recordings import PUSHED, RELEASED, Recording
+from touchline.arrays import Array
 from touchline.health import Health
 from touchline.observer.observer import Estimate
 from touchline.observer.samples import Samples
 from touchline.pipeline.pipeline import Pipeline
 from touchline.result.event import Event
 from touchline.result.kinds import ContactLevel, Fault
-
-Array = NDArray[np.float64]
+from touchline.trials.faults import Channel, FaultType, injected
+from touchline.trials.recordings import PUSHED, RELEASED, Recording
 
 SURE = 0.9  # probability of a body: a confident link
 SAME = 0.02  # s by which the times of an event may differ

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from touchline.bench.reliability.faults import FAULTS, cases_of
 from touchline.bench.reliability.judge import Outcome, judge, listen
-from touchline.bench.reliability.recordings import PHASES, ROBOTS, record, robots
 from touchline.bench.tables import Row, aligned
 from touchline.pipeline.pipeline import Pipeline
+from touchline.trials.faults import FAULTS, cases_of
+from touchline.trials.recordings import PHASES, ROBOTS, record, robots
 
 TOLD, WRONG = 0.98, 0.005  # shares that are required
 

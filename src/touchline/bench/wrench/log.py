@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.mechanism import Mechanism
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import posture
@@ -23,7 +24,6 @@ from touchline.simulation.setup import read_setup
 from touchline.simulation.simulator import Rates, run
 from touchline.simulation.truth import Truth
 
-Array = NDArray[np.float64]
 PHYSICS = 4000.0  # Hz
 
 

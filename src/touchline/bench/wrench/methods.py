@@ -12,15 +12,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.bench.wrench.log import Log
 from touchline.observer.classical import ClassicalObserver
 from touchline.observer.dynamics import point_jacobian, posture, to_world
 from touchline.observer.observer import Observer
 from touchline.simulation.truth import filter_truth
-
-Array = NDArray[np.float64]
 
 OPEN = float("inf")  # the bandwidth of no low-pass
 BANDWIDTHS = (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # [rad/s]

@@ -5,14 +5,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.bench.wrench.log import Log
 from touchline.bench.wrench.methods import Method, Trial
 from touchline.bench.wrench.scenarios import Scenario, Scene
 from touchline.bench.wrench.stage import IMPACT, QUIET, START
 
-Array = NDArray[np.float64]
 Key = tuple[str, str, str]  # scene, segment, quantity; the scene of all logs together is ""
 
 DEFAULT = 100.0  # bandwidth of ours as shipped, and the least where nothing touches [rad/s]

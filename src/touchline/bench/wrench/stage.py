@@ -19,8 +19,6 @@ from touchline.simulation.places import PlaceFinder
 from touchline.simulation.scene import wandering
 from touchline.simulation.setup import read_setup
 
-Array = NDArray[np.float64]
-
 START = 0.5  # of each log, while filters settle [s]
 QUIET = 1.5  # until then nothing touches a log with impacts [s]
 SPEED = 1.0  # of the fastest joint of an arm that is touched [rad/s]

@@ -3,13 +3,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.floating[Any]]
-Vector = Sequence[float] | Array
+from touchline.arrays import Floats
+
+Vector = Sequence[float] | Floats
 Size = tuple[int, int]
 
 FIELD_OF_VIEW = 0.42  # rad, vertical: long enough a lens that parallel lines look parallel
@@ -26,8 +26,8 @@ class Camera:
         focal: focal length in heights of the image.
     """
 
-    eye: Array
-    axes: Array
+    eye: Floats
+    axes: Floats
     focal: float
 
     @staticmethod
@@ -53,7 +53,7 @@ class Camera:
 
     @staticmethod
     def framing(
-        points: Array,
+        points: Floats,
         direction: Vector,
         aspect: float = 1.0,
         margin: float = 0.06,
@@ -85,7 +85,7 @@ class Camera:
         eye = np.array([*middle, min(distances)]) @ axes
         return Camera(eye, axes, 0.5 / float(height))
 
-    def project(self, points: Array, size: Size) -> tuple[Array, Array]:
+    def project(self, points: Floats, size: Size) -> tuple[Floats, Floats]:
         """Where points appear in an image.
 
         Args:
@@ -102,12 +102,12 @@ class Camera:
         pixels = seen[..., :2] * scale[..., None] + np.array(size) / 2
         return pixels, depth
 
-    def rays(self, size: Size) -> Array:
+    def rays(self, size: Size) -> Floats:
         """Directions (H * W, 3) in world through the middles of all pixels, of unit depth."""
         row, column = np.divmod(np.arange(size[0] * size[1]), size[0])
         return self.rays_at(column, row, size)
 
-    def rays_at(self, column: NDArray, row: NDArray, size: Size) -> Array:
+    def rays_at(self, column: NDArray, row: NDArray, size: Size) -> Floats:
         """Directions (N, 3) in world through the middles of pixels, of unit depth."""
         scale = 1 / (self.focal * size[1])
         x, y = (column + (0.5 - size[0] / 2)) * scale, (row + (0.5 - size[1] / 2)) * scale
@@ -115,7 +115,7 @@ class Camera:
         return np.stack([right[i] * x + down[i] * y + forward[i] for i in range(3)], axis=1)
 
 
-def _axes(forward: Array, up: Vector) -> Array:
+def _axes(forward: Floats, up: Vector) -> Floats:
     """Rows right, down, forward; any right where `forward` is along `up`."""
     forward = forward / np.linalg.norm(forward)
     right = np.cross(forward, np.asarray(up, float))

@@ -3,18 +3,14 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from touchline import _render
+from touchline.arrays import Floats, Index
 from touchline.model.mechanism import Geometry, Link
 from touchline.model.robot import Robot
 from touchline.model.surface import Surface, link_surface
-
-Array = NDArray[np.floating[Any]]
-Index = NDArray[np.int64]
 
 CREASE = np.cos(np.deg2rad(35.0))  # edges sharper than this stay sharp
 
@@ -29,11 +25,11 @@ class Triangles:
         part: (T,) number of what each belongs to.
     """
 
-    corners: Array
-    normals: Array
+    corners: Floats
+    normals: Floats
     part: Index
 
-    def moved(self, T: Array) -> "Triangles":
+    def moved(self, T: Floats) -> "Triangles":
         """The triangles in another frame, by the pose (4, 4) of this one in it."""
         turned = self.normals @ T[:3, :3].T
         return Triangles(self.corners @ T[:3, :3].T + T[:3, 3], turned, self.part)
@@ -66,12 +62,12 @@ class Piece:
     closed: bool
 
     @cached_property
-    def middles(self) -> Array:
+    def middles(self) -> Floats:
         """Middles (T, 3) [m] of the triangles."""
         return self.triangles.corners.mean(axis=1)
 
     @cached_property
-    def outline(self) -> Array:
+    def outline(self) -> Floats:
         """The points (N, 3) [m] that lie farthest out in some direction."""
         from scipy.spatial import ConvexHull, QhullError
 

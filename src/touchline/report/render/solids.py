@@ -1,20 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Simple solids to mark things with: arrows, balls, ellipsoids, rods."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Floats
 from touchline.model.transforms import pose, rotation_to_axis
 from touchline.report.render.skin import Triangles
-
-Array = NDArray[np.floating[Any]]
 
 SIDES = 32
 
 
-def arrow(tail: Array, tip: Array, radius: float) -> Triangles:
+def arrow(tail: Floats, tip: Floats, radius: float) -> Triangles:
     """A round arrow from `tail` (3,) to `tip` (3,) [m], its shaft of the radius [m]."""
     length = float(np.linalg.norm(tip - tail))
     head = min(6.5 * radius, 0.7 * length)
@@ -23,19 +19,19 @@ def arrow(tail: Array, tip: Array, radius: float) -> Triangles:
     return _turned(np.array(profile, float)).moved(_frame(tail, tip - tail))
 
 
-def rod(start: Array, end: Array, radius: float) -> Triangles:
+def rod(start: Floats, end: Floats, radius: float) -> Triangles:
     """A round rod between two points (3,) [m]."""
     length = float(np.linalg.norm(end - start))
     profile = np.array([(0, 0), (0, radius), (length, radius), (length, 0)], float)
     return _turned(profile).moved(_frame(start, end - start))
 
 
-def ball(centre: Array, radius: float) -> Triangles:
+def ball(centre: Floats, radius: float) -> Triangles:
     """A ball about `centre` (3,) [m]."""
     return ellipsoid(centre, np.eye(3) * radius)
 
 
-def ellipsoid(centre: Array, axes: Array) -> Triangles:
+def ellipsoid(centre: Floats, axes: Floats) -> Triangles:
     """An ellipsoid about `centre` (3,) [m] with half axes in the columns of `axes` (3, 3) [m]."""
     angle = np.linspace(-np.pi / 2, np.pi / 2, SIDES // 2 + 1)
     sphere = _turned(np.column_stack([np.sin(angle), np.cos(angle).clip(0)]))
@@ -45,7 +41,7 @@ def ellipsoid(centre: Array, axes: Array) -> Triangles:
     return Triangles(corners, normals, sphere.part)
 
 
-def spread(covariance: Array, sigmas: float, least: float) -> Array:
+def spread(covariance: Floats, sigmas: float, least: float) -> Floats:
     """Half axes (3, 3), in columns [m], of the ellipsoid of a covariance (3, 3) [m2].
 
     Args:
@@ -57,7 +53,7 @@ def spread(covariance: Array, sigmas: float, least: float) -> Array:
     return directions * np.maximum(sigmas * np.sqrt(variances.clip(0)), least)
 
 
-def _turned(profile: Array) -> Triangles:
+def _turned(profile: Floats) -> Triangles:
     """The solid that a profile (P, 2) of (z, radius) makes, turning about z."""
     z, r = profile.T
     along, out = np.diff(z), np.diff(r)
@@ -78,6 +74,6 @@ def _turned(profile: Array) -> Triangles:
     return Triangles(corners, normals, np.zeros(len(corners), np.int64))
 
 
-def _frame(origin: Array, direction: Array) -> Array:
+def _frame(origin: Floats, direction: Floats) -> Floats:
     """A pose (4, 4) whose z axis lies along the direction."""
     return pose(rotation_to_axis(direction / np.linalg.norm(direction)), np.asarray(origin, float))

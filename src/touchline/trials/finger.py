@@ -7,15 +7,13 @@ The dynamics are those of the classical methods, which share no code with the ob
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.bench.touches import Signals, add_noise
+from touchline.arrays import Array
 from touchline.localizer.skin import Patch, Skin
 from touchline.model.description import WidgetDescription
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import contact_loads, inverse_dynamics
-
-Array = NDArray[np.float64]
+from touchline.trials.touches import Signals, add_noise
 
 LANDING = 0.04  # s in which the force of a finger rises and falls
 SLOPE = 0.75  # cosine; a pad whose surface turns away more is no place to write

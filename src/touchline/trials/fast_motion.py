@@ -1,15 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A fast motion with a known push, as ideal sensors report it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.model.robot import Robot
+from touchline.arrays import Array
+from touchline.model.robot import Robot, load_robot
 from touchline.observer.dynamics import contact_loads, inverse_dynamics
-
-Array = NDArray[np.float64]
 
 PUSH = np.array([12.0, -8.0, 15.0])  # [N], world axes
 POINT = np.array([0.1, 0.2, 0.4])  # [m], fixed in world
@@ -73,3 +71,20 @@ def pushed_link(robot: Robot) -> str:
     """Where the push acts: the link that the middle one of the joints carries."""
     name = robot.joint_names[len(robot.joint_names) // 2]
     return robot.mechanism.joints[name].child
+
+
+def two_sensor_arm(bandwidth: float = 100.0) -> Robot:
+    """`sara-full` with the sensors at base and wrist alone.
+
+    Args:
+        bandwidth: K [rad/s] of all rows.
+    """
+    full = load_robot("sara-full")
+    sensors = full.description.sensors[:2]
+    description = replace(
+        full.description,
+        sensors=sensors,
+        bandwidth_joints=(bandwidth,) * len(full.joint_names),
+        bandwidth_sensors={sensor.name: bandwidth for sensor in sensors},
+    )
+    return Robot(description, full.mechanism)

@@ -10,14 +10,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import inverse_dynamics
 from touchline.observer.samples import Samples
-
-Array = NDArray[np.float64]
 
 # Positions, velocities, accelerations (N, n) at times (N,).
 Path = Callable[[Array], tuple[Array, Array, Array]]

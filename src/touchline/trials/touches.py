@@ -7,12 +7,11 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.localizer.skin import Patch, Skin
 from touchline.model.robot import Robot
 from touchline.model.transforms import rotation_to_axis
 from touchline.observer.dynamics import gravity_loads
-
-Array = NDArray[np.float64]
 
 TRIES = 200  # places on a segment, before another pose is tried
 

@@ -5,13 +5,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.description import AXES
 from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
-
-Array = NDArray[np.float64]
 
 SIGNALS = ("q", "qd", "tau", "wrench")
 SPIKE = {"q": 3.0, "qd": 2.0, "tau": 80.0, "fx": 300.0, "mx": 80.0}  # rad, rad/s, Nm, N, Nm

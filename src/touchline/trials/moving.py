@@ -6,13 +6,11 @@ code with the observer.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.bench.touches import Signals, Touch, add_noise
+from touchline.arrays import Array
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import contact_loads, inverse_dynamics
-
-Array = NDArray[np.float64]
+from touchline.trials.touches import Signals, Touch, add_noise
 
 
 def moving_signals(

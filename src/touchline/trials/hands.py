@@ -4,12 +4,10 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.bench.touches import Touch, TouchSampler
+from touchline.arrays import Array
 from touchline.model.robot import Robot
-
-Array = NDArray[np.float64]
+from touchline.trials.touches import Touch, TouchSampler
 
 TREMOR, SLOWEST, QUICKEST = 2.0, 1.0, 10.0  # N rms, of all three axes together; Hz
 WAVES = 24  # of a tremor, of equal power

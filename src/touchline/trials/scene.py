@@ -9,14 +9,17 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.bench.localization.arm import load_arm
-from touchline.bench.localization.cell import Cell
-from touchline.bench.localization.hands import HELD, RESTS, WAITS, in_cone, slide, tremor
-from touchline.bench.localization.moving import carried, moving_signals
-from touchline.bench.localization.wrong_model import RUNS, wrong_model
-from touchline.bench.touches import (
+from touchline.arrays import Array
+from touchline.localizer.skin import Skin
+from touchline.model.robot import Robot
+from touchline.observer.dynamics import contact_loads
+from touchline.pipeline.pipeline import Pipeline
+from touchline.trials.arms import load_arm
+from touchline.trials.cell import Cell
+from touchline.trials.hands import HELD, RESTS, WAITS, in_cone, slide, tremor
+from touchline.trials.moving import carried, moving_signals
+from touchline.trials.touches import (
     Signals,
     Touch,
     TouchSampler,
@@ -24,11 +27,7 @@ from touchline.bench.touches import (
     resting_signals,
     sample_on_each,
 )
-from touchline.localizer.skin import Skin
-from touchline.model.robot import Robot
-from touchline.observer.dynamics import contact_loads
-
-Array = NDArray[np.float64]
+from touchline.trials.wrong_model import RUNS, wrong_model
 
 FORCE = 20.0  # N
 FIRST, APART = 0.55, 0.1  # s: the first onset, after settling and a quiet half second, then each
@@ -165,3 +164,21 @@ def _sample(cell: Cell, robot: Robot, skin: Skin, chance: np.random.Generator) -
     if cell.begin == "segments":
         return sample_on_each(touched_segments(robot), skin, chance, FORCE, FRICTION)
     return TouchSampler(skin, chance, friction=FRICTION).sample_several(cell.contacts, FORCE)
+
+
+def make_pipeline(
+    robot: Robot, skin: Skin, rule: str = "likelihood", model_error: float = 0.0
+) -> Pipeline:
+    """The pipeline as the benchmark uses it.
+
+    It is told what is true of the benchmark: sensors err by the noise figures alone, how wrong the
+    model is (where calibration does not tell), and how large the friction cone is.
+    """
+    return Pipeline(
+        robot,
+        skin=skin,
+        rule=rule,
+        torque_error=0.0,
+        friction=FRICTION,
+        model_error=model_error,
+    )

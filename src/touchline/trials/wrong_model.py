@@ -9,13 +9,6 @@ and the noise of the benchmark.
 from collections.abc import Callable, Iterable
 from functools import lru_cache
 
-from touchline.bench.detection.free_motion import (
-    MotionMaker,
-    generator,
-    imperfect,
-    random_trajectory,
-)
-from touchline.bench.localization.arm import load_arm
 from touchline.calibrate.run import growth
 from touchline.detector import calibration as cal
 from touchline.identify.described import identified_robot
@@ -23,6 +16,13 @@ from touchline.identify.evidence import gather
 from touchline.identify.identification import identify
 from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
+from touchline.trials.arms import load_arm
+from touchline.trials.free_motion import (
+    MotionMaker,
+    generator,
+    imperfect,
+    random_trajectory,
+)
 
 RUNS = 25  # that share an arm
 MINUTES = 6  # of motion, in recordings of one minute

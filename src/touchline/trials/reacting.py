@@ -6,9 +6,8 @@ from dataclasses import asdict, dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.bench.reaction.guiding import HANDLE, handle_point
+from touchline.arrays import Array
 from touchline.model.description import PolicyDescription, PolicyRule
 from touchline.model.robot import Robot, load_robot
 from touchline.reaction.reaction import REACTIONS
@@ -16,8 +15,7 @@ from touchline.reaction.reactor import Reactor
 from touchline.simulation.encounter import HIT_TIME, Encounter, EncounterScene, Outcome
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scene import Run
-
-Array = NDArray[np.float64]
+from touchline.trials.guiding import HANDLE, handle_point
 
 SCENES = ("free", "wall", "guided")
 LINKS = {

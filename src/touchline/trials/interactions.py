@@ -10,15 +10,13 @@ steadily; its dynamics are exact but for inertias that are not those of the desc
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.bench.touches import Signals, Touch, TouchSampler, add_noise
+from touchline.arrays import Array
 from touchline.classifier.zones import Zones
 from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import contact_loads, inverse_dynamics
-
-Array = NDArray[np.float64]
+from touchline.trials.touches import Signals, Touch, TouchSampler, add_noise
 
 BEGIN, SECONDS = 0.3, 0.9  # s: of the interaction, of the recording
 SPEEDS, SPRINGS, MASSES = (0.25, 1.5), (5e3, 7.5e4), (2.0, 6.0)  # m/s, N/m, kg of blows
