@@ -5,9 +5,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import gravity_loads
 from touchline.observer.samples import Samples
@@ -30,7 +29,7 @@ class Mending:
     time: float
     position: Array
     velocity: Array
-    order: NDArray[np.int64]
+    order: Index
     torque: Array
     wrench: Array
     weights: Robot | None = None

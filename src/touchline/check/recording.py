@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Mask
 from touchline.check.coarse import is_off, next_step
 from touchline.check.findings import Findings
 from touchline.check.joints import check_torques, velocity_problems
@@ -81,9 +81,7 @@ def check_recording(robot: Robot, path: Path, findings: Findings) -> None:
     findings.take(plain)
 
 
-def glance(
-    robot: Robot, parts: list[Samples], felt: list[NDArray[np.bool_]], off: bool
-) -> list[str]:
+def glance(robot: Robot, parts: list[Samples], felt: list[Mask], off: bool) -> list[str]:
     """What a short look at a recording tells: units, order, signs, unmodelled weights, noise.
 
     It may hold touches: what these look like (offsets, gains, delays) is not judged, and what the
@@ -110,7 +108,7 @@ def glance(
     return found.findings
 
 
-def _untouched(parts: list[Samples], felt: list[NDArray[np.bool_]]) -> Iterator[Samples]:
+def _untouched(parts: list[Samples], felt: list[Mask]) -> Iterator[Samples]:
     """The pieces in which nothing was felt, nor a moment before or after."""
     times = [part.time[mask] for part, mask in zip(parts, felt, strict=True)]
     touched = np.sort(np.concatenate(times)) if times else np.empty(0)

@@ -9,9 +9,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index, Mask
 from touchline.detector.detector import Detector
 from touchline.detector.tail import LEAST_PEAKS, Tail, count_clusters, fit_tail
 from touchline.detector.thresholds import (
@@ -67,7 +66,7 @@ class Statistics:
 
     blocks: Array
     time: Array
-    recording: NDArray[np.int64]
+    recording: Index
     hours: float
     length: float = BLOCK
 
@@ -76,7 +75,7 @@ class Statistics:
         """Alarms at most so many blocks apart are one."""
         return max(1, round(GAP / self.length))
 
-    def part(self, use: NDArray[np.bool_]) -> "Statistics":
+    def part(self, use: Mask) -> "Statistics":
         """Some of the blocks."""
         hours = self.hours * float(use.mean())
         return Statistics(self.blocks[use], self.time[use], self.recording[use], hours, self.length)

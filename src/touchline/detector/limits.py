@@ -4,9 +4,8 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index
 from touchline.detector.chi_square import chi_square_limit, normal_limit
 from touchline.model.description import DetectionDescription, TailDescription
 from touchline.tuning import DEFAULTS
@@ -41,7 +40,7 @@ def siegmund(run_length: float, shift: float) -> float:
 
 
 def theoretical(
-    method: str, counts: NDArray[np.int64], rate: float, period: float, d: DetectionDescription
+    method: str, counts: Index, rate: float, period: float, d: DetectionDescription
 ) -> Array:
     """Limits (m,) if noise were all: every sample is taken for a test of its own."""
     if method == "rows":
@@ -56,7 +55,7 @@ def theoretical(
     return np.sqrt(chi_square_limit(rows, alarm / tests))
 
 
-def sum_limits(counts: NDArray[np.int64], sigmas: float) -> Array:
+def sum_limits(counts: Index, sigmas: float) -> Array:
     """Limits (m,) of the sum of squared rows, as rare as one row beyond `sigmas`."""
     alarm = math.erfc(sigmas / math.sqrt(2))  # of one row: a normal variable beyond +-sigmas
     return chi_square_limit(np.maximum(counts, 1), alarm) / sigmas**2

@@ -8,9 +8,9 @@ and their excesses have a generalized Pareto distribution.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index
 from touchline.model.description import TailDescription
 
 PEAKS, PEAKS_PER_HOUR = 50, 60.0  # the tail begins where there are so many
@@ -88,7 +88,7 @@ def _excess(t: float, shape: float) -> float:
     return float(t if abs(shape) < 1e-9 else np.expm1(shape * t) / shape)
 
 
-def cluster_peaks(series: Array, level: float, gap: int) -> tuple[Array, NDArray[np.int64]]:
+def cluster_peaks(series: Array, level: float, gap: int) -> tuple[Array, Index]:
     """Peaks (P,) of the clusters above `level`, and where they are.
 
     Args:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array, Index, Mask
 from touchline.folder import replaced_file
 from touchline.health import Health
 from touchline.report.outcome import EPOCH
@@ -37,7 +38,7 @@ def make_figures(folder: Path, robot: str) -> Figures:
     return figures
 
 
-def percentile(counts: NDArray[np.int64], share: float) -> float:
+def percentile(counts: Index, share: float) -> float:
     """The force [N] below which a share of the samples lies; NaN without samples.
 
     Args:
@@ -98,7 +99,7 @@ def _of_estimates(path: Path, events: list[dict[str, Any]]) -> Figures:
     }
 
 
-def _quiet(time: NDArray, events: list[dict[str, Any]]) -> NDArray[np.bool_]:
+def _quiet(time: NDArray, events: list[dict[str, Any]]) -> Mask:
     quiet = np.isfinite(time)
     for event in events:
         end = np.inf if event["cleared"] is None else event["cleared"] + SETTLES
@@ -106,7 +107,7 @@ def _quiet(time: NDArray, events: list[dict[str, Any]]) -> NDArray[np.bool_]:
     return quiet
 
 
-def _numbers(column: Any) -> NDArray[np.float64]:
+def _numbers(column: Any) -> Array:
     return np.asarray(column.to_numpy(zero_copy_only=False), dtype=float)
 
 
@@ -126,7 +127,7 @@ def _count(
     health: NDArray,
     joints: list[str],
     torques: NDArray,
-    quiet: NDArray[np.bool_],
+    quiet: Mask,
 ) -> None:
     entry["samples"] += len(health)
     entry["healthy"] += int((health == 0).sum())
@@ -143,9 +144,7 @@ def _count(
         told["largest"] = max(told["largest"], float(np.abs(clean).max(initial=0.0)))
 
 
-def _spread(
-    entry: dict[str, Any], segments: list[str], sizes: NDArray, quiet: NDArray[np.bool_]
-) -> None:
+def _spread(entry: dict[str, Any], segments: list[str], sizes: NDArray, quiet: Mask) -> None:
     for g, name in enumerate(segments):
         told, values = entry["segments"][name], sizes[:, g]
         known = np.isfinite(values)

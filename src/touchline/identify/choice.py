@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index, Mask
 from touchline.identify.evidence import WIDTHS, Evidence
 from touchline.identify.fit import (
     BodyChange,
@@ -37,11 +37,11 @@ BETTER = 1.0  # standard errors by which a larger model must win
 class Fold:
     """Instants to fit on and instants to judge on."""
 
-    train: NDArray[np.bool_]
-    test: NDArray[np.bool_]
+    train: Mask
+    test: Mask
 
 
-def folds_of(evidence: Evidence, use: NDArray[np.bool_], count: int = FOLDS) -> Iterator[Fold]:
+def folds_of(evidence: Evidence, use: Mask, count: int = FOLDS) -> Iterator[Fold]:
     """Each recording in `count` parts; the k-th parts of all are held out together."""
     part = np.zeros(len(evidence), dtype=int)
     for number in np.unique(evidence.recording):
@@ -54,7 +54,7 @@ def folds_of(evidence: Evidence, use: NDArray[np.bool_], count: int = FOLDS) -> 
             yield Fold(train, test)
 
 
-def blocks_of(evidence: Evidence) -> NDArray[np.int64]:
+def blocks_of(evidence: Evidence) -> Index:
     """The number of the block of time (N,) that each instant belongs to."""
     number = np.floor(evidence.time / BLOCK).astype(np.int64)
     number += evidence.recording * (number.max(initial=0) - number.min(initial=0) + 1)
@@ -69,7 +69,7 @@ class Chooser:
         use: (N,) those that may be used.
     """
 
-    def __init__(self, evidence: Evidence, use: NDArray[np.bool_]) -> None:
+    def __init__(self, evidence: Evidence, use: Mask) -> None:
         self.evidence, self.use = evidence, use
         self.start = evidence.residual()
         self.floor = LEAST_SCATTER * np.abs(evidence.reading).max(axis=0, initial=0.0)
@@ -111,7 +111,7 @@ class Chooser:
         only = Solution(Problem((), bodies), np.empty(0), found.steps)
         return self._columns_of_rows(self.start + applied(self.evidence, only))
 
-    def fit(self, problem: Problem, use: NDArray[np.bool_] | None = None) -> Solution:
+    def fit(self, problem: Problem, use: Mask | None = None) -> Solution:
         """Fits a problem; equations that are far off count less."""
         return self._equations(problem, self.use if use is None else use).solve()
 
@@ -121,7 +121,7 @@ class Chooser:
         equations = self._equations(found.problem, self.use)
         return equations.with_errors(found, left, self.weight, self.use, self.blocks)
 
-    def _equations(self, problem: Problem, use: NDArray[np.bool_]) -> Equations:
+    def _equations(self, problem: Problem, use: Mask) -> Equations:
         return Equations.of(self.evidence, problem, self.start, self.weight, use)
 
     def _scatter(self, left: Array) -> Array:

@@ -9,9 +9,8 @@ beside it (Frisch and Waugh, Econometrica 1(4), 1933), so that a wrong model is 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Mask
 from touchline.identify.choice import Chooser
 from touchline.identify.evidence import Evidence
 from touchline.identify.fit import Equations, column_of
@@ -38,7 +37,7 @@ class Delay:
     error: float
 
 
-def find_delays(evidence: Evidence, use: NDArray[np.bool_] | None = None) -> list[Delay]:
+def find_delays(evidence: Evidence, use: Mask | None = None) -> list[Delay]:
     """Delays that the data are sure of, and that two halves of them agree on."""
     use = np.ones(len(evidence), dtype=bool) if use is None else use
     chooser = Chooser(evidence, use)
@@ -82,7 +81,7 @@ def _groups(evidence: Evidence) -> list[tuple[str, list[int]]]:
     return [(name, rows) for name, rows in groups if rows]
 
 
-def _delay(chooser: Chooser, rows: list[int], use: NDArray[np.bool_]) -> tuple[float, float] | None:
+def _delay(chooser: Chooser, rows: list[int], use: Mask) -> tuple[float, float] | None:
     """Delay and standard error [s]; None where nothing moves."""
     evidence = chooser.evidence
     rate = np.zeros_like(evidence.reading)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index, Mask
 from touchline.identify.regressor import Rows, body_vector, momentum_regressors, rows_of
 from touchline.identify.smoothing import Steps, derivative, make_steps, mean, settled, smooth
 from touchline.model.description import Friction
@@ -51,10 +51,10 @@ class Evidence:
 
     robot: Robot
     rows: Rows
-    used: NDArray[np.bool_]
+    used: Mask
     bandwidth: float
     time: Array
-    recording: NDArray[np.int64]
+    recording: Index
     q: Array
     qd: Array
     reading: Array
@@ -177,9 +177,9 @@ class _Signals:
     q: Array
     qd: Array
     reading: Array
-    used: NDArray[np.bool_]
+    used: Mask
     steps: Steps
-    keep: NDArray[np.bool_]
+    keep: Mask
 
 
 def _signals_of(robot: Robot, parts: list[Samples], bandwidth: float) -> _Signals | None:
@@ -230,7 +230,7 @@ def _columns(
     qd: Array,
     reading: Array,
     steps: Steps,
-    keep: NDArray[np.bool_],
+    keep: Mask,
 ) -> Iterator[dict[str, Array]]:
     """The filtered columns, piece by piece of the recording: filters go on across pieces."""
     own = np.array([joint.friction.coulomb_width for joint in robot.description.joints])
@@ -303,7 +303,7 @@ def _straight(robot: Robot, wrench: Array) -> Array:
     return read
 
 
-def _forward(time: Array) -> NDArray[np.bool_]:
+def _forward(time: Array) -> Mask:
     """Stamps that are later than all before."""
     clean = np.where(np.isfinite(time), time, -np.inf)
     before = np.maximum.accumulate(np.concatenate([[-np.inf], clean[:-1]]))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index, Mask
 from touchline.identify.evidence import Evidence
 from touchline.identify.physical import PhysicalBody
 from touchline.identify.regressor import PARAMETERS, body_vector
@@ -125,7 +125,7 @@ class Equations:
 
     @staticmethod
     def of(
-        evidence: Evidence, problem: Problem, start: Array, weight: Array, use: NDArray[np.bool_]
+        evidence: Evidence, problem: Problem, start: Array, weight: Array, use: Mask
     ) -> "Equations":
         """Sums up some instants.
 
@@ -219,7 +219,7 @@ class Equations:
         return J
 
     def with_errors(
-        self, found: Solution, left: Array, weight: Array, use: NDArray[np.bool_], blocks: NDArray
+        self, found: Solution, left: Array, weight: Array, use: Mask, blocks: NDArray
     ) -> Solution:
         """The solution with standard errors.
 
@@ -260,9 +260,7 @@ class Equations:
         )
 
 
-def _rows_of(
-    e: Evidence, problem: Problem, use: NDArray[np.bool_]
-) -> Iterator[tuple[int, NDArray[np.int64], Array]]:
+def _rows_of(e: Evidence, problem: Problem, use: Mask) -> Iterator[tuple[int, Index, Array]]:
     """Rows with something free in them: number, indices of the parameters, equations (N, ...)."""
     linear = len(problem.columns)
     size = linear + PARAMETERS * len(problem.bodies)

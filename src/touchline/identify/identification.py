@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Mask
 from touchline.errors import InputError
 from touchline.identify.choice import Chooser
 from touchline.identify.evidence import Evidence
@@ -37,12 +37,12 @@ class Identification:
 
     evidence: Evidence
     solution: Solution
-    touched: NDArray[np.bool_]
+    touched: Mask
     before: Array
     after: Array
     parted: str
-    train: NDArray[np.bool_]
-    test: NDArray[np.bool_]
+    train: Mask
+    test: Mask
     trained: Solution
 
     @property
@@ -118,7 +118,7 @@ def identify_all(evidence: Evidence) -> Solution:
     return chooser.with_errors(chooser.fit(chooser.choose()))
 
 
-def touched_instants(evidence: Evidence) -> NDArray[np.bool_]:
+def touched_instants(evidence: Evidence) -> Mask:
     """Which instants (N,) a rich model cannot explain beside the others."""
     touched = np.zeros(len(evidence), dtype=bool)
     for _ in range(ROUNDS):
@@ -138,7 +138,7 @@ def rms(left: Array) -> Array:
     return np.sqrt(np.mean(left**2, axis=0)) if len(left) else np.zeros(left.shape[1])
 
 
-def duration(evidence: Evidence, use: NDArray[np.bool_]) -> float:
+def duration(evidence: Evidence, use: Mask) -> float:
     """Seconds that some of the instants stand for."""
     steps = np.diff(evidence.time)
     same = np.diff(evidence.recording) == 0
@@ -146,7 +146,7 @@ def duration(evidence: Evidence, use: NDArray[np.bool_]) -> float:
     return typical * float(use.sum())
 
 
-def _part(evidence: Evidence, use: NDArray[np.bool_]) -> tuple[NDArray, NDArray, str]:
+def _part(evidence: Evidence, use: Mask) -> tuple[NDArray, NDArray, str]:
     numbers = np.unique(evidence.recording)
     if len(numbers) >= HELD_OUT:
         out = evidence.recording % HELD_OUT == HELD_OUT - 1

@@ -14,9 +14,8 @@ no code in common with the native core.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Mask
 from touchline.model.mechanism import Inertia
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import Posture, posture
@@ -38,8 +37,8 @@ class Rows:
 
     names: tuple[str, ...]
     nodes: tuple[tuple[int, ...], ...]
-    weightless: NDArray[np.bool_]
-    silent: NDArray[np.bool_]
+    weightless: Mask
+    silent: Mask
 
     def __len__(self) -> int:
         return len(self.names)

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Array, Mask
 from touchline.identify.choice import Fold, folds_of
 from touchline.identify.evidence import Evidence
 from touchline.identify.fit import applied
@@ -24,8 +25,6 @@ from touchline.identify.identification import WORSE, Identification, rms
 from touchline.identify.touches import usual_scatter
 from touchline.model.learned_rest import LearnedRest
 from touchline.model.robot import Robot
-
-Array = NDArray[np.float64]
 
 POSITIONS, SPEEDS = 16, 17  # nodes at most
 APART, APART_SPEED = 0.12, 0.5  # rad, and in units of `_bend`: nodes are at least so far apart
@@ -176,7 +175,7 @@ def inner(table: LearnedRest) -> Array:
     return whole[1:-1, 1:-1].ravel()
 
 
-def regions_of(evidence: Evidence, use: NDArray[np.bool_]) -> Iterator[Fold]:
+def regions_of(evidence: Evidence, use: Mask) -> Iterator[Fold]:
     """Parts of the workspace, each judged by what was seen of the others."""
     centred = evidence.q - evidence.q[use].mean(axis=0)
     directions = np.linalg.svd(centred[use], full_matrices=False)[2][:2]
@@ -203,7 +202,7 @@ class _Joint:
     def __init__(self, evidence: Evidence, grid: Grid, hats: Array, left: Array) -> None:
         self.evidence, self.grid, self.hats, self.residual = evidence, grid, hats, left
 
-    def fit(self, use: NDArray[np.bool_]) -> tuple[Array, Array]:
+    def fit(self, use: Mask) -> tuple[Array, Array]:
         """Torques at the nodes and their doubt (nodes,), 0 where nothing was seen."""
         hats, left = self.hats[use], self.residual[use]
         size = float(np.mean(left**2))

@@ -11,9 +11,8 @@ the filter begins anew, since nothing shall be learnt from doubtful values.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Mask
 from touchline.tuning import DEFAULTS
 
 LONGEST = DEFAULTS["observer.gap_periods"]  # longer intervals are not integrated over
@@ -31,7 +30,7 @@ class Steps:
     """
 
     dt: Array
-    usable: NDArray[np.bool_]
+    usable: Mask
     keep: Array
 
     def part(self, start: int, stop: int) -> "Steps":
@@ -39,7 +38,7 @@ class Steps:
         return Steps(self.dt[start:stop], self.usable[start:stop], self.keep[start:stop])
 
 
-def make_steps(time: Array, bandwidth: float, present: NDArray[np.bool_]) -> Steps:
+def make_steps(time: Array, bandwidth: float, present: Mask) -> Steps:
     """Intervals between samples that go forward in time.
 
     Args:
@@ -80,7 +79,7 @@ def smooth(inputs: Array, steps: Steps, start: Array | None = None) -> Array:
     return out.reshape(inputs.shape)
 
 
-def settled(steps: Steps, bandwidth: float) -> NDArray[np.bool_]:
+def settled(steps: Steps, bandwidth: float) -> Mask:
     """Per interval, has the filter run for long enough since its last start?"""
     since, told = 0.0, np.zeros(len(steps.dt), dtype=bool)
     for i, dt in enumerate(steps.dt):

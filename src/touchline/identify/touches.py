@@ -2,9 +2,8 @@
 """Which instants of a recording are left out because something seems to touch the robot."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Mask
 from touchline.identify.evidence import Evidence
 
 QUIET = 0.4  # of the instants at least are untouched, and tell the usual scatter
@@ -16,7 +15,7 @@ BESIDE = 2.0  # time constants of the filter on either side belong to a touch
 _QUANTILE = 0.524  # 40 % of normal values lie within so many sigmas of the middle
 
 
-def usual_scatter(left: Array, used: NDArray[np.bool_]) -> Array:
+def usual_scatter(left: Array, used: Mask) -> Array:
     """1 sigma (R,) of most of the residuals (N, R), whatever the others do."""
     return np.where(used, np.maximum(_shortest(left)[1], 1e-9), 1.0)
 
@@ -37,7 +36,7 @@ def _shortest(left: Array) -> tuple[Array, Array]:
     return 0.5 * (low + high), 0.5 * (high - low) / _QUANTILE
 
 
-def find_touches(evidence: Evidence, left: Array, coulomb: Array) -> NDArray[np.bool_]:
+def find_touches(evidence: Evidence, left: Array, coulomb: Array) -> Mask:
     """Which instants (N,) are touched.
 
     Args:
@@ -67,7 +66,7 @@ def find_touches(evidence: Evidence, left: Array, coulomb: Array) -> NDArray[np.
     return touched
 
 
-def stretches(evidence: Evidence, touched: NDArray[np.bool_]) -> list[tuple[int, float, float]]:
+def stretches(evidence: Evidence, touched: Mask) -> list[tuple[int, float, float]]:
     """Recording, begin and end [s] of the touched stretches."""
     return [
         (int(evidence.recording[a]), float(evidence.time[a]), float(evidence.time[b]))
@@ -75,7 +74,7 @@ def stretches(evidence: Evidence, touched: NDArray[np.bool_]) -> list[tuple[int,
     ]
 
 
-def _runs(flags: NDArray[np.bool_], evidence: Evidence) -> list[tuple[int, int]]:
+def _runs(flags: Mask, evidence: Evidence) -> list[tuple[int, int]]:
     """First and last index of each run; a recording's end ends a run."""
     runs: list[tuple[int, int]] = []
     for i in np.flatnonzero(flags).tolist():

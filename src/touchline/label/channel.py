@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Index, Mask
 from touchline.errors import InputError
 from touchline.logs.blocks import Block
 from touchline.logs.log import Log
@@ -41,13 +42,13 @@ class Channel:
     """
 
     tau_ext: NDArray[np.float32]
-    contact: NDArray[np.bool_]
-    link: NDArray[np.int64]
+    contact: Mask
+    link: Index
     position: NDArray[np.float32]
     force: NDArray[np.float32]
-    level: NDArray[np.int64]
-    soon: NDArray[np.bool_]
-    health: NDArray[np.int64]
+    level: Index
+    soon: Mask
+    health: Index
 
     def columns(self) -> dict[str, NDArray]:
         """The arrays by name."""
@@ -120,7 +121,7 @@ class Feeler:
         return ContactTable(table.sample[rows], table.numbers[rows], table.names)
 
 
-def _soon(time: NDArray, contact: NDArray[np.bool_], period: float) -> NDArray[np.bool_]:
+def _soon(time: NDArray, contact: Mask, period: float) -> Mask:
     before = BEFORE + 0.5 * period  # whatever the rounding of the stamps
     onsets = np.flatnonzero(contact & ~np.concatenate([[False], contact[:-1]]))
     soon = np.zeros(len(time), bool)

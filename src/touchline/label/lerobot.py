@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline import __version__
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.folder import replaced_file
 from touchline.label.channel import BEFORE, LEVELS, Channel, Feeler, episode_samples, parts
@@ -213,7 +214,7 @@ def _features(robot: Robot) -> dict[str, Any]:
     }
 
 
-def _numbers(column: Any, where: str) -> NDArray[np.float64]:
+def _numbers(column: Any, where: str) -> Array:
     """(N, w) of a column of lists; (N, 1) of one of numbers."""
     import pyarrow as pa
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Mask
 from touchline.model.robot import Robot
 
 NANO = 1e-9
@@ -40,10 +40,10 @@ class Validity:
         wrench: (k, 6).
     """
 
-    q: NDArray[np.bool_]
-    qd: NDArray[np.bool_]
-    tau: NDArray[np.bool_]
-    wrench: NDArray[np.bool_]
+    q: Mask
+    qd: Mask
+    tau: Mask
+    wrench: Mask
 
 
 @dataclass(frozen=True, slots=True)

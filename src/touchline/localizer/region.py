@@ -4,9 +4,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index, Mask
 from touchline.localizer.skin import Skin
 
 
@@ -23,7 +23,7 @@ class Region:
     """
 
     links: tuple[str, ...]
-    link: NDArray[np.int64]
+    link: Index
     points: Array
     probability: Array
     density: Array
@@ -64,7 +64,7 @@ class Region:
         """Is a point of a link in the highest-posterior region of this probability?"""
         return self.level(link, point) <= probability
 
-    def largest(self, probability: float = 0.9) -> NDArray[np.bool_]:
+    def largest(self, probability: float = 0.9) -> Mask:
         """(m,) the pieces that make up the highest-posterior region of this probability."""
         order = np.argsort(-self.density)
         inside = np.zeros(len(order), dtype=bool)

@@ -4,8 +4,8 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.description import LinkCorrection, Load, RobotDescription
 from touchline.model.mechanism import Inertia, Link, Mechanism
 from touchline.model.plausibility import inertia_warnings
@@ -65,9 +65,7 @@ def with_loads(
     return replace(description, loads=loads), replace(mechanism, links=links)
 
 
-def with_offsets(
-    description: RobotDescription, torque: NDArray[np.float64], wrench: NDArray[np.float64]
-) -> RobotDescription:
+def with_offsets(description: RobotDescription, torque: Array, wrench: Array) -> RobotDescription:
     """The description with biases that take away what is felt.
 
     Args:

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.model.description import AXES, RobotDescription
 from touchline.model.mechanism import Mechanism
 from touchline.model.tree import Node, Place
@@ -39,7 +39,7 @@ class Kernelled(Protocol):
         ...
 
     @property
-    def gravity(self) -> NDArray[np.float64]:
+    def gravity(self) -> Array:
         """(3,) in world [m/s2]."""
         ...
 

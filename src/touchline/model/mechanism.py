@@ -8,9 +8,8 @@ what is observed.
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ class Geometry:
     path: str | None = None
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
     vertices: Array | None = None
-    faces: NDArray[np.int64] | None = None
+    faces: Index | None = None
     problem: str | None = None
 
 

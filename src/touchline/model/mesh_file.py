@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Index
 from touchline.model.mechanism import Array
 
 FORMATS = (".stl", ".obj", ".dae", ".ply", ".off", ".glb")
@@ -17,7 +17,7 @@ NEED_TRIMESH = "a {} file needs the package trimesh: pip install 'touchline[mesh
 
 _FACET = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribute", "<u2")])
 
-Triangles = tuple[Array, NDArray[np.int64]]
+Triangles = tuple[Array, Index]
 
 
 class MeshError(ValueError):
@@ -88,7 +88,7 @@ def read_mesh(path: Path) -> Triangles:
     return _finite(vertices * _unit(path), faces)
 
 
-def _finite(vertices: Array, faces: NDArray[np.int64]) -> Triangles:
+def _finite(vertices: Array, faces: Index) -> Triangles:
     if len(faces) == 0:
         raise MeshError("holds no triangle")
     if not np.isfinite(vertices).all():

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Index
 from touchline.model.mechanism import Array, Geometry, Link, Mechanism
 from touchline.model.mesh_file import MeshError, Triangles, read_mesh
 from touchline.model.tessellation import tessellate
@@ -31,7 +31,7 @@ class Surface:
     """
 
     vertices: Array
-    faces: NDArray[np.int64]
+    faces: Index
     normals: Array
     areas: Array
     closed: bool
@@ -139,7 +139,7 @@ def _shapes(link: Link, kind: str) -> tuple[Geometry, ...]:
     return getattr(link, kind) or link.collision or link.visual
 
 
-def _shape_triangles(shape: Geometry) -> tuple[Array, NDArray[np.int64], list[str]]:
+def _shape_triangles(shape: Geometry) -> tuple[Array, Index, list[str]]:
     """Return a shape's triangles in the link frame with outward faces, and what is doubtful."""
     vertices, faces = _own_triangles(shape)
     vertices, faces = _clean(vertices, faces)
@@ -170,7 +170,7 @@ def _name(shape: Geometry) -> str:
     return f"mesh '{shape.path}'" if shape.path else shape.kind
 
 
-def _clean(vertices: Array, faces: NDArray[np.int64]) -> Triangles:
+def _clean(vertices: Array, faces: Index) -> Triangles:
     """Merge equal vertices (an STL repeats them in each facet); drop faces without an area."""
     step = max(1e-7 * float(np.ptp(vertices, axis=0).max(initial=0.0)), 1e-12)
     first, merged = _distinct(np.round(vertices / step).astype(np.int64))
@@ -179,7 +179,7 @@ def _clean(vertices: Array, faces: NDArray[np.int64]) -> Triangles:
     return vertices[first], faces[(a != b) & (b != c) & (c != a)]
 
 
-def _distinct(rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _distinct(rows: Index) -> tuple[Index, Index]:
     """Return where each distinct row (V, 3) first stands, and which of them each row is.
 
     As `np.unique` along an axis, several times faster.
@@ -191,7 +191,7 @@ def _distinct(rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.in
     return order[new], merged
 
 
-def _doubts(faces: NDArray[np.int64]) -> list[str]:
+def _doubts(faces: Index) -> list[str]:
     """Say what keeps the faces from being one closed, consistently turned surface.
 
     Closed: each edge belongs to two faces. Consistent: they run along it in opposite directions.
@@ -209,7 +209,7 @@ def _doubts(faces: NDArray[np.int64]) -> list[str]:
     return []
 
 
-def _signed_volume(vertices: Array, faces: NDArray[np.int64]) -> float:
+def _signed_volume(vertices: Array, faces: Index) -> float:
     """Return the volume by the divergence theorem; negative if the faces look inwards.
 
     About the middle of the vertices, so that it also tells the side of a surface with holes.
@@ -218,7 +218,7 @@ def _signed_volume(vertices: Array, faces: NDArray[np.int64]) -> float:
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 
 
-def _normals(vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, Array]:
+def _normals(vertices: Array, faces: Index) -> tuple[Array, Array]:
     a, b, c = vertices[faces].transpose(1, 0, 2)
     cross = np.cross(b - a, c - a)
     length = np.linalg.norm(cross, axis=1)

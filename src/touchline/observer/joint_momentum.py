@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index
 from touchline.errors import InputError
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import (
@@ -58,7 +58,7 @@ class ToolWrench:
     """
 
     wrench: Array
-    rank: NDArray[np.int64]
+    rank: Index
     condition: Array
 
 

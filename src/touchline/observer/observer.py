@@ -4,9 +4,9 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Mask
 from touchline.model.robot import Robot
 from touchline.native import core
 from touchline.value import Value, told_shortly
@@ -98,12 +98,12 @@ class Estimate(Value):
         return self._wrenches("segment_innovation")
 
     @property
-    def joint_settled(self) -> NDArray[np.bool_]:
+    def joint_settled(self) -> Mask:
         """Has the filter of each joint (n,) run for 5 / bandwidth since its last restart?"""
         return self._part("joint_settled") > 0.0
 
     @property
-    def segment_settled(self) -> NDArray[np.bool_]:
+    def segment_settled(self) -> Mask:
         """Has the filter of each segment (m,) run for 5 / bandwidth since its last restart?"""
         return self._part("segment_settled") > 0.0
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index
 from touchline.result.contact import Contact
 from touchline.result.native import CONTACT, Names, names_of
 from touchline.value import Field
@@ -35,7 +35,7 @@ class ContactTable:
         names: of the robot.
     """
 
-    sample: NDArray[np.int64]
+    sample: Index
     numbers: Array
     names: Names
 
@@ -55,17 +55,17 @@ class ContactTable:
         return (self[row] for row in range(len(self)))
 
     @property
-    def segment(self) -> NDArray[np.int64]:
+    def segment(self) -> Index:
         """(M,) index of the segment."""
         return self._field("segment")[:, 0].astype(np.int64)
 
     @property
-    def event(self) -> NDArray[np.int64]:
+    def event(self) -> Index:
         """(M,) number of the event."""
         return self._field("event")[:, 0].astype(np.int64)
 
     @property
-    def level(self) -> NDArray[np.int64]:
+    def level(self) -> Index:
         """(M,) index of the level in `touchline.result.native.LEVELS`."""
         return self._field("level")[:, 0].astype(np.int64)
 

@@ -5,9 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Mask
 from touchline.errors import InputError
 from touchline.model.description import PolicyDescription
 from touchline.model.robot import Robot
@@ -75,9 +74,7 @@ def _permitted(state: State) -> Array:
     return np.array([-speed(state.q - lower), speed(upper - state.q)])
 
 
-def _accelerated(
-    torque: Array, state: State, lowest: Array, highest: Array
-) -> tuple[Array, NDArray[np.bool_]]:
+def _accelerated(torque: Array, state: State, lowest: Array, highest: Array) -> tuple[Array, Mask]:
     """Torques (n,) that keep the joints' accelerations (n,) within bounds; also says of which.
 
     Only joints that would leave them get other torques. What pushes the robot is not counted.

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Mask
 from touchline.check.felt import felt
 from touchline.check.recording import glance
 from touchline.errors import InputError
@@ -128,10 +128,10 @@ class Glance:
 
     def __init__(self) -> None:
         self.parts: list[Samples] = []
-        self.felt: list[NDArray[np.bool_]] = []
+        self.felt: list[Mask] = []
         self._kept = 0
 
-    def add(self, part: Samples, felt: NDArray[np.bool_]) -> None:
+    def add(self, part: Samples, felt: Mask) -> None:
         """Take the next samples, as long as there is room."""
         if self._kept < LOOKED_AT:
             keep = np.arange(len(part)) < LOOKED_AT - self._kept
@@ -197,7 +197,7 @@ class _Run:
         }
         self._windows = EventWindows(columns, self.period)
 
-    def add(self, part: Samples) -> NDArray[np.bool_]:
+    def add(self, part: Samples) -> Mask:
         """Take the next samples; returns (N,) whether something was felt at each."""
         time = part.time
         estimate, detection = self.pipeline.run(time, part.q, part.qd, part.tau, part.wrench)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index, Mask
 from touchline.detector.detector import Detection
 from touchline.health import Health
 from touchline.observer.observer import Estimate
@@ -22,7 +22,7 @@ class Moments:
         self._largest = np.zeros(columns)
 
     @classmethod
-    def of(cls, values: Array, where: NDArray[np.bool_]) -> "Moments":
+    def of(cls, values: Array, where: Mask) -> "Moments":
         """Those of rows (N, c) where (N, c) is true."""
         moments = cls(values.shape[1])
         known = where.any(axis=0)
@@ -118,7 +118,7 @@ class Statistics:
     quiet_torque: Moments
     wrench: Moments
     quiet_wrench: Moments
-    watch: NDArray[np.int64]
+    watch: Index
     clock: Clock = field(default_factory=Clock)
     health: dict[Health, int] = field(default_factory=lambda: dict.fromkeys(Health, 0))
     healthy: int = 0

@@ -5,9 +5,8 @@ The pieces widen as the recording goes on, so that memory does not grow with its
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Mask
 
 ROUNDING = 1e-3  # of a piece, at first
 ASTRAY = 1.0  # s; a stamp that is further ahead of a later one is wrong
@@ -72,7 +71,7 @@ class Traces:
         return int(filled[-1]) + 1 if len(filled) else 0
 
 
-def _credible(time: Array) -> NDArray[np.bool_]:
+def _credible(time: Array) -> Mask:
     """Stamps that are numbers and do not run far ahead of those that follow them."""
     usable = np.isfinite(time)
     if usable.all() and (np.diff(time) >= 0).all():

@@ -2,9 +2,8 @@
 """From where a contact is seen well."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Floats
+from touchline.arrays import Floats, Mask
 from touchline.report.picture import Mark, Scene
 from touchline.report.render.camera import Camera
 
@@ -34,7 +33,7 @@ def views_of_contact(scene: Scene, aspect: float = 1.0) -> tuple[Camera, Camera]
     return Camera.framing(points, first, aspect), Camera.framing(points, second, aspect)
 
 
-def sees(scene: Scene, point: Floats, directions: Floats) -> NDArray[np.bool_]:
+def sees(scene: Scene, point: Floats, directions: Floats) -> Mask:
     """Whether nothing of the robot lies between a point and far eyes, (D,).
 
     Args:

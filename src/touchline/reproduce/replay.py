@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Mask
 from touchline.model.robot import Robot
 from touchline.observer.observer import Estimate, Observer
 from touchline.pipeline.pipeline import Pipeline
@@ -63,7 +63,7 @@ class Replay:
     def _segment_of(self) -> dict[str, str]:
         return {link: body.segment for body in self.robot.bodies for link in body.links}
 
-    def _own(self, segment: str) -> NDArray[np.bool_]:
+    def _own(self, segment: str) -> Mask:
         """Which slots (N, c) of the truth touch a segment now."""
         truth = self.simulated.truth
         own = [i for i, link in enumerate(truth.links) if self._segment_of.get(link) == segment]
@@ -113,7 +113,7 @@ class Replay:
             links[table.sample[own]] = columns["link"][own]
         return links
 
-    def found(self, segment: str) -> NDArray[np.bool_]:
+    def found(self, segment: str) -> Mask:
         """Where (N,) a segment is held to be touched."""
         return self.detection.levels[:, self.robot.segment_names.index(segment)] > 0
 

@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Mask
 from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
 from touchline.simulation.readings import Readings
@@ -76,7 +75,7 @@ class SensorNoise:
             column[self._silent(samples.time, rng)] = np.nan
         return {"tau": tau, "wrench": wrench}
 
-    def _silent(self, time: Array, rng: np.random.Generator) -> NDArray[np.bool_]:
+    def _silent(self, time: Array, rng: np.random.Generator) -> Mask:
         span = float(time[-1] - time[0])
         starts = time[0] + rng.uniform(0, span, rng.poisson(self.dropout_rate * span))
         lengths = rng.exponential(self.dropout_time, len(starts))

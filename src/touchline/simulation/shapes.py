@@ -9,9 +9,8 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index
 from touchline.model.mechanism import Geometry, Mechanism
 from touchline.model.surface import Surface, link_surface
 from touchline.simulation.mujoco_model import Addition, quaternion
@@ -111,7 +110,7 @@ def _add_primitive(spec: Any, body: Any, name: str, shape: Geometry) -> None:
     _add_geom(spec, body, shape.kind, name, size=size, pos=T[:3, 3], quat=quaternion(T[:3, :3]))
 
 
-def _add_mesh(spec: Any, name: str, vertices: Array, faces: NDArray[np.int64]) -> None:
+def _add_mesh(spec: Any, name: str, vertices: Array, faces: Index) -> None:
     shell = import_module("mujoco").mjtMeshInertia.mjMESH_INERTIA_SHELL  # it need not be closed
     spec.add_mesh(
         name=name,

@@ -5,9 +5,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index
 from touchline.observer.samples import Samples
 from touchline.simulation.contacts import Touch
 
@@ -28,12 +27,12 @@ class Truth:
     """
 
     links: tuple[str, ...]
-    link: NDArray[np.int64]
+    link: Index
     point: Array
     force: Array
     moment: Array
     wrench_mean: Array
-    link_mean: NDArray[np.int64]
+    link_mean: Index
 
     def columns(self) -> dict[str, Array]:
         """The log's columns `truth.contact.K.*`, (N,) each."""

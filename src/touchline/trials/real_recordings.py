@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.logs import open_log
 from touchline.model.robot import Robot, load_robot
@@ -73,7 +73,7 @@ class Recording:
     robot: Robot
     samples: Samples
     period: float
-    touches: NDArray[np.float64]
+    touches: Array
     link: int = 0
 
 

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Mask
 from touchline.localizer.skin import Patch, Skin
 from touchline.model.robot import Robot
 from touchline.model.transforms import rotation_to_axis
@@ -245,5 +244,5 @@ def touch_loads(robot: Robot, q: Array, node: int, position: Array, force: Array
     return loads
 
 
-def _measured(robot: Robot) -> NDArray[np.bool_]:
+def _measured(robot: Robot) -> Mask:
     return np.array([joint.measured for joint in robot.description.joints])

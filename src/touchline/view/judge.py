@@ -4,9 +4,8 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Mask
 from touchline.model.robot import Robot
 from touchline.result.contact import Contact
 from touchline.simulation.hands import Hand
@@ -97,9 +96,7 @@ class Judge:
             )
         return verdicts
 
-    def _delay(
-        self, segment: str, time: Array, active: NDArray[np.bool_], began: list[float]
-    ) -> float | None:
+    def _delay(self, segment: str, time: Array, active: Mask, began: list[float]) -> float | None:
         """Of the first hand on a segment that nothing touched; later ones go unnoticed."""
         onset = self._onsets.setdefault(segment, _Onset())
         if not began:

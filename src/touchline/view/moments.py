@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index
 from touchline.model.description import AXES
 from touchline.model.surface import Surface, link_surface
 from touchline.result.contact import Contact
@@ -69,7 +68,7 @@ def curves(replay: Replay) -> Iterator[tuple[Array, dict[str, Array]]]:
             )
 
 
-def _thinned(time: Array, rate: float, last: float = -np.inf) -> tuple[Array, NDArray[np.int64]]:
+def _thinned(time: Array, rate: float, last: float = -np.inf) -> tuple[Array, Index]:
     """The first time of each slot of 1 / rate after `last`, and their rows; times increase."""
     usable = np.flatnonzero(np.isfinite(time) & (time > last))
     usable = usable[time[usable] >= np.maximum.accumulate(time[usable])]

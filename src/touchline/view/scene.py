@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 import trimesh
 import viser
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index
 from touchline.model.mechanism import Geometry, Link
 from touchline.model.robot import Robot
 from touchline.model.surface import Surface, link_surface
@@ -102,7 +101,7 @@ def _colours(link: Link) -> list[tuple[Geometry, Colour]]:
     ]
 
 
-def sharp(surface: Surface) -> tuple[Array, NDArray[np.int64]]:
+def sharp(surface: Surface) -> tuple[Array, Index]:
     """Vertices and faces, the vertices doubled along sharp edges so that these are not rounded."""
     mesh = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
     shaded = trimesh.graph.smooth_shade(mesh, angle=CREASE)

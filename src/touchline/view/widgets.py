@@ -6,7 +6,7 @@ import trimesh
 import viser
 from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index
 from touchline.localizer.skin import Patch
 from touchline.touch.stroke import Stroke
 from touchline.touch.touch import Press, Touch
@@ -112,7 +112,7 @@ def _ink(widget: Widget, way: Array) -> NDArray[np.float32]:
     return np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
 
 
-def cut(widget: Widget, patch: Patch) -> tuple[Array, NDArray[np.int64]] | None:
+def cut(widget: Widget, patch: Patch) -> tuple[Array, Index] | None:
     """Vertices and faces of the part of a link's surface that is on a widget, a little above it.
 
     None where the widget is nowhere on the surface.

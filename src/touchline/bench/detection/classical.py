@@ -12,9 +12,8 @@ from collections.abc import Iterable, Iterator
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Mask
 from touchline.bench.detection.pushes import AFTER, BEFORE, PushMaker, random_pushes
 from touchline.bench.detection.work import (
     CALIBRATED,
@@ -58,7 +57,7 @@ class FastClassical:
         self._maker = maker
         self._segments = _Segments(maker.robot)
 
-    def run(self, path: Path, s: Samples) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def run(self, path: Path, s: Samples) -> tuple[Array, Array, Mask]:
         """External joint torques (N, n), segment wrenches (N, m, 6) in the frames of the sensors.
 
         The third is where the joint residuals have settled (N,).

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Mask
 from touchline.bench.identify.arms import ARMS, KINOVA, Arm
 from touchline.bench.identify.pushes import FORCE, detect
 from touchline.errors import InputError
@@ -77,7 +77,7 @@ def _judged(
     robot: Robot,
     recordings: list[list[Samples]],
     whole: Evidence,
-    first: NDArray[np.bool_],
+    first: Mask,
 ) -> Judgement:
     part, n = whole.part(first), whole.joints
     found, grids = identify(part), grids_of(part)

@@ -13,9 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index, Mask
 from touchline.bench.localization.touched import NEAR
 from touchline.localizer.skin import Patch, Skin
 from touchline.model.robot import Robot
@@ -40,11 +39,11 @@ class SurfacePoints:
     """
 
     patches: tuple[Patch, ...]
-    patch: NDArray[np.int64]
+    patch: Index
     position: Array
     normal: Array
 
-    def of_body(self, body: str) -> NDArray[np.int64]:
+    def of_body(self, body: str) -> Index:
         """Indices of the points on a rigid body."""
         return np.flatnonzero([self.patches[k].body == body for k in self.patch])
 
@@ -96,7 +95,7 @@ def exact_readings(robot: Robot, touches: Sequence[Touch]) -> Readings:
     return Readings(q, np.sum(wrenches, axis=0), np.where(own, torque, np.nan))
 
 
-def covered(answers: Sequence[Contact], points: SurfacePoints) -> NDArray[np.bool_]:
+def covered(answers: Sequence[Contact], points: SurfacePoints) -> Mask:
     """For each point (N,): does it lie in a part of a link that answers name?"""
     inside = np.zeros(len(points.patch), dtype=bool)
     links = np.array([patch.link for patch in points.patches])[points.patch]
@@ -124,7 +123,7 @@ class CompatiblePairs:
         self._poses = skin.robot.poses(readings.q)
         self._F, self._M = readings.wrench[:3], readings.wrench[3:]
 
-    def touched(self, points: SurfacePoints) -> NDArray[np.bool_]:
+    def touched(self, points: SurfacePoints) -> Mask:
         """For each point (N,): is it one of a pair that the readings allow?"""
         touched = np.zeros(len(points.patch), dtype=bool)
         bodies = list(dict.fromkeys(patch.body for patch in points.patches))

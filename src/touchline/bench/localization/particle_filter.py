@@ -12,9 +12,8 @@ its force-torque sensors included, with the same noise figures as our estimator.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index
 from touchline.localizer.skin import Skin
 from touchline.model.transforms import rotation_to_axis
 from touchline.observer.dynamics import contact_loads
@@ -43,7 +42,7 @@ class Particles:
         age: updates since it began.
     """
 
-    patch: NDArray[np.int64]
+    patch: Index
     point: Array
     normal: Array
     best: int = 0
@@ -247,7 +246,7 @@ def tempered_weights(cost: Array, least: float) -> Array:
     return weights(high)
 
 
-def _rows_and_noise(skin: Skin, period: float) -> tuple[NDArray[np.int64], Array]:
+def _rows_and_noise(skin: Skin, period: float) -> tuple[Index, Array]:
     """The measured rows, and the standard deviation of each after the observer's filter."""
     description = skin.robot.description
     force, moment, torque = LEAST_NOISE

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from touchline.arrays import Index
 from touchline.logs.cdr import JOINT_STATE, WRENCH_STAMPED, field_places
 from touchline.logs.mcap import FOOTER, MAGIC
 from touchline.model.robot import Robot
@@ -27,7 +28,7 @@ class Serialized:
         kinds: topic -> message type.
     """
 
-    received: NDArray[np.int64]
+    received: Index
     tables: dict[str, Bytes]
     kinds: dict[str, str]
 
@@ -136,7 +137,7 @@ def write_mcap(path: Path, messages: Serialized, compression: str, summary: bool
         file.write(_record(2, _number(start, 8) + bytes(12)) + MAGIC)
 
 
-def _records(channel: int, received: NDArray[np.int64], table: Bytes) -> Bytes:
+def _records(channel: int, received: Index, table: Bytes) -> Bytes:
     size = table.shape[1]
     out = np.empty((len(table), 31 + size), np.uint8)
     out[:, :9] = np.frombuffer(_number(5, 1) + _number(22 + size, 8), np.uint8)

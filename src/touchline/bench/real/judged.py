@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.bench.matching import match
 from touchline.pipeline.pipeline import Pipeline
 from touchline.result.event import Event
@@ -102,7 +102,7 @@ def judge_free(recording: Recording, events: list[Event]) -> Free:
     )
 
 
-def spans(events: list[Event]) -> NDArray[np.float64]:
+def spans(events: list[Event]) -> Array:
     """(E, 2) begin and end [s], infinite where an event has not ended."""
     ends = [np.inf if e.cleared is None else e.cleared for e in events]
     return np.array([(e.detected, end) for e, end in zip(events, ends, strict=True)]).reshape(-1, 2)

@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index
 from touchline.model.mechanism import Mechanism
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import posture
@@ -84,7 +83,7 @@ class Recording:
         self,
         noise: SensorNoise | None,
         rng: np.random.Generator,
-        rows: NDArray[np.int64] | None = None,
+        rows: Index | None = None,
     ) -> Log:
         """What sensors log.
 
@@ -140,6 +139,6 @@ def segment_wrench(robot: Robot, truth: Truth) -> Array:
     return out
 
 
-def _picked(readings: Readings, rows: NDArray[np.int64]) -> Readings:
+def _picked(readings: Readings, rows: Index) -> Readings:
     names = ("time", "q", "qd", "link_torque", "motor_torque", "wrench", "acceleration")
     return replace(readings, **{name: getattr(readings, name)[rows] for name in names})

@@ -6,8 +6,8 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Index
 from touchline.bench.wrench.log import Log, Recording, record
 from touchline.logs.velocity import choose_window, estimate_velocity
 from touchline.model.mechanism import Inertia
@@ -149,11 +149,11 @@ class Stage:
         ]
         return record(self.robot, self.wander, contacts, 2.5)
 
-    def three_pushes(self, rows: NDArray[np.int64] | None = None) -> Log:
+    def three_pushes(self, rows: Index | None = None) -> Log:
         """`three`, sampled at rows of the recording; default: at 1 kHz."""
         return self.three.log(NOISE, self.rng(13), rows)
 
-    def jittered(self) -> NDArray[np.int64]:
+    def jittered(self) -> Index:
         """Rows about 1 ms apart: 0.5 to 1.5 ms."""
         rows = np.arange(4, len(self.three.readings.time) - 4, 4)
         return rows + self.rng(14).integers(-1, 2, len(rows))
