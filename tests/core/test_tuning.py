@@ -94,10 +94,11 @@ def test_a_number_that_is_changed_changes_what_the_pipeline_does():
         tl.Pipeline("sara"),
         tl.Pipeline("sara", tuning={"observer.settled_steps": 50.0}),
     )
-    n = len(usual.robot.joint_names)
+    n, k = len(usual.robot.joint_names), len(usual.robot.sensor_names)
+    still = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros((k, 6))
     settled = []
     for pipeline in (usual, cautious):
-        health = [pipeline.update(0.001 * i, np.zeros(n), np.zeros(n)).health for i in range(200)]
+        health = [pipeline.update(0.001 * i, *still).health for i in range(200)]
         settled.append(sum(not h & tl.Health.SETTLING for h in health))
     assert cautious.tuning["observer.settled_steps"] == 50.0
     assert settled[0] > settled[1] == 0
