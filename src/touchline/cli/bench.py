@@ -476,6 +476,28 @@ def reliability(
     return main(Plan(seeds, share, healthy), page)
 
 
+def tuning(
+    *,
+    numbers: tuple[str, ...] = (),
+    out: Annotated[Path | None, arg(metavar="FILE")] = None,
+) -> int:
+    """What half and double of each tuning number do, on a few simulated recordings.
+
+    Example: touchline bench tuning --numbers place localizer.young --out benchmarks/tuning.json
+
+    Prints a line for each: how many touches, false events and faults more or fewer there are, and
+    by how much places and detection are off. All of them take some minutes.
+
+    Args:
+        numbers: Of `print(tl.Tuning())`, or modules of it; default: all.
+        out: Writes the table here as well; docs/reference/tuning.md is made from it.
+    """
+    from touchline.bench.tuning.run import main
+
+    main(numbers, out)
+    return 0
+
+
 def fuzz(
     *, runs: int = 1000, seed: int = 0, keep: Annotated[Path | None, arg(metavar="DIR")] = None
 ) -> int:
@@ -519,5 +541,6 @@ BENCHMARKS: dict[str, Callable[..., int]] = {
     "real": real,
     "interface": interface,
     "reliability": reliability,
+    "tuning": tuning,
     "fuzz": fuzz,
 }
