@@ -314,6 +314,24 @@ def test_a_test_that_could_not_be_set_is_refused(logs, tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
+        (lambda s: replace(s, tau=1e3 * s.tau), "every joint is about .* mNm"),
+        (lambda s: replace(s, qd=np.degrees(s.qd)), "velocity of joint1"),
+        (lambda s: replace(s, tau=-s.tau), "opposite sign"),
+    ],
+    ids=["torque unit", "velocity unit", "sign"],
+)
+def test_wrong_signals_are_refused(robot, tmp_path, change, words):
+    log, out = tmp_path / "log.parquet", tmp_path / "out.yaml"
+    write_table(log, change(free_motion(robot, 12.0, 100.0)), robot.description)
+    with pytest.raises(InputError, match=words) as caught:
+        calibrate([log], "sara", out)
+    assert "nothing written: mend this first" in str(caught.value)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
         (lambda p: {"logs": []}, "at least one recording"),
         (lambda p: {"logs": [p[0], p[0]]}, "named twice"),
         (

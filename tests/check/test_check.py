@@ -194,6 +194,44 @@ def test_a_fixed_description_has_no_more_findings(tmp_path, robot):
     assert fixed.read_bytes() == before and not (tmp_path / "no.yaml").exists()
 
 
+def upside_down(values):
+    values[:, WRIST] *= -1.0
+
+
+def offset(values):
+    values[:, 2] += 6.0
+
+
+FIXABLE = {
+    "torque sign": ({"tau": scale((2,), -1.0)}, {"joints": {"joint3": {"sign": -1.0}}}),
+    "all torques in mNm": (
+        {"tau": lambda tau: tau * 1e3},
+        {"joints": {f"joint{i}": {"gain": 0.001} for i in range(1, 8)}},
+    ),
+    "torque offset": ({"tau": offset}, {"joints": {"joint3": {"bias": 6.0}}}),
+    "polarity": (
+        {"wrench": upside_down},
+        {"force_torque_sensors": {"wrist": {"polarity": "inboard"}}},
+    ),
+}
+
+
+@pytest.mark.parametrize("mistake", FIXABLE)
+def test_what_has_a_key_is_mended(tmp_path, robot, recording, mistake):
+    changes, expected = FIXABLE[mistake]
+    log, fixed = tmp_path / "log.parquet", tmp_path / "fixed.yaml"
+    write_table(log, changed(recording, **changes), robot.description)
+    assert main(["check", "sara-full", str(log), "--fix", str(fixed)]) == 1
+    written = tl.load_robot(fixed).description
+    entries = {"joints": written.joints, "force_torque_sensors": written.sensors}
+    for key, names in expected.items():
+        for entry in entries[key]:
+            for name, value in names.get(entry.name, {}).items():
+                found = getattr(entry, name)
+                assert found == (value if isinstance(value, str) else pytest.approx(value, 0.02))
+    assert check(fixed, log).findings == []
+
+
 def test_a_tool_that_is_modelled_but_not_mounted(tmp_path, robot, recording):
     path = tmp_path / "robot.yaml"
     text = robot.description.path.read_text()

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from touchline.calibrate.beforehand import refuse_wrong_signals
 from touchline.calibrate.blame import find_blame, often_off
 from touchline.calibrate.held_out import HeldOut, judge, split
 from touchline.calibrate.noise import measure_noise, noise_keys
@@ -149,6 +150,8 @@ def calibrate(
     given = read_yaml(source).get("detection") or {}
     hold = model.description.detection.min_duration if "min_duration" in given else 0.0
     recordings = Recordings(model, logs)
+    if identification and not trust:
+        refuse_wrong_signals(model, recordings, logs)
     changes: dict[str, Any] = {}
     found: Identification | None = None
     left_out: list[tuple[int, float, float]] = []

@@ -107,7 +107,7 @@ def _torques(robot: Robot, seen: Seen, mending: Mending) -> Step | None:
     dead = {name for kind, name in seen.table.dead() if kind == "tau"}
     measured = judged_joints(robot, windows, dead)
     telling = telling_joints(robot, seen)
-    units = _units(robot, windows, telling, mending)
+    units = _units(robot, windows, telling, measured, mending)
     if units is not None:
         return units
     rows = misfit(robot, windows, telling)
@@ -178,10 +178,12 @@ def total_misfit(robot: Robot, windows: Windows, measured: list[int]) -> float:
     return float(sum(misfit(robot, windows, measured)))
 
 
-def _units(robot: Robot, windows: Windows, measured: list[int], mending: Mending) -> Step | None:
-    """A unit that all torques share, or those of single joints."""
+def _units(
+    robot: Robot, windows: Windows, telling: list[int], measured: list[int], mending: Mending
+) -> Step | None:
+    """A unit that all measured torques share as far as they tell, or those of single joints."""
     ratios = {}
-    for j in measured:
+    for j in telling:
         e, r = windows.expected_torque[:, j], windows.torque[:, j]
         known = np.isfinite(e) & np.isfinite(r)
         if known.any() and np.abs(e[known]).max() > TELLING:

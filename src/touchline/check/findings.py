@@ -4,6 +4,8 @@
 from dataclasses import dataclass, field
 from typing import Any
 
+from touchline.model.robot_file import NAMED
+
 
 @dataclass
 class Findings:
@@ -12,7 +14,8 @@ class Findings:
     Attributes:
         findings: what should be mended, one clear line each.
         notes: by section, what was seen.
-        fixes: top-level keys of `robot.yaml` with the values that would mend findings.
+        fixes: top-level keys of `robot.yaml` with the values that would mend findings; of `joints`
+            and `force_torque_sensors` name -> key -> value.
     """
 
     findings: list[str] = field(default_factory=list)
@@ -24,6 +27,10 @@ class Findings:
         if line not in self.findings:
             self.findings.append(line)
 
+    def mend(self, key: str, name: str, **values: Any) -> None:
+        """Add what would mend an entry of `joints` or `force_torque_sensors`."""
+        self.fixes.setdefault(key, {}).setdefault(name, {}).update(values)
+
     def note(self, section: str, *lines: str) -> None:
         """Add lines to a section."""
         self.notes.setdefault(section, []).extend(lines)
@@ -34,7 +41,12 @@ class Findings:
             self.find(line)
         for section, lines in other.notes.items():
             self.note(section, *lines)
-        self.fixes.update(other.fixes)
+        for key, value in other.fixes.items():
+            if key in NAMED:
+                for name, values in value.items():
+                    self.mend(key, name, **values)
+            else:
+                self.fixes[key] = value
 
     def text(self) -> str:
         """Everything, the findings last."""

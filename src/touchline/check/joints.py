@@ -15,6 +15,7 @@ from touchline.check.fit import (
     scatter_of,
 )
 from touchline.check.windows import Windows
+from touchline.model.description import JointDescription
 from touchline.model.robot import Robot
 
 MOVED = 0.02  # rad/s or m/s; slower says nothing of a velocity's sign
@@ -148,7 +149,7 @@ def check_torques(
         _note_fit(name, fit, findings)
         if j not in inside:
             fits[j] = fit
-            _judge(name, fit, size, limits.get(j, np.inf), findings)
+            _judge(robot.description.joints[j], fit, size, limits.get(j, np.inf), findings)
     _judge_delays(robot, fits, findings)
 
 
@@ -217,9 +218,12 @@ def torque_words(name: str, fit: TorqueFit) -> list[str]:
     return []
 
 
-def _judge(name: str, fit: TorqueFit, size: float, limit: float, findings: Findings) -> None:
+def _judge(
+    joint: JointDescription, fit: TorqueFit, size: float, limit: float, findings: Findings
+) -> None:
     if not fit.certain:
         return
+    name = joint.name
     coarse = torque_words(name, fit)
     for line in coarse:
         findings.find(line)
@@ -237,6 +241,7 @@ def _judge(name: str, fit: TorqueFit, size: float, limit: float, findings: Findi
             f"torque of {name} has an offset of {fit.offset:+.2f} Nm that the description does "
             f"not know, more than its contact threshold {limit:.2f}: set bias"
         )
+        findings.mend("joints", name, bias=round(joint.bias + fit.offset, 3))
     rubs = max(SURE * fit.rubbing_error, RUBBING * size, limit)
     if not coarse and fit.rubbing > rubs and max(fit.coulomb, fit.viscous) > 0.0:
         findings.find(
@@ -268,6 +273,9 @@ def _judge_delays(robot: Robot, fits: dict[int, TorqueFit], findings: Findings) 
             f"the torques come {1e3 * common:.1f} +- {1e3 * max(error, 1e-4):.1f} ms late, beside "
             f"the positions: delay: {common:.4f} for each of joints"
         )
+        for joint in robot.description.joints:
+            if joint.measured:
+                findings.mend("joints", joint.name, delay=round(joint.delay + common, 5))
 
 
 def swapped_torques(windows: Windows, measured: list[int]) -> list[tuple[int, int]]:

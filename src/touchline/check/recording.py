@@ -79,6 +79,23 @@ def check_recording(robot: Robot, path: Path, findings: Findings) -> None:
                 plain = better
                 findings.take(explained)
     findings.take(plain)
+    _mend_description(robot, mending, findings)
+
+
+def _mend_description(robot: Robot, mending: Mending, findings: Findings) -> None:
+    """What a description can say of a recording that had to be mended; the log's keys cannot."""
+    description = robot.description
+    ordered = np.array_equal(mending.order, np.arange(len(description.joints)))
+    for joint, factor in zip(description.joints, mending.torque, strict=True):
+        if factor != 1.0 and ordered:
+            gain = float(f"{joint.gain * abs(factor):.6g}")
+            findings.mend("joints", joint.name, gain=gain, sign=joint.sign * np.sign(factor).item())
+        if mending.weights is not None and joint.measured:
+            findings.mend("joints", joint.name, compensated="gravity")
+    for sensor, matrix in zip(description.sensors, mending.wrench, strict=True):
+        if np.array_equal(matrix, -np.eye(6)):
+            other = "inboard" if sensor.polarity == "outboard" else "outboard"
+            findings.mend("force_torque_sensors", sensor.name, polarity=other)
 
 
 def glance(robot: Robot, parts: list[Samples], felt: list[Mask], off: bool) -> list[str]:

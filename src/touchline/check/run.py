@@ -45,6 +45,9 @@ def write_fixes(robot: str | Path, found: Findings, out: Path) -> str:
     if not found.fixes:
         return "nothing that could be mended by itself: nothing written"
     fixes = dict(found.fixes)
+    if "joints" in fixes:  # those that a file does not name are not observed
+        names = load_robot(robot).joint_names
+        fixes["joints"] = {name: {} for name in names} | fixes["joints"]
     if "loads" in fixes:
         fixes["loads"] = [*(read_yaml(source).get("loads") or []), *fixes["loads"]]
     write_description(source, out, fixes)

@@ -2,7 +2,7 @@
 """Force-torque sensors beside the weight and the motion of what they carry."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import permutations, product
 
 import numpy as np
@@ -30,6 +30,7 @@ class Explanation:
         words: what would have to be changed.
         forces, moments: (W, 3) expected, in the log's axes and with its sign.
         columns: (3, 3) what leads from the logged axes to the described ones, where that is all.
+        change: of the sensor's keys in `robot.yaml`, that says so.
     """
 
     kind: str
@@ -37,6 +38,7 @@ class Explanation:
     forces: Array
     moments: Array
     columns: Array | None = None
+    change: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -120,6 +122,8 @@ class _SensorCheck:
         moment, moment_words = self._factor("moments", best.moments, MOMENT_FACTORS)
         for line in (*words, *force_words, *moment_words):
             self.findings.find(line)
+        if best.change:
+            self.findings.mend("force_torque_sensors", self.sensor.name, **best.change)
         self._judge(best)
         if best.columns is None:
             return []
@@ -162,17 +166,22 @@ class _SensorCheck:
         yield Explanation("described", "", *self._turned(own, R, sign), np.eye(3))
         other = "inboard" if sign > 0 else "outboard"
         words = f"reads the opposite of what it carries: set polarity: {other}"
-        yield Explanation("polarity", words, *self._turned(own, R, -sign), -np.eye(3))
+        yield Explanation(
+            "polarity", words, *self._turned(own, R, -sign), -np.eye(3), {"polarity": other}
+        )
         if described == "gravity":
             words = "the weight is still in the signal: compensated: none"
-            yield Explanation("compensated", words, *self._turned(self._expected("none"), R, sign))
+            turned = self._turned(self._expected("none"), R, sign)
+            yield Explanation("compensated", words, *turned, None, {"compensated": "none"})
         for frame in ("sensor", "world", self.robot.mechanism.root, self.sensor.link):
             if frame != self.sensor.frame:
                 R_other = self._to_log(frame)
                 words = f"the log gives its axes in another frame: frame: {frame}"
-                yield Explanation("frame", words, *self._turned(own, R_other, sign))
+                change = {"frame": frame}
+                yield Explanation("frame", words, *self._turned(own, R_other, sign), None, change)
                 words += f", polarity: {other}"
-                yield Explanation("frame", words, *self._turned(own, R_other, -sign))
+                change = {"frame": frame, "polarity": other}
+                yield Explanation("frame", words, *self._turned(own, R_other, -sign), None, change)
         if self.has.all():
             for P, words in axis_mixes():
                 yield Explanation("axes", words, *self._turned(own, P @ R, sign), P.T)
@@ -251,6 +260,17 @@ class _SensorCheck:
                     f"sensor {self.sensor.name}: {what} bias about [{words}] {unit}, more than "
                     f"the contact threshold {limit:.2g}: set bias"
                 )
+                self._mend_bias(first, fit.offset)
+
+    def _mend_bias(self, first: int, offset: Array) -> None:
+        """What the description should have as bias, where the log gives sensor axes."""
+        if self.sensor.frame != "sensor" or not self.has.all():
+            return
+        found = self.findings.fixes.get("force_torque_sensors", {}).get(self.sensor.name, {})
+        bias = list(found.get("bias", self.sensor.bias))
+        sign = 1.0 if self.sensor.polarity == "outboard" else -1.0
+        bias[first : first + 3] = [round(float(x), 4) for x in sign * offset]
+        self.findings.mend("force_torque_sensors", self.sensor.name, bias=bias)
 
 
 def fit_vectors(expected: Array, reading: Array) -> Fit:

@@ -28,7 +28,9 @@ def check(
     Args:
         robot: A robot.yaml, a URDF or MJCF, or the name of a robot.
         log: A recording: a table (.parquet, .csv, .csv.gz) or a rosbag2 (.mcap, .db3).
-        fix: Writes a copy of the description in which a missing load or a tilted base is mended.
+        fix: Writes a copy of the description in which all is mended that has a key there: loads, a
+            tilted base, sign, gain, offset, delay and compensation of torques; polarity, axes and
+            bias of force-torque sensors. What the log names wrongly is left to you.
     """
     from touchline.check.run import check as run
 
