@@ -14,6 +14,7 @@ from prose import REPOSITORY
 PYTHON = sorted((REPOSITORY / "src").rglob("*.py"))
 CPP = sorted(p for p in (REPOSITORY / "core").rglob("*") if p.suffix in (".hpp", ".cpp"))
 CPP_COMMENT = re.compile(r"(?:^|\s)//+\s?(.*)$")
+HEADING = re.compile(r"^-+ .* -+$")
 
 
 def passages(path: Path) -> list[tuple[int, str]]:
@@ -53,7 +54,8 @@ def _python_comments(text: str) -> Iterator[tuple[int, bool, str]]:
 def _cpp_comments(text: str) -> Iterator[tuple[int, bool, str]]:
     for number, line in enumerate(text.splitlines(), 1):
         if found := CPP_COMMENT.search(line):
-            yield number, line.lstrip().startswith("//"), found.group(1)
+            told = HEADING.sub("", found.group(1))
+            yield number, line.lstrip().startswith("//"), told
 
 
 def _blocks(comments: Iterator[tuple[int, bool, str]]) -> list[tuple[int, str]]:
