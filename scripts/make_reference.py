@@ -145,6 +145,7 @@ MANIFEST = [
     ("duration", "number", "s", "From the first sample to the last."),
     ("events", "whole number", "", "Number of events."),
     ("collisions", "whole number", "", "How many of them are collisions."),
+    ("faint", "list of text", "", "Touches below what is surely felt on their link."),
     ("outputs", "by file", "", "Hash of each file of the results."),
     ("seconds", "number", "s", "Time that the analysis took."),
     ("cpu_seconds", "number", "s", "CPU time that it took."),
@@ -323,7 +324,8 @@ def results() -> str:
         + "\nEach of `standing`:\n\n"
         + described("key", standing())
         + "\n## Several recordings\n\nEach has a folder with the files above. Beside these folders "
-        "stand the page `fleet.html`, the file `manifest.jsonl` and the folder `tables`.\n\n"
+        "stand the page `fleet.html`, the file `manifest.jsonl` and the folder `tables`. In "
+        "`log.jsonl` each run adds a line when it is done with a recording.\n\n"
         "### manifest.jsonl\n\nOne line of JSON per recording.\n\n"
         + described("key", MANIFEST)
         + "".join(

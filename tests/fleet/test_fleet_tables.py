@@ -3,7 +3,7 @@
 
 import json
 import re
-from html import unescape
+from html import escape, unescape
 from urllib.parse import unquote
 
 import numpy as np
@@ -16,6 +16,8 @@ from free_motion import free_motion, pushed
 import touchline as tl
 from touchline.cli import main
 from touchline.fleet.figures import EDGES, SETTLES, percentile
+from touchline.fleet.manifest import Manifest
+from touchline.fleet.page import write_page
 from touchline.fleet.plan import make_plan
 from touchline.logs import write_table
 
@@ -119,6 +121,20 @@ def test_the_page_leads_to_each_recording(out):
     for heading in ("Robots", "Contacts by link", "Contacts by hour", "Calibration drift"):
         assert f"<h2>{heading}</h2>" in page
     assert "http" not in page.replace("http-equiv", "") and "<script" not in page
+
+
+def test_the_page_names_touches_below_what_is_surely_felt(out, tmp_path):
+    recordings = list(Manifest(out).rows.values())
+    assert all(isinstance(row["faint"], list) for row in recordings)
+    nothing = {"contacts": [], "health": [], "joints": [], "segments": []}
+    told = [row | {"faint": [], "duration": 90.0} for row in recordings]
+    write_page(tmp_path, told, {}, nothing)
+    assert "Below what can be felt" not in (tmp_path / "fleet.html").read_text()
+    told[1]["faint"] = ["event 3: 1.2 N & less"]
+    write_page(tmp_path, told, {}, nothing)
+    page = (tmp_path / "fleet.html").read_text()
+    assert f"<li>{escape(told[1]['name'])}: event 3: 1.2 N &amp; less</li>" in page
+    assert f"<b>{1.5 * len(told):.2f} min</b>" in page
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

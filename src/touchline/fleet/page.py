@@ -19,6 +19,7 @@ from touchline.report.outputs import EVENTS, REPORT, write_text
 
 PAGE_FILE = "fleet.html"
 DRIFTS = 30  # joints that the page names, the worst first
+MOST_FAINT = 20  # lines
 MOST_RECORDINGS = 20_000  # lines of the last table: some 4 MB
 
 PAGE = """<!doctype html>
@@ -35,8 +36,7 @@ PAGE = """<!doctype html>
 <body>
 <main>
 {body}
-<footer>Touchline {version}. Phantom forces are those felt while no contact was found, in samples
-without remark. Not a certified safety function.</footer>
+<footer>Touchline {version}. Not a certified safety function.</footer>
 </main>
 </body>
 </html>
@@ -53,6 +53,7 @@ def write_page(out: Path, recordings: list[Row], figures: dict[str, Figures], ro
         _robots(recordings, figures),
         _by(rows, "link", "Contacts by link", "link"),
         _by(rows, "hour", "Contacts by hour", "hour"),
+        _faint(recordings),
         _drift(figures),
         _health(rows),
         _recordings(out, recordings),
@@ -63,11 +64,11 @@ def write_page(out: Path, recordings: list[Row], figures: dict[str, Figures], ro
 
 def _header(recordings: list[Row]) -> str:
     told = Counter(row["status"] for row in recordings)
-    hours = sum(row["duration"] for row in recordings) / 3600
+    seconds = sum(row["duration"] for row in recordings)
     lost = len(recordings) - told["ok"]
     cards = [
         (str(len(recordings)), f"recordings, {lost} of them not ok"),
-        (f"{hours:.2f} h", f"{sum(row['samples'] for row in recordings)} samples"),
+        (_lasting(seconds), f"{sum(row['samples'] for row in recordings)} samples"),
         (str(sum(row["events"] for row in recordings)), "contacts"),
         (str(sum(row["collisions"] for row in recordings)), "of them collisions"),
     ]
@@ -90,14 +91,29 @@ def _robots(recordings: list[Row], figures: dict[str, Figures]) -> str:
             for told in entry["segments"].values():
                 spread[robot] += np.array(told["counts"])
     head = ["robot", "recordings", "hours", "contacts", "collisions", "contacts per hour"]
-    head += [f"phantom force {name} [N]" for name in SHARES]
+    head += [f"{name} [N]" for name in SHARES]
+    words = (
+        f"{', '.join(SHARES)}: percentiles of the force that is felt while nothing touches, in "
+        "samples without remark."
+    )
     lines = [
         [name, names[name], hours[name], contacts[name], collisions[name]]
         + [contacts[name] / hours[name] if hours[name] else None]
         + [percentile(spread[name], share) for share in SHARES.values()]
         for name in sorted(names)
     ]
-    return section("Robots", table(head, [_short(line) for line in lines]))
+    return section("Robots", table(head, [_short(line) for line in lines]), note(words))
+
+
+def _faint(recordings: list[Row]) -> str:
+    """Touches below what is surely felt on their link, by recording."""
+    lines = [(row["name"], line) for row in recordings for line in row.get("faint", ())]
+    if not lines:
+        return ""
+    items = [f"<li>{escape(name)}: {escape(line)}</li>" for name, line in lines[:MOST_FAINT]]
+    if len(lines) > MOST_FAINT:
+        items.append(f"<li>{len(lines) - MOST_FAINT} more are in manifest.jsonl</li>")
+    return section("Below what can be felt", f"<ul>{''.join(items)}</ul>")
 
 
 def _by(rows: Rows, key: str, title: str, head: str) -> str:
@@ -177,6 +193,14 @@ def _recordings(out: Path, recordings: list[Row]) -> str:
     hidden = len(recordings) - len(lines)
     more = note(f"{hidden} more are in manifest.jsonl.") if hidden else ""
     return section("Recordings", table(head, [_short(line) for line in lines]), more)
+
+
+def _lasting(seconds: float) -> str:
+    """A duration in the unit that suits it."""
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= size:
+            return f"{seconds / size:.2f} {unit}"
+    return f"{seconds:.1f} s"
 
 
 def _short(line: list[Any]) -> list[Any]:

@@ -12,6 +12,7 @@ from touchline.fleet.manifest import Row
 from touchline.fleet.work import Job, blank, serve
 
 TRIES = 2
+FAREWELL = 5.0  # s that a process without a job has to end
 
 
 class _Worker:
@@ -31,9 +32,13 @@ class _Worker:
         self.pipe.send(job)
 
     def end(self) -> None:
+        """End it: at once while it has a job, else by closing its pipe, so that it cleans up."""
+        if self.job is not None:
+            self.process.kill()
+        self.pipe.close()
+        self.process.join(FAREWELL)
         self.process.kill()
         self.process.join()
-        self.pipe.close()
 
 
 class Pool:
@@ -90,6 +95,7 @@ class Pool:
         except (EOFError, OSError):  # it died while it answered
             pass
         late = worker in self._late([worker])
+        worker.process.kill()
         self._dismiss(worker)
         if late:
             return blank(job, "failed", f"took longer than {self._seconds:g} s")

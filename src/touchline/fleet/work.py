@@ -101,6 +101,7 @@ def blank(job: Job, status: str, reason: str) -> Row:
         "duration": 0.0,
         "events": 0,
         "collisions": 0,
+        "faint": [],
         "outputs": {},
     }
 
@@ -130,5 +131,6 @@ def _analyzed(job: Job, log: Path) -> Row:
         "duration": round(clock.duration, 6),
         "events": len(analysis.events),
         "collisions": sum(event.level == "collision" for event in analysis.events),
+        "faint": list(analysis.faint),
         "outputs": {file.name: file_hash(file) for file in files},
     }

@@ -149,8 +149,8 @@ def _words(
     words = (
         "The arm as it stood at the event, from two sides. The arrow ends where the arm was "
         "touched and points along the force on it; the line goes on along the force. The disc is "
-        f"{SIGMAS:g} standard deviations of the point; where they are small the ball hides it. "
-        "What the arm hides is drawn fainter."
+        f"{SIGMAS:g} standard deviations of the point wide; the ball hides a small one. "
+        "What lies behind the arm is drawn fainter."
         if pictures
         else "No mesh of the robot could be read: there are no pictures."
     )

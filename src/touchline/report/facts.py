@@ -109,10 +109,16 @@ def event_where(event: Event) -> str:
 
 def event_place(event: Event) -> str:
     """The same, with its status where the event is not located, and its probability if not 1."""
-    doubts = [] if event.status == "located" else [str(event.status).replace("_", " ")]
-    if event.link is not None and (event.body_probability or 1.0) < SURE:
-        doubts.append(f"{100 * (event.body_probability or 0.0):.0f} %")
-    return f"{event_where(event)} ({', '.join(doubts)})".lstrip() if doubts else event_where(event)
+    doubt = event_status(event).removeprefix("located").removeprefix(", ")
+    return f"{event_where(event)} ({doubt})".lstrip() if doubt else event_where(event)
+
+
+def event_status(event: Event) -> str:
+    """Status of an event in words, and the probability of its body if that is not 1."""
+    status = str(event.status).replace("_", " ")
+    if event.link is None or (event.body_probability or 1.0) >= SURE:
+        return status
+    return f"{status}, {100 * (event.body_probability or 0.0):.0f} %"
 
 
 def event_doubt(event: Event) -> str:

@@ -14,7 +14,13 @@ from touchline.report.beside import Beside
 from touchline.report.comparison import HEAD, cells, verdict
 from touchline.report.curves import Panel
 from touchline.report.event_figures import figures
-from touchline.report.facts import event_where, health_facts, joint_facts, segment_facts
+from touchline.report.facts import (
+    event_status,
+    event_where,
+    health_facts,
+    joint_facts,
+    segment_facts,
+)
 from touchline.report.html import Cell, note, section, table
 from touchline.report.lanes import lanes
 from touchline.report.outcome import Analysis
@@ -129,7 +135,7 @@ def _events(analysis: Analysis, pictured: set[int]) -> str:
     words = "Peaks of force and of the torque on the named joint. A click shows the event."
     if hidden > 0:
         words += f" {hidden} more are in events.json."
-    return section("Events", strip, table([*head, "where", "located"], rows, marks), note(words))
+    return section("Events", strip, table([*head, "where", "status"], rows, marks), note(words))
 
 
 def _comparisons(analysis: Analysis) -> str:
@@ -160,7 +166,7 @@ def _event_row(event: Event, origin: float, pictured: bool) -> list[Any]:
         event.segment,
         *("" if value is None else f"{value:.2f}" for value in peak),
         event_where(event),
-        event.status.replace("_", " "),
+        event_status(event),
     ]
 
 
