@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 
 import touchline as tl
+from touchline.bench.reliability.campaign import Kept, Part, run_all
 from touchline.bench.reliability.judge import judge, listen
 from touchline.bench.reliability.run import tables
+from touchline.errors import InputError
 from touchline.simulation.contacts import Profile, ScriptedContact
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scenario import scripted
@@ -116,3 +118,23 @@ def test_a_push_that_a_slow_joint_feels_first_is_felt_until_its_end():
 def test_what_is_pushed_can_be_reached_from_outside():
     recording = record(tl.load_robot("sara"), 0)
     assert recording.body != "link5"  # its first draw lies inside link6
+
+
+def test_runs_that_are_kept_are_not_run_again(tmp_path):
+    part = Part("sara-full", 0, 0.0015)
+    first = list(run_all([part], tmp_path, 1))
+    path = Kept(tmp_path).file(part)
+    lines = path.read_text().splitlines()
+    assert len(first) == len(lines) >= 2
+    # The last run was cut off as it was written: it alone is run again.
+    path.write_text("\n".join([*lines[:-1], lines[-1][:20]]))
+    again = list(run_all([part], tmp_path, 1))
+    assert path.read_text().splitlines()[:-1] == [*lines[:-1], lines[-1][:20]]
+    told = [(o.fault.name, o.channel.name, o.phase, o.told, o.phantoms) for o in first]
+    assert told == [(o.fault.name, o.channel.name, o.phase, o.told, o.phantoms) for o in again]
+
+
+def test_runs_of_another_build_are_refused(tmp_path):
+    (tmp_path / "build.txt").write_text("0123456789abcdef\n")
+    with pytest.raises(InputError, match="another build"):
+        Kept(tmp_path)

@@ -452,10 +452,13 @@ def reliability(
     share: float = 0.03,
     healthy: float = 0.25,
     page: Annotated[Path | None, arg(metavar="FILE")] = None,
+    keep: Annotated[Path | None, arg(metavar="DIR")] = None,
+    processes: int = 1,
 ) -> int:
     """Faults of sensors and clocks, put into recordings: what is told, and what comes of them.
 
     Example: touchline bench reliability --share 0.2 --page docs/reliability.md
+    Example: touchline bench reliability --share 1 --seeds 3 --keep runs --processes 4
 
     Prints figures beside the goals, then a line for each type of fault. The arms are `sara`,
     `sara-full`, a UR5 with two sensors and a Panda; the last two need example-robot-data.
@@ -467,13 +470,15 @@ def reliability(
         share: Share of the cases that are drawn; 1 takes some 7,000 runs, half an hour.
         healthy: Minutes of motion without a fault, of each arm, in which none may be reported.
         page: Writes docs/reliability.md.
+        keep: Each run that is done is kept here; the same command goes on where it was stopped.
+        processes: That work at a time.
     """
     from touchline.bench.reliability.run import Plan, main
     from touchline.numbers import check_least
 
-    check_least(1, seeds=seeds)
+    check_least(1, seeds=seeds, processes=processes)
     check_least(0, share=share, healthy=healthy)
-    return main(Plan(seeds, share, healthy), page)
+    return main(Plan(seeds, share, healthy, keep, processes), page)
 
 
 def tuning(

@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from touchline.bench.reliability.judge import Outcome, judge, listen
+from touchline.bench.reliability.campaign import Part, run_all
+from touchline.bench.reliability.judge import Outcome, listen
 from touchline.bench.tables import Row, aligned
 from touchline.pipeline.pipeline import Pipeline
-from touchline.trials.faults import FAULTS, cases_of
-from touchline.trials.recordings import PHASES, ROBOTS, record, robots
+from touchline.trials.faults import FAULTS
+from touchline.trials.recordings import ROBOTS, record, robots
 
 TOLD, WRONG = 0.98, 0.005  # shares that are required
 
@@ -25,25 +26,21 @@ class Plan:
         seeds: motions and pushes of each arm.
         share: of the cases of each, drawn at random; 1: all.
         healthy: minutes of motion without a fault, of each arm.
+        folder: keeps what is done, for another start to go on with; None: nothing is kept.
+        processes: that work at a time.
     """
 
     seeds: int = 1
     share: float = 1.0
     healthy: float = 0.5
+    folder: Path | None = None
+    processes: int = 1
 
 
 def outcomes(plan: Plan) -> Iterator[Outcome]:
     """Of all cases of a plan."""
-    for _, robot in robots():
-        pipeline = Pipeline(robot)
-        for seed in range(plan.seeds):
-            recording = record(robot, seed)
-            healthy = listen(pipeline, recording.samples)
-            rng = np.random.default_rng([seed, 12])
-            for fault, channel in cases_of(robot):
-                for phase in PHASES.items():
-                    if rng.random() < plan.share:
-                        yield judge(pipeline, recording, healthy, fault, channel, phase)
+    parts = [Part(name, seed, plan.share) for seed in range(plan.seeds) for name, _ in robots()]
+    return run_all(parts, plan.folder, plan.processes)
 
 
 def false_reports(plan: Plan) -> tuple[float, list[str]]:
@@ -179,8 +176,9 @@ not the touched one, and is not what the healthy recording says either.
 ```
 
 What a layout cannot tell, `touchline check ROBOT` lists as its parity space. Scale, delay, bias and
-drift of one channel are told where they make it jump or stand still. So are those of one axis of a
-sensor that has another one inboard, which does not feel it. A force at the innermost sensor alone
-is not told: it may be a push on the link that carries it. Nor is a joint torque: a hand may pinch
-the joint.
+drift of one channel are told where they make it jump or stand still. They are also told where that
+channel alone explains what a force-torque sensor's segment feels (`suspect`): a contact does so at
+one place in thousands. Then it is named, and nothing that it explains is a sure contact or a
+collision. It is left out of what is estimated where a sensor inboard contradicts it. With joint
+torques alone nothing of this is told: a push on the first link loads one joint, too.
 """
