@@ -6,13 +6,16 @@ import gzip
 import os
 import socket
 import urllib.request
+from contextlib import ExitStack
 
 import pytest
 import viser
 from browser import until
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from touchline.errors import InputError
+from touchline.view import gate
 from touchline.view.guard import Guard
 from touchline.view.server import PageServer
 
@@ -106,6 +109,51 @@ def test_a_program_on_this_machine_may_connect(server):
     url = f"ws://127.0.0.1:{server.page.get_port()}"
     with connect(url, subprotocols=[PROTOCOL], compression=None, proxy=None) as client:
         assert len(client.recv(timeout=5)) > 16
+
+
+def visitor(server):
+    url = f"ws://127.0.0.1:{server.page.get_port()}"
+    return connect(url, subprotocols=[PROTOCOL], compression=None, proxy=None)
+
+
+def test_a_visitor_who_sends_too_many_messages_is_sent_away():
+    with PageServer("test", port=0) as page:
+        with visitor(page) as client, pytest.raises(ConnectionClosed) as closed:
+            for _ in range(int(gate.BURST) + 5000):
+                client.send(b"nonsense")
+            while True:
+                client.recv(timeout=10)
+        assert closed.value.rcvd.code == gate.TOO_MANY
+        with visitor(page) as client:  # others are let in
+            assert len(client.recv(timeout=5)) > 16
+
+
+def test_so_many_visitors_and_no_more():
+    with PageServer("test", port=0) as page, ExitStack() as stack:
+        first = stack.enter_context(visitor(page))
+        for _ in range(gate.MOST_VISITORS - 1):
+            stack.enter_context(visitor(page)).recv(timeout=5)
+        with visitor(page) as late, pytest.raises(ConnectionClosed) as closed:
+            late.recv(timeout=5)
+        assert closed.value.rcvd.code == gate.LATER
+        first.close()
+        until(lambda: _is_let_in(page), what="room for another visitor")
+
+
+def _is_let_in(server):
+    with visitor(server) as client:
+        try:
+            return len(client.recv(timeout=5)) > 16
+        except ConnectionClosed:
+            return False
+
+
+def test_a_page_that_is_used_is_not_sent_away():
+    allowance = gate.Allowance(0.0)
+    assert all(allowance.take(i / 250.0) for i in range(5000))
+    fast = gate.Allowance(0.0)
+    taken = [fast.take(i / 1000.0) for i in range(5000)]
+    assert taken[:1000] == [True] * 1000 and not all(taken)
 
 
 def test_the_page_may_load_nothing_from_elsewhere_and_stands_in_no_frame(server):

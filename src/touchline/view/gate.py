@@ -6,6 +6,7 @@ text for a number, a number out of its range, or one that is not finite.
 """
 
 import math
+import time
 from collections.abc import Awaitable, Callable
 from typing import Any
 
@@ -13,7 +14,11 @@ import msgspec
 import viser
 from viser import _messages
 
+MOST_VISITORS = 20  # at a time: each is sent all that moves
+RATE = 300.0  # 1/s, messages of one visitor: a page sends some 60 while its view turns
+BURST = 1000.0  # messages at once: a page greets with some dozens
 LARGEST_NUMBER = 1e6  # m, pixels or units of a control: nothing on a page is larger
+TOO_MANY, LATER = 1008, 1013  # why a connection is closed: a rule is broken; try again later
 TYPED = {
     kind.__name__: kind
     for kind in (
@@ -94,8 +99,26 @@ def _is_moderate(value: Any) -> bool:
     return True
 
 
+class Allowance:
+    """How many messages a visitor may send: so many at once, and so many a second.
+
+    Args:
+        now: the time of its first message [s].
+    """
+
+    def __init__(self, now: float) -> None:
+        self._left, self._time = BURST, now
+
+    def take(self, now: float) -> bool:
+        """Whether one more may be sent."""
+        self._left = min(BURST, self._left + RATE * (now - self._time))
+        self._time = now
+        self._left -= 1.0
+        return self._left >= 0.0
+
+
 class GatedConnection:
-    """A WebSocket connection of which only admitted messages are read.
+    """A WebSocket connection of which only admitted messages are read, and not too many.
 
     Args:
         connection: of a visitor.
@@ -104,24 +127,35 @@ class GatedConnection:
 
     def __init__(self, connection: Any, admits: Callable[[bytes | str], bool]) -> None:
         self._connection, self._admits = connection, admits
+        self._allowance = Allowance(time.monotonic())
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._connection, name)
 
     async def recv(self, *args: Any, **options: Any) -> bytes | str:
-        """The next message that is admitted."""
+        """The next message that is admitted; who sends too many is sent away."""
         while True:
             message = await self._connection.recv(*args, **options)
-            if self._admits(message):
+            if not self._allowance.take(time.monotonic()):
+                await self._connection.close(TOO_MANY, "too many messages")
+            elif self._admits(message):
                 return message
 
 
 def gated(
     handler: Callable[[Any], Awaitable[None]], admits: Callable[[bytes | str], bool]
 ) -> Callable[[Any], Awaitable[None]]:
-    """The handler of connections, for which messages are judged first."""
+    """The handler of connections: messages are judged first, and visitors are not too many."""
+    visitors: set[Any] = set()
 
     async def handle(connection: Any) -> None:
-        await handler(GatedConnection(connection, admits))
+        if len(visitors) >= MOST_VISITORS:
+            await connection.close(LATER, "too many visitors")
+            return
+        visitors.add(connection)
+        try:
+            await handler(GatedConnection(connection, admits))
+        finally:
+            visitors.discard(connection)
 
     return handle
