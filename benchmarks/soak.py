@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A pipeline that runs for long: `soak.py [SAMPLES]`, 1e8 without it (a day of 1 kHz).
+
+An arm swings and is pushed, again and again, with a pause of a minute between. Prints the resident
+memory as it goes, its slope over the second half in MB an hour of 1 kHz and of wall time. Tells
+whether a pipeline that has been reset afterwards says what a fresh one says, to the last bit.
+"""
+
+import resource
+import sys
+import time as clock
+
+import numpy as np
+
+import touchline as tl
+from touchline.bench.reliability.recordings import record
+
+PAUSE = 60.0  # s of recorded time between two pushes
+PARTS = 20  # prints of the memory
+
+
+def resident():
+    """Of this process [MB]."""
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * resource.getpagesize() / 1e6
+
+
+def said(pipeline, s):
+    """All that is said of a recording."""
+    before = len(pipeline.events)
+    estimate, _ = pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+    return estimate.rows, [
+        (e.detected, e.cleared, e.body, e.force) for e in pipeline.events[before:]
+    ]
+
+
+def main(samples):
+    """Prints what came of it."""
+    robot = tl.load_robot("sara")
+    touched, free = record(robot, 0).samples, record(robot, 0, pushed=False).samples
+    pipeline = tl.Pipeline(robot)
+    length = len(touched)
+    rounds = round(PAUSE / (touched.time[-1] + 1e-3))
+    done, shift, sizes, began = 0, 0.0, [], clock.monotonic()
+    while done < samples:
+        for i in range(rounds):
+            s = touched if i == 0 else free
+            pipeline.run(s.time + shift, s.q, s.qd, s.tau, s.wrench)
+            shift += length * 1e-3
+            done += length
+        if done >= samples * (len(sizes) + 1) / PARTS:
+            sizes.append((done, clock.monotonic() - began, resident()))
+            print(f"{done:.2e} samples, {sizes[-1][1]:.0f} s: {sizes[-1][2]:.1f} MB", flush=True)
+    half = np.array(sizes[len(sizes) // 2 :])
+    recorded = np.polyfit(half[:, 0] / 3.6e6, half[:, 2], 1)[0] if len(half) > 2 else np.nan
+    wall = np.polyfit(half[:, 1] / 3600.0, half[:, 2], 1)[0] if len(half) > 2 else np.nan
+    events = len(pipeline.events)
+    pipeline.reset()
+    rows, told = said(pipeline, touched)
+    fresh_rows, fresh_told = said(tl.Pipeline(robot), touched)
+    same = np.array_equal(rows, fresh_rows, equal_nan=True) and repr(told) == repr(fresh_told)
+    print(f"{done:.3g} samples, {events} events")
+    print(f"{recorded:.2f} MB an hour of 1 kHz, {wall:.1f} of wall time")
+    print(f"reset and fresh: {'the same bits' if same else 'they differ'}")
+    return int(not same)
+
+
+if __name__ == "__main__":
+    sys.exit(main(int(float(sys.argv[1])) if len(sys.argv) > 1 else 100_000_000))
