@@ -104,6 +104,10 @@ MISTAKES = {
         {"wrench": scale((BASE, slice(0, 3)), 1e-3)},
         ["sensor base", "forces", "kN"],
     ),
+    "wrist in grams": (
+        {"wrench": scale((WRIST,), 1000 / 9.80665)},
+        ["sensor wrist", "forces", "grams", "0.00980665"],
+    ),
     "moments in mNm": (
         {"wrench": scale((WRIST, slice(3, 6)), 1e3)},
         ["sensor wrist", "moments", "mNm"],

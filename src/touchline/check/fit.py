@@ -15,6 +15,7 @@ FORCE_FACTORS = {
     9.80665: "N where kgf is expected, or a factor of 9.81 applied twice",
     1 / 9.80665: "kgf: use factor 9.80665",
     1000.0: "mN: use factor 0.001",
+    1000 / 9.80665: "grams: use factor 0.00980665",
     0.001: "kN: use factor 1000",
     4.44822: "a factor of 4.448 (pounds) applied twice",
     1 / 4.44822: "pounds: use factor 4.44822",
@@ -24,7 +25,7 @@ MOMENT_FACTORS = {
     1 / 9.80665: "kgf m: use factor 9.80665",
     1000.0: "mNm: use factor 0.001",
     0.001: "kNm: use factor 1000",
-    100.0: "Ncm: use factor 0.01",
+    100.0: "Ncm: use factor 0.01 (0.00980665 where forces are in grams)",
     1 / 1.35582: "pound-feet: use factor 1.35582",
     1 / 0.112985: "pound-inches: use factor 0.112985",
 }
