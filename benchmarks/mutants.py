@@ -78,6 +78,11 @@ def sums(program):
     return np.array([float(line.split()[0]) for line in done.stdout.splitlines()])
 
 
+def alike(found, right):
+    """Are these the same sums?"""
+    return found.shape == right.shape and np.allclose(found, right, rtol=1e-9, atol=1e-9)
+
+
 def main(count, seed):
     """Prints survivors and the score."""
     from tqdm import tqdm
@@ -103,8 +108,7 @@ def main(count, seed):
             if build(include, program):
                 valid += 1
                 found = sums(program)
-                same = found is not None and found[-1] == 0.0 and found.shape == right.shape
-                if same and np.allclose(found, right, rtol=1e-9, atol=1e-9):
+                if found is not None and found[-1] == 0.0 and alike(found, right):
                     print(f"{name}:{number + 1}: {lines[number].strip()}")
                 else:
                     killed += 1

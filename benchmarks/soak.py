@@ -13,7 +13,7 @@ import time as clock
 import numpy as np
 
 import touchline as tl
-from touchline.bench.reliability.recordings import record
+from touchline.trials.recordings import record
 
 PAUSE = 60.0  # s of recorded time between two pushes
 PARTS = 20  # prints of the memory

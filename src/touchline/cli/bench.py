@@ -458,7 +458,6 @@ def reliability(
     """Faults of sensors and clocks, put into recordings: what is told, and what comes of them.
 
     Example: touchline bench reliability --share 0.2 --page docs/reliability.md
-    Example: touchline bench reliability --share 1 --seeds 3 --keep runs --processes 4
 
     Prints figures beside the goals, then a line for each type of fault. The arms are `sara`,
     `sara-full`, a UR5 with two sensors and a Panda; the last two need example-robot-data.
@@ -471,7 +470,7 @@ def reliability(
         healthy: Minutes of motion without a fault, of each arm, in which none may be reported.
         page: Writes docs/reliability.md.
         keep: Each run that is done is kept here; the same command goes on where it was stopped.
-        processes: That work at a time.
+        processes: So many work at a time.
     """
     from touchline.bench.reliability.run import Plan, main
     from touchline.numbers import check_least
