@@ -8,13 +8,13 @@ from pathlib import Path
 
 from touchline.errors import InputError
 from touchline.fleet.manifest import MANIFEST, Manifest
+from touchline.fleet.figures import HOUR, lasting
 from touchline.fleet.plan import Recording
 from touchline.logs.log import open_log
 from touchline.logs.source import HEAD_ROWS
 from touchline.model.description import RobotDescription
 from touchline.model.robot import load_robot
 
-HOUR = 3600.0  # s
 # CPU time for an hour at 1 kHz, touched every ten seconds: `touchline bench logs`, rounded up [s].
 CPU = {"none": 40.0, "summary": 45.0, "full": 70.0}
 
@@ -132,22 +132,16 @@ def forecast_text(told: Forecast) -> str:
             f"{verb:8}{recording.size / 1e6:9.1f} MB {length:>8} h  {recording.name}{words}"
         )
     unknown = sum(r.name not in told.durations for r in told.todo)
-    hours = sum(told.durations.get(r.name, 0.0) for r in told.todo) / HOUR
+    known = sum(told.durations.get(r.name, 0.0) for r in told.todo)
     size = sum(r.size for r in told.todo) / 1e6
     lines.append(
-        f"{len(told.todo)} of {len(told.plan)} recordings, {hours:.2f} hours"
+        f"{len(told.todo)} of {len(told.plan)} recordings, {lasting(known)}"
         + (f" and {unknown} of unknown length" if unknown else "")
         + f", {size:.1f} MB"
     )
     source = f"as {told.measured} recordings before" if told.measured else "as of an arm at 1 kHz"
     lines.append(
-        f"about {_clock(told.seconds)} with {told.workers} processes "
+        f"about {lasting(max(told.seconds, 1.0))} with {told.workers} processes "
         f"({told.cost * HOUR:.0f} s of CPU an hour, {source}); nothing was done"
     )
     return "\n".join(lines)
-
-
-def _clock(seconds: float) -> str:
-    if seconds < 120.0:
-        return f"{max(seconds, 1.0):.0f} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < 2 * HOUR else f"{seconds / HOUR:.1f} h"

@@ -11,7 +11,7 @@ import numpy as np
 
 import touchline
 from touchline import __version__
-from touchline.fleet.figures import EDGES, Figures, percentile
+from touchline.fleet.figures import EDGES, Figures, lasting, percentile
 from touchline.fleet.manifest import Row
 from touchline.fleet.tables import SHARES, Rows
 from touchline.report.html import Cell, note, section, table
@@ -68,7 +68,7 @@ def _header(recordings: list[Row]) -> str:
     lost = len(recordings) - told["ok"]
     cards = [
         (str(len(recordings)), f"recordings, {lost} of them not ok"),
-        (_lasting(seconds), f"{sum(row['samples'] for row in recordings)} samples"),
+        (lasting(seconds), f"{sum(row['samples'] for row in recordings)} samples"),
         (str(sum(row["events"] for row in recordings)), "contacts"),
         (str(sum(row["collisions"] for row in recordings)), "of them collisions"),
     ]
@@ -193,14 +193,6 @@ def _recordings(out: Path, recordings: list[Row]) -> str:
     hidden = len(recordings) - len(lines)
     more = note(f"{hidden} more are in manifest.jsonl.") if hidden else ""
     return section("Recordings", table(head, [_short(line) for line in lines]), more)
-
-
-def _lasting(seconds: float) -> str:
-    """A duration in the unit that suits it."""
-    for unit, size in (("h", 3600.0), ("min", 60.0)):
-        if seconds >= size:
-            return f"{seconds / size:.2f} {unit}"
-    return f"{seconds:.1f} s"
 
 
 def _short(line: list[Any]) -> list[Any]:

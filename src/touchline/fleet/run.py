@@ -12,7 +12,7 @@ from typing import Any
 
 from touchline.errors import InputError
 from touchline.fleet.cluster import Cluster
-from touchline.fleet.figures import FIGURES, make_figures
+from touchline.fleet.figures import FIGURES, lasting, make_figures
 from touchline.fleet.manifest import Manifest, Row, configuration_hash
 from touchline.fleet.page import write_page
 from touchline.fleet.plan import Recording, make_plan
@@ -210,12 +210,12 @@ def outcome_text(outcome: Outcome, out: Path) -> str:
     ]
     told = Counter(row["status"] for row in outcome.rows)
     sums = ", ".join(f"{told[s]} {s}" for s in (*DONE, "failed", "skipped") if told[s])
-    hours = sum(row["duration"] for row in outcome.rows) / 3600
+    lasted = lasting(sum(row["duration"] for row in outcome.rows))
     events = sum(row["events"] for row in outcome.rows)
     if outcome.stopped:
         lines.append("stopped; the same command goes on")
     lines.append(
-        f"{len(outcome.rows)} recordings ({sums or 'none done'}), {hours:.2f} hours, "
+        f"{len(outcome.rows)} recordings ({sums or 'none done'}), {lasted}, "
         f"{events} events; "
         f"{len(outcome.unchanged)} were unchanged; {out}/manifest.jsonl tells of each"
     )
