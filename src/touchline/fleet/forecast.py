@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from touchline.errors import InputError
-from touchline.fleet.manifest import MANIFEST, Manifest
 from touchline.fleet.figures import HOUR, lasting
+from touchline.fleet.manifest import MANIFEST, Manifest
 from touchline.fleet.plan import Recording
 from touchline.logs.log import open_log
 from touchline.logs.source import HEAD_ROWS
