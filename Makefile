@@ -3,13 +3,17 @@
 PYTHON := .venv/bin/python
 CORE := $(shell find core -name '*.hpp' -o -name '*.cpp' -o -name 'CMakeLists.txt')
 
-.PHONY: demo test check accept format docs wheels acceptance clean
+.PHONY: demo test test-live check accept format docs wheels acceptance clean
 
 demo: .venv/demo
 	.venv/bin/touchline demo $(ARGS)
 
 test: .venv/ready
 	$(PYTHON) -m pytest -n 2 --dist worksteal $(ARGS)
+
+# With real ROS 2, the public RTDE client and franky, which are large: 300 MB.
+test-live: .venv/live
+	REQUIRE_ROS=1 $(PYTHON) -m pytest -n 2 --dist worksteal tests/live $(ARGS)
 
 check: .venv/ready
 	.venv/bin/ruff check .
@@ -42,6 +46,10 @@ clean:
 
 .venv/demo: pyproject.toml scripts/setup.sh $(CORE)
 	scripts/setup.sh demo
+
+.venv/live: .venv/ready
+	$(PYTHON) -m pip install --quiet --disable-pip-version-check --group live
+	touch $@
 
 .venv/ready: pyproject.toml scripts/setup.sh $(CORE)
 	scripts/setup.sh

@@ -75,7 +75,11 @@ def _follow(news, seconds: float) -> None:
 
 
 def memory(folder: Path, address: str, minutes: float) -> None:
-    """Prints the slope of the resident memory of `touchline live` and of the node."""
+    """Prints the slope of the resident memory of `touchline live` and of the node.
+
+    All of it, and what the process has asked for itself. The rest are pages of files, libraries
+    above all: Linux takes them away and brings them back as memory on the machine gets short.
+    """
     robot = str(folder / "robot.yaml")
     live = ["live", "--robot", robot, "--source", address, "--force", "--view", "--no-browser"]
     commands = {"page and recorder": ["touchline", *live, "--record", str(folder / "log.mcap")]}
@@ -93,7 +97,8 @@ def memory(folder: Path, address: str, minutes: float) -> None:
             kept.callback(process.wait)
             kept.callback(process.terminate)
             running[name] = process.pid
-        times, sizes = [], {name: [] for name in running}
+        times: list[float] = []
+        sizes: dict[str, list[tuple[float, float]]] = {name: [] for name in running}
         end = time.monotonic() + 60.0 * minutes
         while (now := time.monotonic()) < end:
             times.append(now)
@@ -110,19 +115,22 @@ def memory(folder: Path, address: str, minutes: float) -> None:
     warm = seconds > min(WARM, 0.5 * seconds[-1])
     hours = seconds[warm] / 3600.0
     for name, values in sizes.items():
-        megabytes = np.array(values)[warm] / 1e6
+        print(f"{name}, over {60 * np.ptp(hours):.1f} min; {written[name] / 1e6:.1f} MB recorded")
         A = np.column_stack([hours - hours.mean(), np.ones(len(hours))])
-        (slope, mean), *_ = np.linalg.lstsq(A, megabytes, rcond=None)
-        grown = megabytes[-1] - megabytes[0]
-        print(
-            f"{name}: {mean:.1f} MB, {slope:+.2f} MB an hour over {60 * np.ptp(hours):.1f} min, "
-            f"{grown:+.2f} MB from first to last; {written[name] / 1e6:.1f} MB recorded"
-        )
+        kinds = zip(("resident", "of its own"), np.array(values)[warm].T / 1e6, strict=True)
+        for kind, megabytes in kinds:
+            (slope, mean), *_ = np.linalg.lstsq(A, megabytes, rcond=None)
+            series = " ".join(f"{x:.1f}" for x in megabytes[:: max(len(megabytes) // 6, 1)])
+            print(
+                f"  {kind:10} {mean:.1f} MB, {slope:+.2f} MB an hour, "
+                f"{megabytes[-1] - megabytes[0]:+.2f} MB from first to last; {series}"
+            )
 
 
-def _resident(pid: int) -> int:
-    """Bytes."""
-    return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * PAGE
+def _resident(pid: int) -> tuple[float, float]:
+    """Bytes: all, and those that are no pages of files."""
+    all_of, shared = map(int, Path(f"/proc/{pid}/statm").read_text().split()[1:3])
+    return all_of * PAGE, (all_of - shared) * PAGE
 
 
 def main() -> None:

@@ -85,6 +85,7 @@ def main() -> None:
     rate = float(sys.argv[2]) if len(sys.argv) > 2 else 1000.0
     with tempfile.TemporaryDirectory() as folder:
         robot = _robot(Path(folder), "torques" not in sys.argv[3:])
+        alone = _alone(str(robot), rate)
         arm = [sys.executable, "-c", ARM, str(robot), str(rate), str(seconds)]
         parameters = ["-p", f"robot:={robot}", "-p", "source:=ros2://?wait=60", "-p", "force:=true"]
         node = [sys.executable, "-m", "touchline.live.node", "--ros-args", *parameters]
@@ -112,6 +113,8 @@ def main() -> None:
             f"{name}: {len(found)} messages, p50 {p50:.2f} ms, p99 {p99:.2f} ms, "
             f"largest {late.max():.1f} ms, {later:.1f} ms after the first second"
         )
+    p50, p99 = np.percentile(alone, [50, 99])
+    print(f"the pipeline alone, samples with a contact: p50 {p50:.2f} ms, p99 {p99:.2f} ms")
     print(f"load of this machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
 
 
@@ -127,6 +130,24 @@ def _robot(folder: Path, wrenches: bool) -> Path:
     joints = ", ".join(f"{{name: {joint.name}, torque: sensor}}" for joint in sara.joints)
     path.write_text(TORQUES.format(model=sara.model, joints=joints))
     return path
+
+
+def _alone(path: str, rate: float) -> list[float]:
+    """What the pipeline itself takes for each sample of the motion that has a contact [ms]."""
+    import touchline as tl
+    from touchline.simulation.noise import SensorNoise
+    from touchline.simulation.scenario import demo
+    from touchline.simulation.scene import Run
+
+    robot = tl.load_robot(path)
+    s = demo(robot, 20.0, Run(noise=SensorNoise(), rate=rate)).samples
+    pipeline, took = tl.Pipeline(robot, period=1.0 / rate), []
+    for row in zip(s.time, s.q, s.qd, s.tau, s.wrench, strict=True):
+        begin = time.perf_counter()
+        result = pipeline.update(*row)
+        if result.contacts:
+            took.append(1e3 * (time.perf_counter() - begin))
+    return took
 
 
 def _listen(seconds: float) -> tuple[dict[str, list[tuple[float, float]]], str]:

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <functional>
 #include <iterator>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -65,6 +66,8 @@ struct Pipeline {
   std::vector<std::vector<int>> hopeless;  // lost sensors that nobody can stand in for
   std::mutex turn;
   std::vector<double> ended;       // numbers of events, one after the other
+  std::size_t most = std::numeric_limits<std::size_t>::max();  // of them that are kept at least
+  std::size_t forgotten = 0;       // events before those in `ended`
   std::vector<double> closed;      // of changes that a restart made, for the next sample to tell
   std::vector<double> unmeasured;  // NaN for each torque and wrench
   std::vector<double> snapshot;    // of the last sample, on its way to Python
@@ -123,6 +126,10 @@ inline void keep_ended(Pipeline& p, const tl::Result& result) {
     p.ended.resize(p.ended.size() + fields::width<tl::Event>());
     tl::write_numbers(change.event, &*p.ended.end() - fields::width<tl::Event>());
   }
+  const std::size_t width = fields::width<tl::Event>(), kept = p.ended.size() / width;
+  if (kept / 2 <= p.most) return;
+  p.ended.erase(p.ended.begin(), p.ended.end() - static_cast<std::ptrdiff_t>(p.most * width));
+  p.forgotten += kept - p.most;
 }
 
 inline void take_snapshot(Pipeline& of, const tl::Sample& sample, const tl::Result& result,
@@ -256,19 +263,23 @@ inline nb::tuple run(Pipeline& p, nb::handle time, nb::handle q, nb::handle qd, 
                         arrays::table(faults, 4), arrays::table(resets, Snapshot::kOfReset + 2));
 }
 
-// The events that have ended, from number `from` of them on, and those that last.
+// The events that have ended, from number `from` of them on as far as they are kept, and those that
+// last; and how many have ended so far.
 inline nb::tuple events(Pipeline& p, std::size_t from) {
   const std::size_t width = fields::width<tl::Event>();
   std::vector<double> ended, lasting;
+  std::size_t count = 0;
   {
     const guard::Turn turn(p.turn);
-    ended.assign(p.ended.begin() + std::min(from * width, p.ended.size()), p.ended.end());
+    const std::size_t skipped = std::max(from, p.forgotten) - p.forgotten;
+    ended.assign(p.ended.begin() + std::min(skipped * width, p.ended.size()), p.ended.end());
+    count = p.forgotten + p.ended.size() / width;
     p.value->visit_lasting([&](const tl::Event& event) {
       lasting.resize(lasting.size() + width);
       tl::write_numbers(event, &*lasting.end() - width);
     });
   }
-  return nb::make_tuple(arrays::table(ended, width), arrays::table(lasting, width));
+  return nb::make_tuple(arrays::table(ended, width), arrays::table(lasting, width), count);
 }
 
 // Begins anew with the same robot but other figures, of its biases or loads. Events that last end
@@ -422,6 +433,10 @@ inline void bind(nb::module_& m) {
       .def("run", &run, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a)
       .def("events", &events, "since"_a)
       .def("restart", &restart, "robot"_a)
+      .def("keep", [](Pipeline& p, std::size_t most) {
+             const guard::Turn turn(p.turn);
+             p.most = most;
+           }, "most"_a)
       .def("prepare", [](Pipeline& p, const std::vector<int>& lost) { prepare(p, lost, false); },
            "lost"_a)
       .def_prop_ro("lost", [](const Pipeline& p) { return p.value->lost(); })

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """`touchline live` on the command line: what it prints, and bad input."""
 
+import json
+
 import pytest
 
 from touchline.cli.main import main
@@ -13,13 +15,18 @@ def run(capsys, *arguments):
 
 def test_contacts_are_told_as_they_come(capsys, tmp_path):
     path = tmp_path / "x.mcap"
+    events = tmp_path / "new" / "events.jsonl"
     options = ["--source", "sim://?speed=0", "--record", str(path), "--duration", "7"]
+    options += ["--events", str(events)]
     status, out, err = run(capsys, *options)
     assert status == 0 and err == ""
     told = [line for line in out.splitlines() if "contact" in line]
     assert "2.0" in told[0] and "on tool" in told[0]
     assert "over after" in told[1] and "20." in told[1]
     assert "7001 samples, 2 events" in out and str(path) in out
+    written = [json.loads(line) for line in events.read_text().splitlines()]
+    assert [event["id"] for event in written] == [0, 1]
+    assert written[0]["link"] == "tool" and written[0]["cleared"] > written[0]["detected"]
 
 
 @pytest.mark.parametrize(
@@ -46,6 +53,11 @@ def test_a_bad_duration_or_recording(capsys, tmp_path):
     assert status == 2 and "--duration" in err
     status, _, err = run(capsys, "--source", "sim://?speed=0", "--record", str(tmp_path / "x.csv"))
     assert status == 2 and ".mcap or .parquet" in err
+    taken = tmp_path / "taken"
+    taken.write_text("")
+    status, _, err = run(capsys, "--source", "sim://", "--events", str(taken / "x.jsonl"))
+    assert status == 2 and f"--events {taken / 'x.jsonl'}: cannot be written" in err
+    assert len(err.strip().splitlines()) == 1
 
 
 def test_a_robot_that_does_not_fit_is_refused_unless_forced(capsys, tmp_path):

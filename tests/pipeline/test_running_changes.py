@@ -14,6 +14,10 @@ from touchline.model.corrections import with_loads
 from touchline.model.description import Load
 from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
+from touchline.simulation.contacts import Profile, ScriptedContact
+from touchline.simulation.noise import SensorNoise
+from touchline.simulation.scenario import scripted
+from touchline.simulation.scene import Run
 
 LINK = "tool"
 
@@ -180,3 +184,22 @@ def test_weighing_names_what_is_wrong(sara):
         weigh_load(sara, [motion], "claw")
     with pytest.raises(InputError, match="no load on tool"):
         weigh_load(sara, [], LINK)
+
+
+def test_events_that_are_over_are_kept_only_as_far_as_asked(sara):
+    pushes = [
+        ScriptedContact(
+            "tool", np.zeros(3), np.array([20.0, 0.0, 0.0]), Profile(0.5 + 0.4 * i, hold=0.1)
+        )
+        for i in range(9)
+    ]
+    samples = scripted(sara, pushes, 4.5, settings=Run(noise=SensorNoise(), rate=500.0)).samples
+    every, bounded = (tl.Pipeline(sara, period=0.002) for _ in range(2))
+    bounded.keep_events(2)
+    for row in zip(samples.time, samples.q, samples.qd, samples.tau, samples.wrench, strict=True):
+        every.update(*row)
+        bounded.update(*row)
+    assert len(every.events) >= 8
+    kept = [event.as_json() for event in bounded.events]
+    assert 2 <= len(kept) <= 4 and kept == [event.as_json() for event in every.events[-len(kept) :]]
+    assert bounded.events == bounded.events

@@ -14,6 +14,7 @@ def live(
     robot: Annotated[str, arg(metavar="ROBOT")],
     source: Annotated[str, arg(metavar="SOURCE")],
     record: Annotated[Path | None, arg(metavar="LOG")] = None,
+    events: Annotated[Path | None, arg(metavar="JSONL")] = None,
     duration: Annotated[float | None, arg(metavar="S")] = None,
     force: bool = False,
     view: bool = False,
@@ -36,6 +37,7 @@ def live(
             speed=0: as fast as possible), ros2:// (topics), ur://HOST (a UR arm), franka://HOST.
         record: Keeps every sample as it came in a .mcap or .parquet, which `analyze` and replay://
             read. It can be read even if this program is killed.
+        events: Keeps each event when it is over, as a line of JSON with the keys of events.json.
         duration: How long it goes on, by the sensors' clock [s]. Default: until Ctrl-C, or the end.
         force: Goes live whatever the first second looks like.
         view: Shows the robot and what it feels on a page.
@@ -54,7 +56,7 @@ def live(
 
     model = load_robot(robot)
     connection = Connection(make_source(source, model))
-    with Session(model, connection, record, force) as session, ExitStack() as kept:
+    with Session(model, connection, record, force, events) as session, ExitStack() as kept:
         print(f"connecting to {source}; the robot must stand still for a second ...", flush=True)
         reasons = session.start()
         for line in [*connection.notes, *(f"forced, in spite of {reason}" for reason in reasons)]:

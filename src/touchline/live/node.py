@@ -9,6 +9,7 @@ Publishes `~/external_joint_torques`, `~/SEGMENT/wrench`, `~/contacts`, `~/colli
 `~/tare` and `~/set_load`. It commands nothing.
 """
 
+import gc
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -107,16 +108,18 @@ class TouchlineNode:
         rate = FloatingPointRange(from_value=1.0, to_value=1000.0, step=0.0)
         depth = IntegerRange(from_value=1, to_value=1000, step=1)
         declare("robot", "", "robot.yaml, or the name of a robot that ships with Touchline")
+        declare("autostart", True, "whether it configures and activates itself")
         declare("source", "ros2://", "as `touchline live --source` takes it")
         declare("record", "", "a .mcap or .parquet for every sample; empty: none")
+        declare("events", "", "a file for each event that is over, as a line of JSON; empty: none")
         declare("force", False, "go live whatever the first second looks like")
         declare("depth", 10, "of the publishers' history", integer_range=[depth])
         declare("reliable", True, "whether what is published is reliable")
         declare("frame", "world", "of what is published in world axes")
-        text = "largest rate at which results are published [Hz]"
         declare("load_link", "", "that ~/set_load is about", False)
         declare("load_mass", -1.0, "[kg] of ~/set_load; 0: none; negative: weighed", False)
         declare("load_com", [0.0, 0.0, 0.0], "[m] of ~/set_load, in the link's frame", False)
+        text = "largest rate at which results are published [Hz]"
         declare("publish_rate", 1000.0, text, False, floating_point_range=[rate])
 
     def _value(self, name: str) -> Any:
@@ -208,12 +211,13 @@ class TouchlineNode:
 
     def _activate(self) -> None:
         source = make_source(self._value("source"), self._robot)
-        record = self._value("record")
+        record, events = self._value("record"), self._value("events")
         self.session = Session(
             self._robot,
             Connection(source),
             Path(record) if record else None,
             self._value("force"),
+            Path(events) if events else None,
         )
         for reason in self.session.start():
             self.node.get_logger().warning(f"forced, in spite of {reason}")
@@ -335,7 +339,7 @@ def main(arguments: list[str] | None = None) -> int:
     node = TouchlineNode(context)
     if local:
         node.node.get_logger().info(local)
-    start = node.node.declare_parameter("autostart", True).value
+    start = node.node.get_parameter("autostart").value
     try:
         if start and not node.autostart():
             return 2
@@ -346,6 +350,7 @@ def main(arguments: list[str] | None = None) -> int:
     finally:
         node.close()
         rclpy.try_shutdown(context=context)
+        gc.unfreeze()
     return 0
 
 

@@ -42,6 +42,16 @@ class Recorder(Protocol):
     def __exit__(self, *_: object) -> None: ...
 
 
+def check_name(path: Path) -> None:
+    """Whether a recording can have this name.
+
+    Raises:
+        InputError: it has another ending.
+    """
+    if path.suffix not in (".parquet", ".mcap"):
+        raise InputError(f"--record {path}: a recording's name ends in .mcap or .parquet")
+
+
 def make_recorder(path: Path, robot: Robot, period: float, source: str) -> Recorder:
     """A recorder for a file of that name; an old one is replaced.
 
@@ -57,9 +67,8 @@ def make_recorder(path: Path, robot: Robot, period: float, source: str) -> Recor
     kept = {RECORDER_KEY: RECORDER, PERIOD_KEY: period, "source": source, "robot": robot.name}
     if path.suffix == ".parquet":
         return ParquetRecorder(path, robot.description, kept)
-    if path.suffix == ".mcap":
-        return McapRecorder(path, robot, kept)
-    raise InputError(f"--record {path}: a recording's name ends in .mcap or .parquet")
+    check_name(path)
+    return McapRecorder(path, robot, kept)
 
 
 class _Closing:

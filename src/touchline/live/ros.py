@@ -32,6 +32,7 @@ DISCOVERY = 8.0  # s in which the topics have to appear: drivers start beside th
 SETTLE = 0.2  # s between two looks at the topics
 DEPTH = 2000  # messages that wait for this program: two seconds at 1 kHz
 INCOMPLETE = 20  # joint states without a joint, before the first whole one: it is not there
+UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"  # of ROS 2
 FELT = "/external_joint_torques"  # what Touchline's node publishes, as joint states too
 
 
@@ -81,7 +82,7 @@ class RosTopics:
         names = {joints: "joints"} | {topic: sensor for sensor, topic in wrenches.items()}
         notes = [local] if local else []
         notes += [f"{names[topic]}: {topic}" for topic in names]
-        notes += [w for topic in names for w in self._qos_warnings(topic)]
+        notes += [line for topic in names for line in self._unheard(topic)]
         subscriptions = [
             self._subscribe(ros.joint_state, joints),
             *(self._subscribe(ros.wrench, wrenches[name]) for name in self._robot.sensor_names),
@@ -128,13 +129,22 @@ class RosTopics:
         felt = [name for name in known if name.endswith(FELT)]
         return bool(publishers(topic).difference(*(publishers(name) for name in felt)))
 
-    def _qos_warnings(self, topic: str) -> list[str]:
+    def _unheard(self, topic: str) -> list[str]:
+        """A line for each publisher whose QoS does not match: DDS delivers nothing of it.
+
+        Raises:
+            InputError: that is so for all of them.
+        """
         best_effort = self._ros.qos.ReliabilityPolicy.BEST_EFFORT
-        return [
-            f"{topic}: {info.node_name} publishes best effort, and reliable=1 cannot match"
-            for info in self._node.get_publishers_info_by_topic(topic)
+        publishers = self._node.get_publishers_info_by_topic(topic)
+        unheard = [
+            f"{topic}: {_node(info)} publishes best effort, and reliable=1 cannot match"
+            for info in publishers
             if self._reliable and info.qos_profile.reliability == best_effort
         ]
+        if unheard and len(unheard) == len(publishers):
+            raise InputError(f"{unheard[0]}; leave it out")
+        return unheard
 
     def _subscribe(self, kind: Any, topic: str) -> Any:
         qos = self._ros.qos
@@ -182,6 +192,11 @@ class RosTopics:
         if self._context is not None:
             self._ros.rclpy.shutdown(context=self._context)
             self._context = None
+
+
+def _node(info: Any) -> str:
+    """A publisher's node; DDS tells its name after its topics."""
+    return "a node" if info.node_name == UNKNOWN_NODE else info.node_name
 
 
 def make_reader(

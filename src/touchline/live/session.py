@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """A running robot from its first second to the end: checked, observed, recorded, told."""
 
+import json
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +17,7 @@ from touchline.errors import InputError
 from touchline.identify.payload import weigh_load
 from touchline.live.connection import Connection, Notice
 from touchline.live.preflight import SECONDS, Reason, preflight
-from touchline.live.recorder import Recorder, make_recorder
+from touchline.live.recorder import Recorder, check_name, make_recorder
 from touchline.live.sample import Sample
 from touchline.live.source import NativeSource
 from touchline.localizer.skin import Skin
@@ -30,6 +32,7 @@ SILENT = 5.0  # s without a sample, after which `duration` is over on this machi
 LONGEST_START = 3.0  # s in which the first second has to come
 RECENT = 5.0  # s of samples that are kept to weigh a load in
 MOST_RECENT = 40_000  # of them: 5 s at 8 kHz
+KEPT_EVENTS = 1000  # that are over; `events` has all of them on disk
 
 
 @dataclass
@@ -55,6 +58,8 @@ class Session:
         connection: to it, opened or not.
         record: where every sample is written, if anywhere: `.mcap` or `.parquet`.
         force: goes live whatever the first second looks like.
+        events: where each event is written when it is over, as a line of JSON, if anywhere. In
+            memory the latest 1000 are kept.
 
     Attributes:
         pipeline: that takes the samples; None before `start`.
@@ -70,9 +75,11 @@ class Session:
         connection: Connection,
         record: Path | None = None,
         force: bool = False,
+        events: Path | None = None,
     ) -> None:
         self.robot, self.connection = robot, connection
-        self._record, self._force = record, force
+        self._record, self._force, self._events = record, force, events
+        self._written: TextIO | None = None
         self._skin = Skin(robot)
         self.pipeline: Pipeline | None = None
         self.touch = Touch(robot, self._skin) if robot.description.interface else None
@@ -98,9 +105,13 @@ class Session:
         Raises:
             InputError: nothing can be read, or something speaks against going live.
         """
-        self.connection.open()
-        self._kept.callback(self.connection.close)
+        if self._record is not None:
+            check_name(self._record)
+        if self._events is not None:
+            self._written = self._kept.enter_context(_opened(self._events))
         try:
+            self._kept.callback(self.connection.close)
+            self.connection.open()
             self._first = self._first_second()
             self._origin = self._first[0].time if self._first else 0.0
             self.reasons = preflight(self.robot, self._first)
@@ -124,7 +135,9 @@ class Session:
         return self.reasons
 
     def _made(self) -> Pipeline:
-        return Pipeline(self.robot, period=self._period, skin=self._skin)
+        pipeline = Pipeline(self.robot, period=self._period, skin=self._skin)
+        pipeline.keep_events(KEPT_EVENTS)
+        return pipeline
 
     def reset(self) -> str:
         """Forgets the past: the estimate starts anew, events that last end; returns what was done.
@@ -244,7 +257,16 @@ class Session:
             if change.happened == "began":
                 self._fresh.began.append(change.event)
             elif change.happened == "ended":
-                self._fresh.ended.append(self._named(change.event))
+                self._end(self._named(change.event))
+
+    def _end(self, event: Event) -> None:
+        self._fresh.ended.append(event)
+        self._write(event)
+
+    def _write(self, event: Event) -> None:
+        if self._written is not None:
+            self._written.write(f"{json.dumps(event.as_json())}\n")
+            self._written.flush()
 
     def _named(self, event: Event) -> Event:
         """An event that has ended with the widget that it was on, if any."""
@@ -274,6 +296,11 @@ class Session:
 
     def close(self) -> None:
         """Ends the recording and the connection."""
+        if self._written is not None and self.pipeline is not None:
+            for event in self.pipeline.events:
+                if event.cleared is None:
+                    self._write(self._named(event))
+            self._written = None
         self._kept.close()
 
     def __enter__(self) -> "Session":
@@ -281,6 +308,14 @@ class Session:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _opened(path: Path) -> TextIO:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path.open("w")
+    except OSError as error:
+        raise InputError(f"--events {path}: cannot be written: {error.strerror}") from None
 
 
 def _times(samples: list[Sample]) -> np.ndarray:

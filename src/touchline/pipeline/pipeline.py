@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Observer, detection, localization, classification and the record of events in one object."""
 
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -149,7 +150,8 @@ class Pipeline:
         self.watch = np.empty((0, len(robot.segment_names)), np.int8)
         self.faults: tuple[FaultChange, ...] = ()
         self.resets: tuple[ResetChange, ...] = ()
-        self._ended: list[Event] = []
+        self._ended: deque[Event] = deque()
+        self._seen = 0  # events that have ended and were asked for
         self._loads: dict[str, Load] = {}  # by link, of `set_load`
 
     def __repr__(self) -> str:
@@ -162,12 +164,20 @@ class Pipeline:
 
     @property
     def events(self) -> list[Event]:
-        """All events so far, in the order of detection; one that lasts has `cleared` None."""
-        ended, lasting = self._core.events(len(self._ended))
+        """All events so far, in the order of detection; one that lasts has `cleared` None.
+
+        After `keep_events`: those that last, and the latest of those that are over.
+        """
+        ended, lasting, self._seen = self._core.events(self._seen)
         names = self._layout.names
-        self._ended += [Event.of(row, names) for row in ended]
+        self._ended.extend(Event.of(row, names) for row in ended)
         events = [*self._ended, *(Event.of(row, names) for row in lasting)]
         return sorted(events, key=lambda event: event.id)
+
+    def keep_events(self, most: int) -> None:
+        """From now on at most so many events that are over are kept: a robot runs for months."""
+        self._core.keep(most)
+        self._ended = deque(self._ended, maxlen=most)
 
     def update(
         self,
