@@ -6,6 +6,8 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
+from touchline.cli.described import described
+
 Method = Literal["rows", "scaled", "chi2", "glrt", "cusum"]
 
 
@@ -75,7 +77,8 @@ def calibrate(
         from touchline.calibrate.figure import check_figure
 
         check_figure(figure)
-    result = run(list(logs), robot, out, method, false_alarms, trust, identify, learn)
+    with described(robot, logs[0] if logs else None, out) as source:
+        result = run(list(logs), source, out, method, false_alarms, trust, identify, learn)
     print(summary_text(result))
     if figure is not None:
         from touchline.calibrate.figure import draw_calibration

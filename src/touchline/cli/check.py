@@ -6,6 +6,8 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
+from touchline.cli.described import described
+
 
 def check(
     robot: Annotated[Positional[str], arg(metavar="ROBOT")],
@@ -39,5 +41,6 @@ def check(
     if fix is not None:
         from touchline.check.run import write_fixes
 
-        print("\n" + write_fixes(robot, result, fix))
+        with described(robot, log, fix) as source:
+            print("\n" + write_fixes(source, result, fix))
     return 1 if result.findings else 0

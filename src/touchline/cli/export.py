@@ -28,6 +28,7 @@ def export(
         period: Time between samples [s], for thresholds and weights that follow from the noise.
         bandwidth: Bandwidth of the observer [rad/s]. Default: as described.
     """
+    from touchline.folder import check_file
     from touchline.model.robot import load_robot
     from touchline.numbers import check_positive
     from touchline.pipeline.pipeline import Pipeline
@@ -36,6 +37,7 @@ def export(
     pipeline = Pipeline(load_robot(robot), bandwidth=bandwidth, period=period)
     for lost in pipeline.skin.lost:
         print(f"note: {lost}")
+    check_file(out)
     pipeline.export(out)
     links = len(pipeline.skin.patches)
     print(f"{out}: {pipeline.robot.name}, {links} surfaces, {out.stat().st_size / 1e6:.1f} MB")

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from tyro.conf import Positional, arg
 
+from touchline.cli.described import described
 from touchline.numbers import check_least, check_positive
 
 
@@ -29,7 +30,7 @@ def teach(
     torques, which holds in the posture of the recording; teach other postures with further runs.
 
     Args:
-        robot: A robot.yaml.
+        robot: A robot.yaml, a URDF or MJCF, or the name of a robot.
         name: Name of the button in `interface`. What it was taught in other postures stays.
         out: The new robot.yaml; may be the same file.
         kind: A button, or a toggle that each touch turns on or off.
@@ -45,19 +46,19 @@ def teach(
     from touchline.touch.teach import as_yaml
     from touchline.touch.teach import teach as learn
 
-    model = load_robot(robot)
-    source = model.description.path
-    if source is None:
-        raise InputError(f"{robot}: has no file to start from; touchline init writes one")
     if (log is None) == (live is None):
-        raise InputError("touchline teach: give either --log LOG or --live SOURCE")
+        raise InputError("teach: give either --log LOG or --live SOURCE")
     check_positive(duration=duration)
     if touches is not None:
         check_least(1, touches=touches)
-    s = _felt(model, log, live, duration)
-    lesson = learn(model, s.time, s.q, s.qd, s.tau, s.wrench, kind, touches)
-    known = model.description.interface.get(name)
-    write_description(source, out, {"interface": {name: as_yaml(lesson.widget, known)}})
+    with described(robot, log, out) as start:
+        model = load_robot(start)
+        source = model.description.path
+        assert source is not None
+        s = _felt(model, log, live, duration)
+        lesson = learn(model, s.time, s.q, s.qd, s.tau, s.wrench, kind, touches)
+        known = model.description.interface.get(name)
+        write_description(source, out, {"interface": {name: as_yaml(lesson.widget, known)}})
     load_robot(out)
     print(f"{name}: a {kind} from {lesson.touches} touches: {lesson.note}")
     print(f"written: {out}")
