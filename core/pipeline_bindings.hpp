@@ -54,6 +54,22 @@ inline bool set_number(tl::Tuning& tuning, const std::string& wanted, double to)
   return found;
 }
 
+// Transitions between the states of the segments' contacts so far: from, to, how often.
+inline nb::list transitions(const tl::RedundantPipeline& p) {
+  nb::list all;
+  for (std::size_t g = 0; g < p.robot().segment_names.size(); ++g) {
+    const tl::TrackingState& state = p.tracking(static_cast<int>(g));
+    for (int i = 0; i < tl::kTrackings; ++i) {
+      for (int j = 0; j < tl::kTrackings; ++j) {
+        const auto from = static_cast<tl::Tracking>(i), to = static_cast<tl::Tracking>(j);
+        if (const std::uint32_t times = state.count(from, to); times > 0)
+          all.append(nb::make_tuple(tl::name_of(from), tl::name_of(to), times));
+      }
+    }
+  }
+  return all;
+}
+
 // The pipeline, and what a user of Python may ask for later: the events that have ended.
 struct Pipeline {
   Pipeline(tl::Robot robot, const tl::Tuning& tuning, nb::object builder)
@@ -373,6 +389,7 @@ inline void bind(nb::module_& m) {
       .def("numbers", &numbers, nb::sig("def numbers(self) -> list[tuple[str, str, float]]"))
       .def("set_number", &set_number, "name"_a, "value"_a);
   nb::class_<tl::Pushes>(m, "Pushes")
+      .def(nb::init<>())
       .def("__init__",
            [](tl::Pushes* self, double friction, double reach) {
              new (self) tl::Pushes{friction, reach};
@@ -404,6 +421,10 @@ inline void bind(nb::module_& m) {
         const std::string content = tl::robot_bytes(robot);
         return nb::bytes(content.data(), content.size());
       });
+  nb::list turns;
+  for (const tl::Turn& turn : tl::kTurns)
+    turns.append(nb::make_tuple(tl::name_of(turn.from), tl::name_of(turn.to), turn.why));
+  m.attr("TURNS") = nb::tuple(turns);
   nb::enum_<tl::Watch>(m, "Watch")
       .value("watched", tl::Watch::watched)
       .value("degraded", tl::Watch::degraded)
@@ -441,6 +462,8 @@ inline void bind(nb::module_& m) {
            "lost"_a)
       .def_prop_ro("lost", [](const Pipeline& p) { return p.value->lost(); })
       .def("rest", &rest)
+      .def("transitions", [](const Pipeline& p) { return transitions(*p.value); },
+           nb::sig("def transitions(self) -> list[tuple[str, str, int]]"))
       .def("standing", &standing, nb::sig("def standing(self) -> numpy.typing.NDArray[numpy.float64]"))
       .def_prop_ro("time", [](const Pipeline& p) { return p.value->time(); })
       .def("region",

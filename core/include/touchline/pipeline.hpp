@@ -96,6 +96,8 @@ class Pipeline {
   void go_on_from(const Pipeline& other, int of, int row, double baseline) {
     detector_.go_on_from(other.detector_, of, row, baseline);
   }
+  // In which state the contacts of segment g are, and which transitions there were: for tests.
+  const TrackingState& tracking(int g) const { return localizer_.state(g); }
   const Observer& observer() const { return observer_; }
 
   // Without its surfaces, which are the localizer's: `surfaces()`.

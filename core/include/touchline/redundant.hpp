@@ -172,6 +172,7 @@ class RedundantPipeline {
   }
   const Tuning& tuning() const { return whole_.tuning(); }
   const std::vector<LinkSurface>& surfaces() const { return whole_.surfaces(); }
+  const TrackingState& tracking(int g) const { return whole_.tracking(g); }
   std::size_t rows() const { return whole_.rows(); }
   Standing standing(int row) const { return whole_.standing(row); }
 

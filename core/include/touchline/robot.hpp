@@ -17,6 +17,7 @@
 #include "touchline/detail/observer/layout.hpp"
 #include "touchline/detail/observer/signals.hpp"
 #include "touchline/detail/place/link_surfaces.hpp"
+#include "touchline/detail/place/settings.hpp"
 
 namespace touchline {
 
@@ -28,12 +29,6 @@ struct Link {
   std::string name, body;  // the rigid body that it belongs to
   Zone zone = Zone::structure;
   Pose placement;
-};
-
-// What touches: pushes come within the cone of the coefficient `friction`, and need `reach` [m] of
-// free space in front of the surface.
-struct Pushes {
-  double friction = 0.8, reach = 0.03;
 };
 
 // Arrays follow `joints` (n), `sensors` (k) and the segments (m): one per six-axis sensor in their

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from touchline.model.learned_rest import LearnedRest
+from touchline.native import core
 
 Vector = tuple[float, ...]
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -184,8 +185,8 @@ class PushDescription:
     all.
     """
 
-    friction: float = 0.8
-    reach: float = 0.03
+    friction: float = core.Pushes().friction
+    reach: float = core.Pushes().reach
     links: list[str] = field(default_factory=list)
 
 

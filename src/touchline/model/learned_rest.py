@@ -11,13 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from touchline.arrays import Array
 from touchline.errors import InputError
 from touchline.folder import replaced_file
 from touchline.suggest import unknown
-
-Array = NDArray[np.float64]
 
 COLUMNS = ("joint", "q", "qd", "torque", "doubt")
 LARGEST = 10_000  # nodes of a joint; a table is small, or it is something else

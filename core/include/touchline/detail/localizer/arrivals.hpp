@@ -31,32 +31,31 @@ class Arrivals {
 
   // From this sample on something is not explained.
   void begin(SegmentContacts& s, const SegmentSample& now) const {
-    s.arriving = true;
-    s.since = now.time;
-    s.is_calm = s.is_placed = false;
-    s.newcomer = s.slider = -1;
-    s.slid = s.rests = -1.0;
-    s.weighed = now.time;
-    std::fill(s.against, s.against + JointEstimate::kMost, 0.0);
-    s.new_age.restart(now.time - period_);
+    s.unexplained = Unexplained{};
+    s.unexplained.since = s.unexplained.slide.weighed = now.time;
+    s.unexplained.age.restart(now.time - period_);
     s.refer_at_last(now.time);
+    s.state.enter(Tracking::newcomer);
   }
 
   // One sample more of it: fills the reports. `read()` takes the measurement anew.
   template <class Read>
   void follow(SegmentContacts& s, const SegmentSample& now, Read&& read) {
     now_ = now;
-    JointEstimate& before = s.before.contacts;
-    before.creep(std::max(0.0, now.time - s.before.time), now.bandwidth, settings_);
-    s.before.time = now.time;
-    before.age(now.bandwidth, now.time, settings_);
+    Reference& before = s.known.before;
+    before.contacts.creep(std::max(0.0, now.time - before.time), now.bandwidth, settings_);
+    before.time = now.time;
+    before.contacts.age(now.bandwidth, now.time, settings_);
     if (subsided(s)) return;
     switch (slides_.follow(s, now, read)) {
       case Slides::Outcome::none:
+        s.state.enter(Tracking::newcomer);
         break;
       case Slides::Outcome::slides:
+        s.state.enter(Tracking::sliding);
         return;
       case Slides::Outcome::rests:
+        s.state.enter(Tracking::sliding);
         end(s);
         return;
     }
@@ -75,32 +74,40 @@ class Arrivals {
  private:
   // Has it been placed for a while, and has it lasted?
   bool is_found(SegmentContacts& s, const Answer& a) const {
-    const bool found = placed(a);
-    if (found && !s.is_placed) s.placed = now_.time;
-    s.is_placed = found;
-    return found && now_.time - s.placed >= now_.brief() &&
-           now_.time - s.since >= settings_.young * now_.brief() &&
-           s.contacts.count < SegmentContacts::kMost;
+    Unexplained& u = s.unexplained;
+    if (!placed(a)) {
+      u.placed.reset();
+      return false;
+    }
+    if (!u.placed) u.placed = now_.time;
+    return now_.time - *u.placed >= now_.brief() &&
+           now_.time - u.since >= settings_.young * now_.brief() &&
+           s.known.contacts.count < SegmentContacts::kMost;
   }
 
   // It is reported beside the known ones, but not known yet.
   void suspect(SegmentContacts& s, Answer& a) {
-    const bool lasting = now_.time - s.since >= settings_.suspected * now_.brief();
-    for (int c = 0; c < s.contacts.count; ++c) {
-      reports_.add(s.before.contacts.known[c]);
+    const bool lasting = now_.time - s.unexplained.since >= settings_.suspected * now_.brief();
+    for (int c = 0; c < s.known.contacts.count; ++c) {
+      reports_.add(s.known.before.contacts.known[c]);
       if (lasting && !placed(a)) reports_.doubt_last();
     }
     if (!placed(a) && !lasting) return;
     if (a.count == 0) a.status = Status::not_separable;  // no force is left, but it does not fit
-    if (s.newcomer < 0) s.newcomer = reports_.next();
-    reports_.add(s.newcomer, a);
+    reports_.add(number(s), a);
+  }
+
+  // Under which number it is reported.
+  int number(SegmentContacts& s) {
+    if (!s.unexplained.newcomer) s.unexplained.newcomer = reports_.next();
+    return *s.unexplained.newcomer;
   }
 
   // Do the known contacts explain all again?
   bool subsided(SegmentContacts& s) {
-    fit_.weigh(s.before.contacts, measurement_);
-    if (!known_.explain(s.before.contacts)) {
-      s.is_calm = false;
+    fit_.weigh(s.known.before.contacts, measurement_);
+    if (!known_.explain(s.known.before.contacts)) {
+      if (s.state.is(Tracking::ending)) s.state.enter(Tracking::newcomer);
       return false;
     }
     resume(s);
@@ -110,23 +117,23 @@ class Arrivals {
   // Or do they with all their forces changed, where no single contact explains what is left?
   template <class Read>
   bool changed(SegmentContacts& s, Read&& read) {
-    if (s.contacts.count == 1) return false;
+    if (s.known.contacts.count == 1) return false;
     read();
-    fit_.weigh(s.before.contacts, measurement_);
-    if (!known_.explain_freely(s.before.contacts)) return false;
+    fit_.weigh(s.known.before.contacts, measurement_);
+    if (!known_.explain_freely(s.known.before.contacts)) return false;
     resume(s);
     return true;
   }
 
   // Is what is left a known contact that lets go?
   bool lets_go(SegmentContacts& s, const Answer& a) {
-    const JointEstimate& before = s.before.contacts;
+    const JointEstimate& before = s.known.before.contacts;
     for (int c = 0; c < before.count; ++c) {
       const KnownContact& k = before.known[c];
       if (!takes_back(k, a, single_.surfaces(), settings_)) continue;
       for (int i = 0; i < before.count; ++i) reports_.add(before.known[i]);
       reports_.change_force(c, k.force + a.force);
-      s.is_placed = false;  // what was suspected ends when all is explained
+      s.unexplained.placed.reset();  // what was suspected ends when all is explained
       return true;
     }
     return false;
@@ -134,27 +141,29 @@ class Arrivals {
 
   // The known contacts explain all, with the forces of the last fit.
   void resume(SegmentContacts& s) {
-    if (!s.is_calm) s.calm = now_.time;
-    s.is_calm = true;
-    s.contacts = s.before.contacts;
-    fit_.accept(s.contacts, known_.change(), 0.0);
-    for (int c = 0; c < s.contacts.count; ++c) reports_.add(s.contacts.known[c]);
-    if (now_.time - s.calm >= now_.brief()) end(s);
+    if (!s.state.is(Tracking::ending)) s.unexplained.calm = now_.time;
+    s.state.enter(Tracking::ending);
+    JointEstimate& known = s.known.contacts;
+    known = s.known.before.contacts;
+    fit_.accept(known, known_.change(), 0.0);
+    for (int c = 0; c < known.count; ++c) reports_.add(known.known[c]);
+    if (now_.time - s.unexplained.calm >= now_.brief()) end(s);
   }
 
   void end(SegmentContacts& s) {
-    s.arriving = false;
-    s.crept = s.restless = now_.time;
-    s.updated = std::max(s.updated, now_.time);
+    Known& known = s.known;
+    known.crept = known.restless = now_.time;
+    known.updated = std::max(known.updated, now_.time);
     s.forget_references();
-    reports_.end(s.newcomer);
+    if (s.unexplained.newcomer) reports_.end(*s.unexplained.newcomer);
+    s.enter_known();
   }
 
   // What is left without the known contacts, their forces held, as one contact.
   Answer& remainder(SegmentContacts& s) {
-    const JointEstimate& known = s.before.contacts;
+    const JointEstimate& known = s.known.before.contacts;
     fit_.take_out(known, Change::none(), measurement_);
-    new_lag_ = s.new_age.follow(measurement_.load(), now_.bandwidth, now_.time, settings_.oldest) *
+    new_lag_ = s.unexplained.age.follow(measurement_.load(), now_.bandwidth, now_.time, settings_.oldest) *
                now_.brief();
     freed_ = false;
     return answer_ = single_.locate(now_.segment, new_lag_, measurement_);
@@ -163,7 +172,7 @@ class Arrivals {
   // The same with their forces free, where there are equations enough: three for each, and five.
   template <class Read>
   void free(SegmentContacts& s, Read&& read) {
-    const JointEstimate& known = s.before.contacts;
+    const JointEstimate& known = s.known.before.contacts;
     read();
     fit_.take_out(known, Change::of_forces(known.count, settings_.force_scale), measurement_);
     const Answer& freed = single_.locate_beside_free_forces(now_.segment, new_lag_, measurement_);
@@ -188,21 +197,22 @@ class Arrivals {
   // The newcomer is known, and with it what its place shares with the others.
   template <class Read>
   void admit(SegmentContacts& s, const Answer& a, Read&& read) {
-    if (s.newcomer < 0) s.newcomer = reports_.next();
-    s.contacts = s.before.contacts;
-    const int old = s.contacts.count;
-    for (int c = 0; c < old; ++c) reports_.add(s.contacts.known[c]);
-    reports_.add(s.newcomer, a);
+    const int newcomer = number(s);
+    JointEstimate& all = s.known.contacts;
+    all = s.known.before.contacts;
+    const int old = all.count;
+    for (int c = 0; c < old; ++c) reports_.add(all.known[c]);
+    reports_.add(newcomer, a);
     read();
     Change change;
     if (freed_) change = Change::of_forces(old, settings_.force_scale);
-    s.contacts.add(found_contact(s.newcomer, a, single_.surfaces(), s.new_age, now_.brief()),
-                   settings_);
-    fit_.weigh(s.contacts, measurement_);
-    fit_.begin(measurement_, s.contacts);
-    fit_.accept(s.contacts, change, 1.0);
-    s.arriving = false;
+    all.add(found_contact(newcomer, a, single_.surfaces(), s.unexplained.age, now_.brief()),
+            settings_);
+    fit_.weigh(all, measurement_);
+    fit_.begin(measurement_, all);
+    fit_.accept(all, change, 1.0);
     s.know(now_);
+    s.state.enter(Tracking::several);
   }
 
   SingleContact& single_;

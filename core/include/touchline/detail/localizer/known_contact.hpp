@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "touchline/detail/localizer/settings.hpp"
 #include "touchline/detail/place/answer.hpp"
@@ -62,7 +63,7 @@ struct KnownContact {
     const double least = std::max(0.0, -std::log(y));
     return norm(force) * y / std::max(1.0, least + std::log(least + 1.2));
   }
-  double gone = 0.0;   // since when there is no force [s]; 0: there is
+  std::optional<double> gone;  // since when there is no force [s]
   // What was said when it was found: its other explanations keep their places on their links.
   Status status = Status::located;
   double body_probability = 1.0;

@@ -115,16 +115,15 @@ class Localizer {
               const double* q) {
     SegmentContacts& s = states_[g];
     ended_.clear();
-    if (touched && !s.touched) {
-      const int first = tracks_.begin(g);
-      s = SegmentContacts{};
-      s.first = first;
-      s.age.restart(time);
+    if (touched && s.state.is(Tracking::quiet)) {
+      s.begin(tracks_.begin(g), time);
       if (g == links_.segment()) links_.begin();
     }
-    if (s.touched && !touched) end_all(g);
-    s.touched = touched;
-    if (!touched) return;
+    if (!touched) {
+      if (!s.state.is(Tracking::quiet)) end_all(g);
+      s.state.enter(Tracking::quiet);
+      return;
+    }
     tracks_.follow(s, g, bandwidth(g), time,
                    [&] { return measurement_.read(g, row, normalized); });
     if (g == links_.segment()) weigh_links(row, q);
@@ -138,6 +137,8 @@ class Localizer {
   }
 
   const Reports& reports() const { return tracks_.reports(); }
+  // Of segment g: in which state its contacts are, and which transitions there were.
+  const TrackingState& state(int g) const { return states_[g].state; }
 
   // An event: its number, its places, and the joint positions at the time of its position.
   struct Memory {

@@ -23,21 +23,21 @@ class Merging {
   // Takes a sample that known contacts explain; returns whether two have become one, after they
   // were for 1 / K.
   bool follow(SegmentContacts& s, const SegmentSample& now) {
-    const JointEstimate& all = s.contacts;
+    const JointEstimate& all = s.known.contacts;
     for (int a = 0; a < all.count; ++a) {
       for (int b = a + 1; b < all.count; ++b) {
         if (!near(all.known[a], all.known[b]) || !unite(all, a, b)) continue;
-        if (s.met < 0.0) s.met = now.time;
-        if (now.time - s.met < now.brief()) return false;
+        if (!s.known.met) s.known.met = now.time;
+        if (now.time - *s.known.met < now.brief()) return false;
         reports_.end(all.known[b].serial);
         fit_.accept(one_, Change::none(), 1.0);
-        s.contacts = one_;
-        s.met = -1.0;
+        s.known.contacts = one_;
+        s.known.met.reset();
         s.know(now);
         return true;
       }
     }
-    s.met = -1.0;
+    s.known.met.reset();
     return false;
   }
 

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is remembered of the contacts on one segment from sample to sample.
+// What is remembered of the contacts on one segment from sample to sample: its state, and what
+// belongs to each state. What a state has is of use in that state alone; it begins empty.
 // Theory: docs/theory.md, section 6.4.
 #pragma once
 
 #include <algorithm>
+#include <optional>
 
 #include "touchline/detail/localizer/joint_estimate.hpp"
+#include "touchline/detail/localizer/tracking.hpp"
 
 namespace touchline {
 
@@ -18,86 +21,132 @@ struct SegmentSample {
   double brief() const { return 1.0 / bandwidth; }  // the memory of the filter [s]
 };
 
-struct SegmentContacts {
-  static constexpr int kMost = JointEstimate::kMost;
-
-  // Contacts at a time before anything new could have been felt.
-  struct Reference {
-    JointEstimate contacts;
-    double time = 0.0;
-  };
-
-  bool touched = false;
-  int first = -1;  // number of the contact that stands for the segment while none is known
+// Contacts at a time before anything new could have been felt.
+struct Reference {
   JointEstimate contacts;
-  Age age;               // of the segment's wrench
-  double explained = 0;  // since when one contact has explained all [s]
-  bool explains = false;
-  double looked = -1.0;  // time of the last search for a sole contact [s]
-  int looked_for = -1;   // and how many were known then
+  double time = 0.0;
+};
+
+// Of all states but quiet.
+struct Touched {
+  int first = -1;  // number of the contact that stands for the segment while none is known
+  Age age;         // of the segment's wrench
+  // The last search for a sole contact: when [s], and how many were known then.
+  struct Search {
+    double time;
+    int known;
+  };
+  std::optional<Search> searched;
+};
+
+// Suspected: since when one contact has explained all [s].
+struct Suspected {
+  std::optional<double> explained;
+};
+
+// Two that began at the same instant, until they count as known.
+struct Together {
+  double since = 0.0;                         // one contact has not explained all since [s]
+  double searched = 0.0, next_search = 0.0;   // [s]
+  std::optional<int> second;                  // its number, once it is reported
+  bool separable = false;                     // can two places be told apart? Then they are:
+  JointEstimate contacts;
+  bool walked = false;  // else: is what may be touched all that explains, or a first look at it?
+  Answer inseparable;
+};
+
+// Single and several, and what they are compared with in the states that follow.
+struct Known {
+  JointEstimate contacts;
   // Time of the last fit [s]. That which a contact was found by lies ahead: the noise of a filtered
   // sample tells nothing new for 1 / K.
   double updated = 0.0;
-  double crept = 0.0;     // up to when the contacts may have crept [s]
+  double crept = 0.0;     // up to when the contacts may have crept: their process noise [s]
   double restless = 0.0;  // when a force changed last [s]
   Reference now, before;
+  std::optional<double> met;  // since when two contacts are one place [s]
+};
 
-  // Two contacts that began at the same instant, until they count as known.
-  double apart = -1.0;  // since when one contact does not explain all [s]
-  double searched = -1.0, next_search = 0.0;
-  int twin = -1;        // number of the second, once it is reported
-  bool paired = false;
-  bool walked = false;  // are they all that explain, or a first look at it?
-  JointEstimate pair;
-  Answer inseparable;
-
-  bool arriving = false;  // is there something that the known contacts do not explain?
-  int newcomer = -1;      // its number, once it is reported
-  double since = 0.0, calm = 0.0, placed = 0.0;
-  bool is_calm = false, is_placed = false;
-  Age new_age;
-
-  double met = -1.0;  // since when two contacts are one place [s]
-
-  // One contact that slides, as it is known from where it seems to have come to rest.
-  int slider = -1;
-  double slid = -1.0;  // when it was seen to last [s], and where
-  Answer slide;
-  double weighed = 0.0, against[kMost] = {};  // what speaks against each: sum of chi2, up to when
-  double rests = -1.0;  // since when it does [s]
+// One of the known contacts slides, as it is known from where it seems to have come to rest.
+struct Slide {
+  std::optional<int> slider;   // which of them
+  std::optional<double> seen;  // when it was seen to last [s], and where
+  Answer place;
+  double weighed = 0.0;  // up to when [s] this speaks against each: sum of chi2
+  double against[JointEstimate::kMost] = {};
+  std::optional<double> rests;  // since when it does [s], and what is known then
   JointEstimate rested;
+};
+
+// Newcomer, sliding and ending: something that the known contacts do not explain.
+struct Unexplained {
+  double since = 0.0;            // [s]
+  Age age;                       // of what is left without them
+  std::optional<double> placed;  // since when that has a place [s]
+  std::optional<int> newcomer;   // its number, once it is reported
+  double calm = 0.0;             // ending: since when [s]
+  Slide slide;
+};
+
+struct SegmentContacts {
+  static constexpr int kMost = JointEstimate::kMost;
+
+  TrackingState state;
+  Touched touched;
+  Suspected suspected;
+  Together together;
+  Known known;
+  Unexplained unexplained;
+
+  // Something touches the segment anew; `first`: the number of that contact.
+  void begin(int first, double time) {
+    const TrackingState before = state;
+    *this = SegmentContacts{};
+    state = before;
+    touched.first = first;
+    touched.age.restart(time);
+    state.enter(Tracking::suspected);
+  }
+
+  bool unexplained_now() const {
+    return state.is(Tracking::newcomer) || state.is(Tracking::sliding) || state.is(Tracking::ending);
+  }
+  // One contact or several are known, and explain.
+  void enter_known() {
+    state.enter(known.contacts.count < 2 ? Tracking::single : Tracking::several);
+  }
 
   // Notes what is known, every `interval` [s].
   void refer(double time, double interval) {
-    const bool same = now.contacts.count == contacts.count;
-    if (time - now.time < interval && same) return;
-    if (same) before = now;
-    now.contacts = contacts;
-    now.time = time;
-    if (before.contacts.count != contacts.count) before = now;
+    const bool same = known.now.contacts.count == known.contacts.count;
+    if (time - known.now.time < interval && same) return;
+    if (same) known.before = known.now;
+    known.now.contacts = known.contacts;
+    known.now.time = time;
+    if (known.before.contacts.count != known.contacts.count) known.before = known.now;
   }
 
   // Without anything to go back to, what is known now must do.
   void refer_at_last(double time) {
-    if (before.contacts.count == contacts.count) return;
-    before.contacts = contacts;
-    before.time = time;
+    if (known.before.contacts.count == known.contacts.count) return;
+    known.before.contacts = known.contacts;
+    known.before.time = time;
   }
 
   // What may have become of the contacts up to an instant.
   void creep(const SegmentSample& now, const LocalizerTuning& t) {
-    contacts.creep(std::max(0.0, now.time - crept), now.bandwidth, t);
-    crept = now.time;
+    known.contacts.creep(std::max(0.0, now.time - known.crept), now.bandwidth, t);
+    known.crept = now.time;
   }
 
   // All that the sample of this instant tells has been taken over.
   void know(const SegmentSample& now) {
-    updated = now.time + now.brief();
-    crept = restless = now.time;
+    known.updated = now.time + now.brief();
+    known.crept = known.restless = now.time;
     forget_references();
   }
 
-  void forget_references() { now.contacts.count = before.contacts.count = 0; }
+  void forget_references() { known.now.contacts.count = known.before.contacts.count = 0; }
 };
 
 }  // namespace touchline

@@ -32,11 +32,12 @@ class Slides {
   // rests they are known from where it does.
   template <class Read>
   Outcome follow(SegmentContacts& s, const SegmentSample& now, Read&& read) {
-    const JointEstimate& before = s.before.contacts;
-    const double time = now.time, brief = now.brief(),
-        way = settings_.fastest_slide * (time - s.since + brief);
-    const double passed = 0.5 * now.bandwidth * std::max(0.0, time - s.weighed);
-    s.weighed = time;
+    const JointEstimate& before = s.known.before.contacts;
+    Slide& slide = s.unexplained.slide;
+    const double time = now.time, brief = now.brief(), since = s.unexplained.since;
+    const double way = settings_.fastest_slide * (time - since + brief);
+    const double passed = 0.5 * now.bandwidth * std::max(0.0, time - slide.weighed);
+    slide.weighed = time;
     int slider = -1;
     for (int c = 0; c < before.count; ++c) {
       read();
@@ -48,40 +49,40 @@ class Slides {
       const Answer& a = single_.locate(now.segment, lag, measurement_);
       const bool can = within_reach(before.known[c], a, single_.surfaces(), way, settings_);
       const double never = chi2_limit(measurement_.size(), settings_.slide_never);
-      s.against[c] += passed * (can ? a.chi2 : never);
-      if (!can || (slider >= 0 && s.against[c] > s.against[slider])) continue;
+      slide.against[c] += passed * (can ? a.chi2 : never);
+      if (!can || (slider >= 0 && slide.against[c] > slide.against[slider])) continue;
       slider = c;
       answer_ = a;
     }
-    if (slider < 0 && !(time - s.slid < brief)) return Outcome::none;
+    if (slider < 0 && !(slide.seen && time - *slide.seen < brief)) return Outcome::none;
     const bool found = slider >= 0;
     if (found) {
       if (!decided(s, slider) && moved(before.known[slider]) > settings_.place_radius)
         answer_.status = Status::ambiguous;
-      s.slid = time;
-      s.slide = answer_;
+      slide.seen = time;
+      slide.place = answer_;
     } else {
-      slider = s.slider;
+      slider = *slide.slider;
     }
     for (int i = 0; i < before.count; ++i) {
       if (i != slider) reports_.add(before.known[i]);
     }
-    reports_.add(before.known[slider].serial, s.slide);
-    const bool anew = s.slider != slider || s.rests < 0.0;
-    s.slider = slider;
+    reports_.add(before.known[slider].serial, slide.place);
+    const bool anew = slide.slider != slider || !slide.rests;
+    slide.slider = slider;
     if (!found) return Outcome::slides;
     read();
     if (before.count == 1) {  // nothing is held: any sample tells where it is
-      if (time - s.since < settings_.young * brief) return Outcome::slides;
-      rest(s.rested = before, slider);
-      s.contacts = s.rested;
+      if (time - since < settings_.young * brief) return Outcome::slides;
+      rest(slide.rested = before, slider);
+      s.known.contacts = slide.rested;
       return Outcome::rests;
     }
-    if (anew || !stays(s)) {
-      s.rests = time;
-      rest(s.rested = before, slider);
-    } else if (time - s.rests >= rest_time(s, slider) * brief) {
-      s.contacts = s.rested;
+    if (anew || !stays(slide)) {
+      slide.rests = time;
+      rest(slide.rested = before, slider);
+    } else if (time - *slide.rests >= rest_time(s, slider) * brief) {
+      s.known.contacts = slide.rested;
       return Outcome::rests;
     }
     return Outcome::slides;
@@ -95,8 +96,9 @@ class Slides {
 
   // Can no other one as well have slid?
   bool decided(const SegmentContacts& s, int slider) const {
-    for (int c = 0; c < s.before.contacts.count; ++c) {
-      if (c != slider && s.against[c] < s.against[slider] + settings_.slide_margin) return false;
+    const double* against = s.unexplained.slide.against;
+    for (int c = 0; c < s.known.before.contacts.count; ++c) {
+      if (c != slider && against[c] < against[slider] + settings_.slide_margin) return false;
     }
     return true;
   }
@@ -106,9 +108,9 @@ class Slides {
     return norm(answer_.candidates[0].point - single_.surfaces().to_world(k.point, k.node));
   }
 
-  bool stays(const SegmentContacts& s) {
-    fit_.weigh(s.rested, measurement_);
-    return known_.explain(s.rested);
+  bool stays(const Slide& slide) {
+    fit_.weigh(slide.rested, measurement_);
+    return known_.explain(slide.rested);
   }
 
   // Contact c is where it was found now.

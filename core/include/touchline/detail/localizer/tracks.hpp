@@ -41,23 +41,29 @@ class Tracks {
     reports_.clear();
     now_ = {g, bandwidth, time, 0.0};
     if (!read()) {
-      report(s.contacts.count > 0 ? s.contacts.known[0].serial : s.first, single_.clear());
+      const JointEstimate& known = s.known.contacts;
+      report(known.count > 0 ? known.known[0].serial : s.touched.first, single_.clear());
       return;
     }
     if (!measurement_.can_be_followed() || settings_.first_entry) {
-      report(s.first, single_.locate(g, 0.0, measurement_, again(s), true));
+      report(s.touched.first, single_.locate(g, 0.0, measurement_, again(s), true));
       return;
     }
-    now_.lag = s.age.follow(measurement_.load(), bandwidth, time, settings_.oldest) / bandwidth;
+    now_.lag =
+        s.touched.age.follow(measurement_.load(), bandwidth, time, settings_.oldest) / bandwidth;
     if (measurement_.has_wrench())
       pasts_[g].follow(measurement_.load(), bandwidth, time, measurement_.posture());
-    if (!s.arriving || s.contacts.count > 1) s.contacts.age(bandwidth, time, settings_);
-    if (s.arriving) {
-      arrivals_.follow(s, now_, read);
-    } else if (s.contacts.count < 2) {
-      sole(s, read);
-    } else {
-      several(s, read);
+    if (!s.unexplained_now() || s.known.contacts.count > 1)
+      s.known.contacts.age(bandwidth, time, settings_);
+    switch (s.state.now()) {
+      case Tracking::quiet: return;
+      case Tracking::suspected:
+      case Tracking::pair: return suspected(s);
+      case Tracking::single: return single(s, read);
+      case Tracking::several: return several(s, read);
+      case Tracking::newcomer:
+      case Tracking::sliding:
+      case Tracking::ending: return arrivals_.follow(s, now_, read);
     }
   }
 
@@ -85,39 +91,43 @@ class Tracks {
   void report(const KnownContact& k) { reports_.add(k); }
   void end(int serial) { reports_.end(serial); }
 
-  // --- one contact, as far as is known ---
-  template <class Read>
-  void sole(SegmentContacts& s, Read&& read) {
+  // The segment's contact, if it has only one.
+  const Answer& locate(SegmentContacts& s) {
     const Past& past = pasts_[now_.segment];
-    const Answer& a = past.known() ? single_.locate(now_.segment, past, measurement_, again(s))
-                                   : single_.locate(now_.segment, now_.lag, measurement_, again(s));
-    if (s.contacts.count == 0) {
-      if (a.status == Status::not_separable) {
-        s.explains = false;
-        twins_.follow(s, a, now_);
-        return;
-      }
-      report(s.first, a);
-      if (placed(a)) twins_.forget(s);
-      if (!placed(a)) {
-        s.explains = false;
-      } else if (!s.explains) {
-        s.explains = true;
-        s.explained = now_.time;
-      } else if (now_.time - s.explained >= settings_.young * now_.brief()) {
-        settle(s, a);
-      }
+    return past.known() ? single_.locate(now_.segment, past, measurement_, again(s))
+                        : single_.locate(now_.segment, now_.lag, measurement_, again(s));
+  }
+
+  // --- none is known yet: suspected, pair ---
+  void suspected(SegmentContacts& s) {
+    const Answer& a = locate(s);
+    if (a.status == Status::not_separable) return twins_.follow(s, a, now_);
+    report(s.touched.first, a);
+    if (!placed(a)) {
+      s.suspected.explained.reset();
       return;
     }
-    const KnownContact& known = s.contacts.known[0];
+    if (s.state.is(Tracking::pair)) twins_.forget(s);
+    if (!s.suspected.explained) {
+      s.suspected.explained = now_.time;
+    } else if (now_.time - *s.suspected.explained >= settings_.young * now_.brief()) {
+      settle(s, a);
+    }
+  }
+
+  // --- one is known ---
+  template <class Read>
+  void single(SegmentContacts& s, Read&& read) {
+    const Answer& a = locate(s);
+    const KnownContact& known = s.known.contacts.known[0];
     if (agrees(known, a, single_.surfaces(), settings_)) {
       report(known.serial, a);
-      if (now_.time - s.updated < settings_.refit * now_.brief()) return;
+      if (now_.time - s.known.updated < settings_.refit * now_.brief()) return;
       s.creep(now_, settings_);
-      if (explains(s.contacts)) accept(s);
+      if (explains(s.known.contacts)) accept(s);
       return;
     }
-    if (explains(s.contacts)) {  // where no single force does, now and then, that is noise
+    if (explains(s.known.contacts)) {  // where no single force does, now and then, that is noise
       a.status == Status::not_separable ? report(known) : report(known.serial, a);
       return;
     }
@@ -128,10 +138,11 @@ class Tracks {
 
   // Was the contact looked for a moment ago? Filtered noise does not change much in the meantime.
   bool again(SegmentContacts& s) const {
-    const bool same = s.contacts.count == s.looked_for;
-    if (same && now_.time - s.looked < settings_.look * now_.brief()) return true;
-    s.looked = now_.time;
-    s.looked_for = s.contacts.count;
+    const int known = s.known.contacts.count;
+    const auto& before = s.touched.searched;
+    const double pause = settings_.look * now_.brief();
+    if (before && before->known == known && now_.time - before->time < pause) return true;
+    s.touched.searched = Touched::Search{now_.time, known};
     return false;
   }
 
@@ -145,29 +156,33 @@ class Tracks {
 
   // The first contact has become known.
   void settle(SegmentContacts& s, const Answer& a) {
-    s.contacts.count = 0;
-    s.contacts.add(found_contact(s.first, a, single_.surfaces(), s.age, now_.brief()),
-                   settings_);
-    if (explains(s.contacts)) fit_.judge(s.contacts);
+    JointEstimate& known = s.known.contacts;
+    known.count = 0;
+    known.add(found_contact(s.touched.first, a, single_.surfaces(), s.touched.age, now_.brief()),
+              settings_);
+    if (explains(known)) fit_.judge(known);
     s.know(now_);
+    s.state.enter(Tracking::single);
   }
 
   // Takes the last explanation over, and keeps what was known for when something arrives.
   void accept(SegmentContacts& s) {
-    const double passed = std::max(0.0, std::min(now_.time - s.updated, now_.brief()));
-    if (passed > 0.0) s.updated = now_.time;
-    if (!known_.held()) s.restless = now_.time;
-    fit_.accept(s.contacts, known_.change(), 0.5 * now_.bandwidth * passed);
-    const bool calm = now_.time - s.restless > 2.0 * now_.brief();
+    Known& known = s.known;
+    const double passed = std::max(0.0, std::min(now_.time - known.updated, now_.brief()));
+    if (passed > 0.0) known.updated = now_.time;
+    if (!known_.held()) known.restless = now_.time;
+    fit_.accept(known.contacts, known_.change(), 0.5 * now_.bandwidth * passed);
+    const bool calm = now_.time - known.restless > 2.0 * now_.brief();
     s.refer(now_.time, (calm ? settings_.lasting : settings_.refit) * now_.brief());
   }
 
-  // --- several contacts, all known ---
+  // --- several are known ---
   template <class Read>
   void several(SegmentContacts& s, Read&& read) {
     s.creep(now_, settings_);
-    fit_.weigh(s.contacts, measurement_);
-    if (!known_.explain(s.contacts)) {
+    JointEstimate& known = s.known.contacts;
+    fit_.weigh(known, measurement_);
+    if (!known_.explain(known)) {
       arrivals_.begin(s, now_);
       read();
       arrivals_.follow(s, now_, read);
@@ -175,22 +190,24 @@ class Tracks {
     }
     accept(s);
     merging_.follow(s, now_);
-    for (int c = 0; c < s.contacts.count; ++c) report(s.contacts.known[c]);
+    for (int c = 0; c < known.count; ++c) report(known.known[c]);
     release(s);
+    s.enter_known();
   }
 
   // Contacts without force have gone; the last one stays until the segment is quiet.
   void release(SegmentContacts& s) {
-    for (int c = s.contacts.count - 1; c >= 0 && s.contacts.count > 1; --c) {
-      KnownContact& k = s.contacts.known[c];
-      const double sigma = s.contacts.force_sigma(c);
+    JointEstimate& known = s.known.contacts;
+    for (int c = known.count - 1; c >= 0 && known.count > 1; --c) {
+      KnownContact& k = known.known[c];
+      const double sigma = known.force_sigma(c);
       const double least = std::max(settings_.least_force, settings_.gone_sigmas * sigma);
       const bool gone = norm(k.force) < least && sigma < settings_.least_force;
-      if (!gone) k.gone = 0.0;
-      if (gone && k.gone == 0.0) k.gone = now_.time;
-      if (!gone || now_.time - k.gone < now_.brief()) continue;
+      if (!gone) k.gone.reset();
+      if (gone && !k.gone) k.gone = now_.time;
+      if (!gone || now_.time - *k.gone < now_.brief()) continue;
       end(k.serial);
-      s.contacts.remove(c);
+      known.remove(c);
       s.forget_references();
     }
   }

@@ -34,90 +34,95 @@ class Twins {
   // forces rise, then ever more rarely.
   void follow(SegmentContacts& s, const Answer& one, const SegmentSample& now) {
     const double time = now.time;
-    if (s.apart < 0.0) {
-      s.apart = s.next_search = time;
-      s.walked = false;
+    Together& two = s.together;
+    if (!s.state.is(Tracking::pair)) {
+      s.state.enter(Tracking::pair);
+      s.suspected.explained.reset();
+      two = Together{};
+      two.since = two.next_search = time;
       parts_[now.segment]->drop();
     }
-    if (time >= s.next_search) {
+    if (time >= two.next_search) {
       pairs_.search(now.segment, now.lag, measurement_);
       take(s, one, now);
-      s.searched = time;
+      two.searched = time;
       const double least = settings_.refit * now.brief();
-      s.next_search = time + std::max(least, settings_.search_growth * (time - s.apart));
-    } else if (s.paired) {
-      if (known_.explain_freely(s.pair)) fit_.accept(s.pair, known_.change(), 0.0);
+      two.next_search = time + std::max(least, settings_.search_growth * (time - two.since));
+    } else if (two.separable) {
+      if (known_.explain_freely(two.contacts)) fit_.accept(two.contacts, known_.change(), 0.0);
     } else {
-      walk(s, *parts_[now.segment]);
+      walk(two, *parts_[now.segment]);
     }
-    if (!s.paired) {
-      reports_.end(s.twin);
-      s.twin = -1;
-      s.inseparable.force = one.force;
-      reports_.add(s.first, s.inseparable);
+    if (!two.separable) {
+      end_second(two);
+      two.inseparable.force = one.force;
+      reports_.add(s.touched.first, two.inseparable);
       return;
     }
-    if (s.twin < 0) s.twin = reports_.next();
-    s.pair.known[0].serial = s.first;
-    s.pair.known[1].serial = s.twin;
-    for (int k = 0; k < 2; ++k) reports_.add(s.pair.known[k]);
-    if (s.searched - s.apart < settings_.young * now.brief()) return;
-    s.contacts = s.pair;
-    s.twin = -1;
-    s.paired = false;
-    s.apart = -1.0;
+    if (!two.second) two.second = reports_.next();
+    two.contacts.known[0].serial = s.touched.first;
+    two.contacts.known[1].serial = *two.second;
+    for (int k = 0; k < 2; ++k) reports_.add(two.contacts.known[k]);
+    if (two.searched - two.since < settings_.young * now.brief()) return;
+    s.known.contacts = two.contacts;
     s.know(now);
+    s.state.enter(Tracking::several);
   }
 
+  // A single contact explains after all.
   void forget(SegmentContacts& s) {
-    reports_.end(s.twin);
-    s.twin = -1;
-    s.paired = false;
-    s.apart = -1.0;
+    end_second(s.together);
+    s.state.enter(Tracking::suspected);
   }
 
  private:
+  void end_second(Together& two) {
+    if (two.second) reports_.end(*two.second);
+    two.second.reset();
+  }
+
   // Takes the outcome of a search over.
   void take(SegmentContacts& s, const Answer& one, const SegmentSample& now) {
     PairParts& parts = *parts_[now.segment];
-    s.paired = said_.separable(pairs_, measurement_.size());
-    if (!s.paired) {
-      if (!s.walked) {
-        s.inseparable = one;
-        said_.name_all(pairs_, s.inseparable);
+    Together& two = s.together;
+    two.separable = said_.separable(pairs_, measurement_.size());
+    if (!two.separable) {
+      if (!two.walked) {
+        two.inseparable = one;
+        said_.name_all(pairs_, two.inseparable);
       }
-      if (!parts.working() && now.time - s.apart >= settings_.risen * now.brief()) {
+      if (!parts.working() && now.time - two.since >= settings_.risen * now.brief()) {
         parts.begin(pairs_);
-        conclude(s, parts);
+        conclude(two, parts);
       }
       return;
     }
-    s.walked = false;
+    two.walked = false;
     parts.drop();
-    s.pair.count = 0;
+    two.contacts.count = 0;
     for (int k = 0; k < 2; ++k) {
       said_.name(pairs_, k, measurement_.size(), answer_);
-      s.pair.add(found_contact(-1, answer_, surfaces_, s.age, now.lag), settings_);
+      two.contacts.add(found_contact(-1, answer_, surfaces_, s.touched.age, now.lag), settings_);
     }
-    fit_.begin(measurement_, s.pair);
-    fit_.judge(s.pair);
+    fit_.begin(measurement_, two.contacts);
+    fit_.judge(two.contacts);
   }
 
   // Goes on with what explains as well; what was said before stands until all is met.
-  void walk(SegmentContacts& s, PairParts& parts) {
+  void walk(Together& two, PairParts& parts) {
     if (!parts.working()) return;
     parts.work(settings_.pair_steps);
-    conclude(s, parts);
+    conclude(two, parts);
   }
 
-  void conclude(SegmentContacts& s, const PairParts& parts) {
+  void conclude(Together& two, const PairParts& parts) {
     if (parts.working()) return;
     if (parts.count() > 0) {
-      said_.name_all(parts, surfaces_, s.inseparable);
-      s.walked = true;
+      said_.name_all(parts, surfaces_, two.inseparable);
+      two.walked = true;
     } else if (pairs_.exhaustive()) {
-      said_.name_none(pairs_, s.inseparable);
-      s.walked = true;
+      said_.name_none(pairs_, two.inseparable);
+      two.walked = true;
     }
   }
 

@@ -9,9 +9,15 @@
 
 namespace touchline {
 
+// What touches: pushes come within the cone of the coefficient `friction`, and need `reach` [m] of
+// free space in front of the surface.
+struct Pushes {
+  double friction = 0.8, reach = 0.03;
+};
+
 struct PlaceSettings : PlaceTuning {
-  double friction = 0.8;     // coefficient of the friction cone, as in `Pushes`
-  double finger = 0.03;      // free space that a push comes from [m]: its `reach`
+  double friction = Pushes{}.friction;
+  double finger = Pushes{}.reach;
   bool first_entry = false;  // the paper's rule
   double gap_sigmas = DetectorTuning{}.gap_sigmas;  // of what a gap may have left
 };
