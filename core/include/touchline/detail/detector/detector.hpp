@@ -32,6 +32,8 @@ class Detector {
   Detector(const Observer& observer, std::vector<DetectionRow> rows, DetectionSettings settings,
            const DetectorTuning& tuning = {})
       : tuning_(tuning),
+        per_trend_(1.0 / tuning.trend),
+        per_fro_memory_(1.0 / tuning.fro_memory),
         observer_(observer),
         posture_(observer.tree(), observer.row_layout().joints),
         rows_(std::move(rows)),
@@ -69,8 +71,8 @@ class Detector {
     }
     for (const DetectionRow& row : rows_) {
       const double least = row.contact / std::max(row.seen, 1.0);
-      meters_.emplace_back(bandwidth(row), least);
-      trend_meters_.emplace_back(bandwidth(row) / tuning_.trend, least);
+      meters_.emplace_back(bandwidth(row), least, tuning_);
+      trend_meters_.emplace_back(bandwidth(row) * per_trend_, least, tuning_);
     }
     slowest_.assign(segments_.size(), kAbsurd);
     for (const DetectionRow& row : rows_)
@@ -588,7 +590,7 @@ class Detector {
     const DetectionRow& row = rows_[i];
     const double value = samples_[i].residual;
     if (!samples_[i].known) return;
-    s.trend += (value - s.trend) * std::min(1.0, dt * bandwidth(row) / tuning_.trend);
+    s.trend += (value - s.trend) * std::min(1.0, dt * bandwidth(row) * per_trend_);
     confirm_start(i, dt);
     if (learns(i) && dt > 0.0) {
       const bool touched = levels_[row.segment] > 0;
@@ -628,7 +630,7 @@ class Detector {
     RowState& s = states_[i];
     const double off = samples_[i].residual - s.trend,
         most = tuning_.fro * limits_[i] * rows_[i].contact;
-    s.turns *= std::max(0.0, 1.0 - dt * bandwidth(rows_[i]) / tuning_.fro_memory);
+    s.turns *= std::max(0.0, 1.0 - dt * bandwidth(rows_[i]) * per_fro_memory_);
     if (off * s.side < -most) s.turns += 1.0;
     if (std::fabs(off) > most) s.side = off > 0.0 ? 1.0 : -1.0;
     const bool counts = !felt || s.turns > tuning_.fro_turns;
@@ -665,6 +667,7 @@ class Detector {
   }
 
   DetectorTuning tuning_;
+  double per_trend_, per_fro_memory_;  // inverse: divisions per row and sample are dear
   const Observer& observer_;
   Posture posture_;
   const double *row_ = nullptr, *qd_ = nullptr;

@@ -16,8 +16,11 @@ class NoiseMeter {
  public:
   // `bandwidth` of the row's filter [rad/s]; `least`: a sigma below which noise does not matter
   // [N or Nm].
-  NoiseMeter(double bandwidth, double least)
-      : bandwidth_(bandwidth), least_(least), told_(least) {}
+  NoiseMeter(double bandwidth, double least, const DetectorTuning& t)
+      : bandwidth_(bandwidth),
+        mean_rate_(bandwidth / t.noise_mean),
+        least_(least),
+        told_(least) {}
 
   // The variance that noise as told has in the row now: of readings, which lasts for 1 / K, and of
   // velocities, which is nearly white.
@@ -37,7 +40,7 @@ class NoiseMeter {
       return;
     }
     const double off = value - mean_;
-    mean_ += off * std::min(1.0, dt * bandwidth_ / t.noise_mean);
+    mean_ += off * std::min(1.0, dt * mean_rate_);
     if (!counts) return;
     double square = off * off / passed_;  // of what lasts the mean takes a part
     double news = news_after(dt);
@@ -96,7 +99,8 @@ class NoiseMeter {
   };
 
   News known_, other_;
-  double bandwidth_, least_, told_, bare_ = 0.0, passed_ = 1.0, mean_ = 0.0, variance_ = 0.0, count_ = 0.0;
+  double bandwidth_, mean_rate_, least_, told_;
+  double bare_ = 0.0, passed_ = 1.0, mean_ = 0.0, variance_ = 0.0, count_ = 0.0;
   bool running_ = false;
 };
 

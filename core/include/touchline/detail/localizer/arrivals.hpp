@@ -163,8 +163,9 @@ class Arrivals {
   Answer& remainder(SegmentContacts& s) {
     const JointEstimate& known = s.known.before.contacts;
     fit_.take_out(known, Change::none(), measurement_);
-    new_lag_ = s.unexplained.age.follow(measurement_.load(), now_.bandwidth, now_.time, settings_.oldest) *
-               now_.brief();
+    const Vec3 load = measurement_.load();
+    new_lag_ = now_.brief() *
+               s.unexplained.age.follow(load, now_.bandwidth, now_.time, settings_.oldest);
     freed_ = false;
     return answer_ = single_.locate(now_.segment, new_lag_, measurement_);
   }

@@ -109,7 +109,8 @@ struct SegmentContacts {
   }
 
   bool unexplained_now() const {
-    return state.is(Tracking::newcomer) || state.is(Tracking::sliding) || state.is(Tracking::ending);
+    return state.is(Tracking::newcomer) || state.is(Tracking::sliding) ||
+           state.is(Tracking::ending);
   }
   // One contact or several are known, and explain.
   void enter_known() {

@@ -34,8 +34,8 @@ constexpr Turn kTurns[] = {
     {Tracking::single, Tracking::newcomer, "the innovation is beyond the gate"},
     {Tracking::several, Tracking::newcomer, "the innovation is beyond the gate"},
     {Tracking::several, Tracking::single, "all but one have let go, or two have met"},
-    {Tracking::newcomer, Tracking::sliding, "one known contact, moved along its body, explains all"},
-    {Tracking::newcomer, Tracking::several, "what is left has had a place for 1 / K: it is admitted"},
+    {Tracking::newcomer, Tracking::sliding, "a known contact, moved along its body, explains all"},
+    {Tracking::newcomer, Tracking::several, "what is left has had a place for 1 / K: admitted"},
     {Tracking::newcomer, Tracking::ending, "the known ones explain all again"},
     {Tracking::sliding, Tracking::newcomer, "none has explained all by sliding for 1 / K"},
     {Tracking::sliding, Tracking::single, "the only contact is found where it has come to"},
@@ -66,8 +66,8 @@ constexpr const char* name_of(Tracking state) {
   return kNames[static_cast<int>(state)];
 }
 
-// The state of one segment. It counts its transitions, so that a test can tell of one that the table
-// lacks.
+// The state of one segment. It counts its transitions, so that a test can tell of one that the
+// table lacks.
 class TrackingState {
  public:
   Tracking now() const { return now_; }
