@@ -43,16 +43,6 @@ class Kernelled(Protocol):
         """(3,) in world [m/s2]."""
         ...
 
-    @property
-    def joint_names(self) -> Sequence[str]:
-        """In the order of all arrays."""
-        ...
-
-    @property
-    def sensor_names(self) -> Sequence[str]:
-        """In the order of all arrays."""
-        ...
-
 
 def native_observer(
     robot: Kernelled, method: str, discretization: str, bandwidth: float | None
@@ -61,8 +51,8 @@ def native_observer(
     return core.Observer(
         [native_node(node) for node in robot.nodes],
         robot.gravity.tolist(),
-        [joint_row(robot, i, bandwidth) for i in range(len(robot.joint_names))],
-        [sensor_row(robot, i, bandwidth) for i in range(len(robot.sensor_names))],
+        [joint_row(robot, i, bandwidth) for i in range(len(robot.description.joints))],
+        [sensor_row(robot, i, bandwidth) for i in range(len(robot.description.sensors))],
         getattr(core.Method, method),
         getattr(core.Discretization, discretization),
     )
@@ -103,7 +93,8 @@ def joint_row(robot: Kernelled, index: int, bandwidth: float | None) -> core.Joi
     row.bandwidth = bandwidth or robot.description.bandwidth_joints[index]
     moved = [i for i, node in enumerate(robot.nodes) if node.coordinate == index]
     row.nodes = sorted(moved, key=lambda i: robot.nodes[i].joint != joint.name)
-    row.sources = [robot.sensor_names.index(name) for name in joint.sources]
+    names = [sensor.name for sensor in robot.description.sensors]
+    row.sources = [names.index(name) for name in joint.sources]
     return row
 
 
