@@ -5,6 +5,7 @@ import json
 import tempfile
 from dataclasses import dataclass
 from html import escape
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -80,11 +81,15 @@ class Results:
         Raises:
             ModuleNotFoundError: pandas is not installed.
         """
+        if find_spec("pandas") is None:
+            raise ModuleNotFoundError("pandas is not installed: pip install pandas", name="pandas")
         return {name: table.to_pandas() for name, table in self.to_arrow().items()}
 
 
 def _line(event: dict[str, Any]) -> str:
     where = event["link"] or event["segment"]
+    if event["status"] != "located":
+        where += f" ({event['status'].replace('_', ' ')})"
     return f"{event['id']}: {event['level']} at {event['detected']:.3f} s on {where}"
 
 
