@@ -113,10 +113,7 @@ class TableWriter:
         if set(columns) != set(names):
             odd = sorted(set(columns) ^ set(names))
             raise ValueError(f"{self.path}: missing or unknown columns: {', '.join(odd)}")
-        arrays = [
-            pa.array(columns[field.name], type=field.type, from_pandas=True)
-            for field in self._schema
-        ]
+        arrays = [_arrow_array(columns[field.name], field.type) for field in self._schema]
         batch = pa.RecordBatch.from_arrays(arrays, schema=self._schema)
         if batch.num_rows:
             self._append(batch)
@@ -211,14 +208,35 @@ def _arrow_type(kind: Any) -> Any:
     return pa.string() if kind in ("str", str) else pa.from_numpy_dtype(np.dtype(kind))
 
 
+def _arrow_array(values: Any, kind: Any) -> Any:
+    """NaN and None become null. Where a sum finds no NaN, arrow need not look at each number."""
+    import pyarrow as pa
+
+    numbers = isinstance(values, np.ndarray) and values.dtype == np.float64
+    whole = numbers and not np.isnan(values.sum())
+    return pa.array(values, type=kind, from_pandas=not whole)
+
+
 def _parquet_writer(path: Path, schema: Any) -> Any:
-    """Measured signals do not repeat, so dictionaries only cost time; words do."""
+    """Measured signals do not repeat: dictionaries and compression only cost time; words do.
+
+    Of the largest and smallest values, which take time too, only those of stamps are read.
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     words: Any = [field.name for field in schema if pa.types.is_string(field.type)] or False
+    compression: Any = {
+        field.name: "none" if pa.types.is_floating(field.type) else "lz4" for field in schema
+    }
+    stamps: Any = [name for name in ("time",) if name in schema.names] or False
     return pq.ParquetWriter(
-        path, schema, compression="lz4", use_dictionary=words, write_page_checksum=True
+        path,
+        schema,
+        compression=compression,
+        use_dictionary=words,
+        write_statistics=stamps,
+        write_page_checksum=True,
     )
 
 

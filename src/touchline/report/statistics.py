@@ -145,15 +145,16 @@ class Statistics:
         for bit in Health:
             if bit & any_of:
                 self.health[bit] += int(np.count_nonzero(health & bit))
-        quiet = np.all(detection.levels == 0, axis=1, keepdims=True)
+        touched = np.any(detection.levels, axis=1)
         wrench = estimate.segment_wrench.reshape(len(time), -1)
         of_wrenches = np.repeat(estimate.segment_settled, 6, axis=1)
         for values, settled, all_of, without_touch in (
             (estimate.tau_ext, estimate.joint_settled, self.torque, self.quiet_torque),
             (wrench, of_wrenches, self.wrench, self.quiet_wrench),
         ):
+            if touched.any():
+                all_of += Moments.of(values[touched], settled[touched])
+                values, settled = values[~touched], settled[~touched]
             moments = Moments.of(values, settled)
             all_of += moments
-            if not quiet.all():
-                moments = Moments.of(values, settled & quiet)
             without_touch += moments
