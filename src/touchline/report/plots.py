@@ -32,16 +32,21 @@ def curve_path(low: Floats, high: Floats, least: float, largest: float, join: in
     scale = STEPS / (largest - least)
     known = np.isfinite(low) & np.isfinite(high)
     rows = np.where(known, np.stack([low, high]), 0.0)
-    ends = np.rint((largest - rows) * scale).clip(0, STEPS).astype(int).T.tolist()
+    x = np.flatnonzero(known)
+    if not len(x):
+        return ""
+    bottom, top = np.rint((largest - rows[:, x]) * scale).clip(0, STEPS).astype(int)
+    first, last = np.where(x % 2, bottom, top), np.where(x % 2, top, bottom)
+    steps = (np.diff(x), first[1:] - last[:-1], (last - first)[1:])
+    words = [
+        f"l{right} {down}v{on}" if on else f"l{right} {down}"
+        for right, down, on in zip(*(step.tolist() for step in steps), strict=True)
+    ]
+    begins = [0, *(np.flatnonzero(steps[0] > join + 1) + 1).tolist()]
     parts: list[str] = []
-    end = at = -join - 2  # height and piece where the last one ended
-    for x in np.flatnonzero(known).tolist():
-        bottom, top = ends[x]
-        first, last = (bottom, top) if x % 2 else (top, bottom)
-        parts.append(f"M{x} {first}" if x - at > join + 1 else f"l{x - at} {first - end}")
-        if first != last:
-            parts.append(f"v{last - first}")
-        end, at = last, x
+    for begin, end in zip(begins, [*begins[1:], len(x)], strict=True):
+        on = f"v{last[begin] - first[begin]}" if last[begin] != first[begin] else ""
+        parts += [f"M{x[begin]} {first[begin]}{on}", *words[begin : end - 1]]
     return "".join(parts)
 
 
