@@ -21,6 +21,8 @@ EXTRAS = {
     "fsspec": "fleet",
     "aiohttp": "fleet",
     "distributed": "fleet",
+    "s3fs": "s3",
+    "gcsfs": "gs",
     "rerun": "rerun",
     "foxglove": "foxglove",
     "pinocchio": "bench",

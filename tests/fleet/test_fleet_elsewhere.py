@@ -4,6 +4,7 @@
 import functools
 import http.server
 import shutil
+import sys
 import threading
 from contextlib import contextmanager
 from dataclasses import replace
@@ -137,3 +138,34 @@ def test_a_cluster_gives_the_same_results(made, tmp_path, local, workers):
         shutil.rmtree(tmp_path / "out" / "b")
         assert run(made, "--out", tmp_path / "out", "--cluster", address) == 3
     assert results(tmp_path / "out") == local
+
+
+@pytest.mark.parametrize(
+    ("url", "package", "extra"),
+    [
+        ("http://host/x.parquet", "aiohttp", "fleet"),
+        ("s3://bucket/x.parquet", "s3fs", "s3"),
+        ("gs://bucket/x.parquet", "gcsfs", "gs"),
+    ],
+)
+def test_a_missing_package_is_told_with_its_extra(
+    url, package, extra, tmp_path, monkeypatch, capsys
+):
+    fsspec = pytest.importorskip("fsspec")
+
+    def absent(_):
+        raise ImportError("as fsspec words it")
+
+    monkeypatch.setattr(fsspec.core, "url_to_fs", absent)
+    assert run(url, "--out", tmp_path / "out") == 1
+    told = capsys.readouterr().err
+    assert told == f"touchline: {package} is not installed: pip install 'touchline[{extra}]'\n"
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_cluster_without_its_package_leaves_nothing(made, tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    out = tmp_path / "out"
+    assert run(made, "--out", out, "--cluster", "tcp://127.0.0.1:1") == 1
+    assert "pip install 'touchline[fleet]'" in capsys.readouterr().err
+    assert not out.exists()

@@ -11,6 +11,8 @@ from touchline.errors import InputError
 from touchline.extras import need
 
 FETCHED = ".fetched"
+# What fsspec needs for a kind of URL; its own message names no module that could be looked up.
+PACKAGES = {"http": "aiohttp", "https": "aiohttp", "s3": "s3fs", "gs": "gcsfs", "gcs": "gcsfs"}
 
 
 def is_url(word: str) -> bool:
@@ -78,6 +80,9 @@ def _system(url: str) -> tuple[Any, str]:
     try:
         return fsspec.core.url_to_fs(url)
     except ImportError as error:
-        raise ModuleNotFoundError(f"{url}: {error}", name=getattr(error, "name", None)) from error
+        package = PACKAGES.get(url.partition("://")[0])
+        if package is None:
+            raise InputError(f"{url}: {error}") from error
+        raise ModuleNotFoundError(f"{url}: {error}", name=package) from error
     except ValueError as error:
         raise InputError(f"{url}: {error}") from error

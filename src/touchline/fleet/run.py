@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from touchline.errors import InputError
+from touchline.extras import need
 from touchline.fleet.cluster import Cluster
 from touchline.fleet.figures import FIGURES, lasting, make_figures
 from touchline.fleet.manifest import Manifest, Row, configuration_hash
@@ -42,7 +43,12 @@ class Limits:
     cluster: str | None = None
 
     def check(self) -> None:
-        """Raise an InputError where a limit makes no sense."""
+        """Make sure that the limits make sense and that there is what they need.
+
+        Raises:
+            InputError: one makes no sense.
+            ModuleNotFoundError: a cluster is named, but distributed is not installed.
+        """
         if self.workers < 0:
             raise InputError(f"--workers {self.workers}: must not be negative")
         for name, value in (("time-limit", self.seconds), ("memory-limit", self.megabytes)):
@@ -52,6 +58,8 @@ class Limits:
                 raise InputError(f"--{name}: not with --cluster: its workers have their own limits")
         if self.workers and self.cluster is not None:
             raise InputError("--workers: not with --cluster: it has as many as it has")
+        if self.cluster is not None:
+            need("distributed")  # told before anything is written
 
     def takers(self, jobs: int) -> "Pool | Cluster":
         """Who analyzes so many recordings."""

@@ -44,7 +44,11 @@ def label(
     draft = out.with_name(f".part.{out.name}")  # keeps the ending: it tells the kind
     try:
         (shutil.copytree if dataset.is_dir() else shutil.copyfile)(dataset, draft)
-        done = _in_place(draft, robot, given, workers)
+        try:
+            done = _in_place(draft, robot, given, workers)
+        except InputError as error:  # in the user's words: of the copy nothing is left
+            told = [line.replace(str(draft), str(dataset)) for line in error.problems]
+            raise InputError(told) from error
         draft.rename(out)
     finally:
         if draft.is_dir():
