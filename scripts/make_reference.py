@@ -469,7 +469,7 @@ def _measured() -> str:
         + found["default"]
         + ".\n\nThe columns tell what has become different of that. `=` means that not one event "
         "has changed in any way. `~` means that events have changed, but none of these figures "
-        "by a step that counts. A small benchmark shows what is "
+        "by a step that counts. `-`: not tried. A small benchmark shows what is "
         "touchy, not what is best: a number without an effect here may matter on a real robot, "
         "for other layouts, or for faults that do not occur here.\n\n" + found["summary"] + "\n"
     )

@@ -113,7 +113,9 @@ def effect(usual: Outcome, other: Outcome) -> str:
         before, now = getattr(usual, name), getattr(other, name)
         if before != now:
             parts.append(f"{name} {now - before:+d}")
-    if not abs(other.error - usual.error) <= WORSE * usual.error:
+    if np.isnan(other.error) and not np.isnan(usual.error):
+        parts.append("a place is not a number")
+    elif not abs(other.error - usual.error) <= WORSE * usual.error:
         parts.append(f"{other.error - usual.error:+.2f} mm")
     if not abs(other.delay - usual.delay) <= LATER:
         parts.append(f"{other.delay - usual.delay:+.0f} ms")
