@@ -346,3 +346,8 @@ def test_a_contact_that_slides_beside_one_that_is_held_is_found():
 def test_hands_that_are_not_steady_touch_arms_at_rest():
     with pytest.raises(InputError, match="--hands sliding: hands that tremble or slide"):
         Plan(("sara",), (2,), (1,), ("apart",), (1.0,), hands=("sliding",)).cells()
+
+
+@pytest.mark.parametrize("name, segments", [("panda", ("base",)), ("ur10", ("base", "wrist"))])
+def test_an_arm_is_the_one_that_is_described(name, segments):
+    assert tuple(load_arm(name, 1).segment_names) == segments  # its description is found
