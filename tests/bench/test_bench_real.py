@@ -8,12 +8,14 @@ from hypothesis import strategies as st
 
 from touchline.bench.matching import match
 from touchline.bench.real.judged import Touched, judge_free, judge_touched
+from touchline.bench.real.left_out import CHOICES, Tried, chosen, named
 from touchline.cli import main
 from touchline.model.robot import load_robot
 from touchline.observer.samples import Samples
 from touchline.result.contact import Candidate
 from touchline.result.event import Event
 from touchline.trials.real_recordings import Recording, at_rate
+from touchline.tuning import DEFAULTS
 
 
 def spans(*intervals):
@@ -114,3 +116,20 @@ def test_a_lower_rate_keeps_samples_of_even_instants():
     np.testing.assert_allclose(slow.samples.time, 5.0 + np.arange(30) / 15.0, atol=0.005)
     assert np.isin(slow.samples.time, time).all()
     np.testing.assert_array_equal(slow.samples.q[:, 0], slow.samples.time)
+
+
+def test_a_recording_has_no_say_in_what_it_is_judged_with():
+    def scores(*values):
+        return [Tried(Touched(), value) for value in values]
+
+    tried = [scores(0.0, 99.0, 0.0), scores(-1.0, -2.0, -0.5), scores(-1.0, -2.0, -3.0)]
+    assert chosen(tried, 0) == 0  # -2, -4, -3.5; it would have taken the second
+    assert chosen(tried, 1) == chosen(tried, 2) == 1
+    assert chosen([scores(5.0, 0.0), scores(1.0, 1.0)], 0) == 0  # of equal ones the default
+
+
+def test_what_is_tried_are_tuning_numbers_and_none_is_the_default():
+    assert CHOICES[0] == {} and named(CHOICES[0]) == "defaults"
+    for choice in CHOICES[1:]:
+        ((name, value),) = choice.items()
+        assert DEFAULTS[name] != value and named(choice) == f"{name} {value:g}"

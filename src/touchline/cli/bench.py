@@ -205,7 +205,7 @@ def detection(
     return 0
 
 
-def real(*, data: Directory = None, rate: float | None = None) -> int:
+def real(*, data: Directory = None, rate: float | None = None, leave_one_out: bool = False) -> int:
     """What holds on recordings of real arms of which nothing but the model is told.
 
     Example: touchline bench real --data recordings
@@ -215,6 +215,8 @@ def real(*, data: Directory = None, rate: float | None = None) -> int:
             kuka_lwr4, kinova_gen3; those that are missing are left out, all without a folder. The
             models of the Panda and the UR10 come with the package example-robot-data.
         rate: Looks at the touched recordings once more as if recorded at this rate [Hz].
+        leave_one_out: For each touched recording, chooses three tuning numbers on all others, and
+            prints what holds on the one left out.
     """
     from touchline.bench.real.run import main
     from touchline.numbers import check_positive
@@ -224,7 +226,7 @@ def real(*, data: Directory = None, rate: float | None = None) -> int:
     if data is None:
         print("Recordings of real arms: none, name their folder with --data")
     else:
-        main(data, rate)
+        main(data, rate, leave_one_out)
     return 0
 
 

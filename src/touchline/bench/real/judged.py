@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What was made of a recording, counted."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -69,9 +69,9 @@ class Free:
     open: bool
 
 
-def events_of(recording: Recording) -> list[Event]:
-    """What the pipeline makes of a recording."""
-    pipeline = Pipeline(recording.robot, period=recording.period)
+def events_of(recording: Recording, tuning: Mapping[str, float] | None = None) -> list[Event]:
+    """What the pipeline makes of a recording, with some tuning numbers changed."""
+    pipeline = Pipeline(recording.robot, period=recording.period, tuning=tuning)
     s = recording.samples
     pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
     return pipeline.events

@@ -5,6 +5,7 @@ Nothing is chosen on a recording that is judged: descriptions name the model, lo
 log's columns, all else is what a new robot starts with.
 """
 
+import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -16,6 +17,7 @@ from touchline.bench.real.judged import (
     judge_free,
     judge_touched,
 )
+from touchline.bench.real.left_out import CHOICES, chosen, named, try_all
 from touchline.bench.tables import Row, aligned
 from touchline.errors import InputError
 from touchline.trials.real_recordings import at_rate, read_free, read_touched, touched_files
@@ -37,12 +39,14 @@ TOUCHED_HEAD = (
 FREE_HEAD = ("recording", "s", "in contact", "longest", "events", "to the end")
 
 
-def main(data: Path, rate: float | None = None) -> None:
+def main(data: Path, rate: float | None = None, leave_one_out: bool = False) -> None:
     """Prints what holds on the recordings below `data`.
 
     Args:
         data: folder of the recordings.
         rate: at which the touched ones are looked at once more [Hz], or None.
+        leave_one_out: numbers are chosen anew on all touched files but the one that is judged, and
+            nothing else is printed.
 
     Raises:
         InputError: there are none.
@@ -53,6 +57,10 @@ def main(data: Path, rate: float | None = None) -> None:
         free = read_free(data.resolve(), folder)
         if not files and not free:
             raise InputError(f"{data}: holds neither panda_touches nor recordings of free motion")
+        if leave_one_out:
+            if files:
+                print(_left_out(files, folder))
+            return
         if files:
             whole = [_judged(path, folder) for path in files]
             print(_touched_text("A real Panda touched by hand", whole))
@@ -63,6 +71,22 @@ def main(data: Path, rate: float | None = None) -> None:
             print(f"touches found at {rate:g} Hz of those found before: {found} of {before}\n")
         if free:
             print(_free_text([(r.name, judge_free(r, events_of(r))) for r in free]))
+
+
+def _left_out(files: list[Path], folder: Path) -> str:
+    from tqdm import tqdm
+
+    bar = tqdm(files, desc="leave one out", file=sys.stderr, disable=None, leave=False)
+    recordings = [read_touched(path, folder) for path in files]
+    tried = [try_all(recording) for recording, _ in zip(recordings, bar, strict=True)]
+    rows: list[Row] = [("file", "chosen on all others")]
+    judged = []
+    for k, recording in enumerate(recordings):
+        choice = chosen(tried, k)
+        rows.append((recording.name, named(CHOICES[choice])))
+        judged.append((recording.name, recording.link, tried[k][choice].counts))
+    text = _touched_text("Numbers chosen on all other files", judged)
+    return f"{text}\n{aligned(rows, text_columns=(0, 1))}"
 
 
 def _judged(path: Path, folder: Path, rate: float | None = None) -> tuple[str, int, Touched]:
