@@ -20,6 +20,7 @@ check: .venv/ready
 	.venv/bin/ruff format --check .
 	.venv/bin/pyright --pythonpath $(PYTHON)
 	.venv/bin/lint-imports
+	$(PYTHON) scripts/make_reference.py --check
 
 # What recordings give now becomes the reference; `git diff` shows what has changed.
 accept: .venv/ready
