@@ -49,12 +49,19 @@ def test_files_that_are_none_are_refused(exported, tmp_path):
 
 
 def test_export_tells_what_it_cannot_do(tmp_path, capsys):
-    assert main(["export", "sara", "--out", str(tmp_path / "no" / "sara.touchline")]) == 2
+    (tmp_path / "file").touch()
+    assert main(["export", "sara", "--out", str(tmp_path / "file" / "sara.touchline")]) == 2
     assert main(["export", "sara", "--out", str(tmp_path / "a"), "--period", "0"]) == 2
     assert main(["export", "nobody", "--out", str(tmp_path / "a")]) == 2
     for line in capsys.readouterr().err.splitlines():
         assert line.startswith("touchline: ")
-    assert not list(tmp_path.iterdir())
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_export_makes_the_folder_of_its_file(tmp_path):
+    out = tmp_path / "new" / "sara.touchline"
+    assert main(["export", "sara", "--out", str(out)]) == 0
+    assert out.stat().st_size > 1000
 
 
 @pytest.mark.skipif(COMPILER is None, reason="no C++ compiler on this machine")
