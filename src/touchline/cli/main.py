@@ -34,7 +34,7 @@ usage: touchline COMMAND ...
 {commands}
 
 `touchline COMMAND --help` explains a command; `touchline --version` names the version.
-Exit status: 0 done, 1 failure (check: findings), 2 bad input."""
+Exit status: 0 done, 1 failure (check: findings), 2 bad input, 3 done in part (many recordings)."""
 
 COMMANDS: dict[str, Callable[..., int]] = {
     "demo": demo,
