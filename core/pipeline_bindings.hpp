@@ -72,14 +72,12 @@ inline nb::list transitions(const tl::RedundantPipeline& p) {
 
 // The pipeline, and what a user of Python may ask for later: the events that have ended.
 struct Pipeline {
-  Pipeline(tl::Robot robot, const tl::Tuning& tuning, nb::object builder)
-      : value(std::make_unique<tl::RedundantPipeline>(std::move(robot), tuning)),
-        build(std::move(builder)),
+  Pipeline(tl::Robot robot, const tl::Tuning& tuning, std::vector<tl::StandIn> stand_ins)
+      : value(std::make_unique<tl::RedundantPipeline>(std::move(robot), tuning,
+                                                      std::move(stand_ins))),
         unmeasured(value->robot().joints.size() + 6 * value->robot().sensors.size(), tl::kUnknown) {}
 
   std::unique_ptr<tl::RedundantPipeline> value;
-  nb::object build;  // of a list of lost sensors: their `StandIn`, or None
-  std::vector<std::vector<int>> hopeless;  // lost sensors that nobody can stand in for
   std::mutex turn;
   std::vector<double> ended;       // numbers of events, one after the other
   std::size_t most = std::numeric_limits<std::size_t>::max();  // of them that are kept at least
@@ -180,20 +178,6 @@ inline void take_snapshot(Pipeline& of, const tl::Sample& sample, const tl::Resu
   }
 }
 
-// Makes a stand-in for lost sensors. Takes a turn of its own unless one is `held`.
-inline void prepare(Pipeline& p, const std::vector<int>& lost, bool held) {
-  if (lost.empty() || p.value->stands_in(lost)) return;
-  if (std::find(p.hopeless.begin(), p.hopeless.end(), lost) != p.hopeless.end()) return;
-  const nb::object made = p.build.is_none() ? nb::none() : p.build(lost);
-  std::optional<guard::Turn> turn;
-  if (!held) turn.emplace(p.turn);
-  if (made.is_none()) {
-    p.hopeless.push_back(lost);
-  } else {
-    p.value->add(nb::cast<tl::StandIn>(made));
-  }
-}
-
 inline nb::object update(Pipeline& p, double time, nb::handle q, nb::handle qd, nb::handle tau,
                          nb::handle wrench) {
   const tl::RowLayout& layout = p.value->row_layout();
@@ -205,8 +189,7 @@ inline nb::object update(Pipeline& p, double time, nb::handle q, nb::handle qd, 
   std::vector<double> numbers;  // taken out of its turn: a new array may run any code of Python
   {
     const guard::Turn turn(p.turn);
-    const tl::Result result = p.value->update(
-        sample, [&p](const std::vector<int>& lost) { prepare(p, lost, true); });
+    const tl::Result result = p.value->update(sample);
     if (p.told) p.told(sample, result);
     keep_ended(p, result);
     take_snapshot(p, sample, result, p.snapshot);
@@ -238,10 +221,6 @@ inline nb::tuple run(Pipeline& p, nb::handle time, nb::handle q, nb::handle qd, 
     for (std::size_t k = 0; k < counts.size(); ++k) counts[k] = so_far[k].count;
     nb::gil_scoped_release release;
     std::size_t i = 0;
-    const auto lacking = [&p](const std::vector<int>& lost) {
-      const nb::gil_scoped_acquire acquire;
-      prepare(p, lost, true);
-    };
     const auto each = [&](const tl::Result& result) {
       level = std::copy(result.levels.begin(), result.levels.end(), level);
       x = std::copy(result.normalized.begin(), result.normalized.end(), x);
@@ -272,7 +251,7 @@ inline nb::tuple run(Pipeline& p, nb::handle time, nb::handle q, nb::handle qd, 
       rows.data()[health] = static_cast<double>(result.health);
       ++i;
     };
-    p.value->run(in.rows, in.time, in.first, rows.data(), each, lacking);
+    p.value->run(in.rows, in.time, in.first, rows.data(), each);
   }
   return nb::make_tuple(rows.release(), levels.release(), normalized.release(), drift.release(),
                         quiet.release(), watch.release(), arrays::table(contacts, contact),
@@ -300,8 +279,9 @@ inline nb::tuple events(Pipeline& p, std::size_t from) {
 
 // Begins anew with the same robot but other figures, of its biases or loads. Events that last end
 // with the last sample; the numbers of events go on.
-inline void restart(Pipeline& p, const tl::Robot& robot) {
-  auto fresh = std::make_unique<tl::RedundantPipeline>(robot, p.value->tuning());
+inline void restart(Pipeline& p, const tl::Robot& robot, std::vector<tl::StandIn> stand_ins) {
+  auto fresh = std::make_unique<tl::RedundantPipeline>(robot, p.value->tuning(),
+                                                       std::move(stand_ins));
   const tl::Robot& before = p.value->robot();
   if (robot.joint_names != before.joint_names || robot.sensor_names != before.sensor_names ||
       robot.links.size() != before.links.size() || robot.rows.size() != before.rows.size())
@@ -319,7 +299,6 @@ inline void restart(Pipeline& p, const tl::Robot& robot) {
   fresh->number_events_from(p.value->next_event());
   fresh->count_resets_from(*p.value);
   p.value.swap(fresh);
-  p.hopeless.clear();
 }
 
 // For how long the arm has been at rest [s]; the mean torques (n) and wrenches (6 k) felt since.
@@ -446,20 +425,19 @@ inline void bind(nb::module_& m) {
   nb::class_<Pipeline>(m, "Pipeline")
       .def(
           "__init__",
-          [](Pipeline* self, const tl::Robot& robot, const tl::Tuning& tuning, nb::object build) {
-            new (self) Pipeline(robot, tuning, std::move(build));
+          [](Pipeline* self, const tl::Robot& robot, const tl::Tuning& tuning,
+             std::vector<tl::StandIn> stand_ins) {
+            new (self) Pipeline(robot, tuning, std::move(stand_ins));
           },
-          "robot"_a, "tuning"_a, "build"_a = nb::none())
+          "robot"_a, "tuning"_a, "stand_ins"_a = std::vector<tl::StandIn>{})
       .def("update", &update, "time"_a, "q"_a, "qd"_a, "tau"_a.none(), "wrench"_a.none())
       .def("run", &run, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a)
       .def("events", &events, "since"_a)
-      .def("restart", &restart, "robot"_a)
+      .def("restart", &restart, "robot"_a, "stand_ins"_a = std::vector<tl::StandIn>{})
       .def("keep", [](Pipeline& p, std::size_t most) {
              const guard::Turn turn(p.turn);
              p.most = most;
            }, "most"_a)
-      .def("prepare", [](Pipeline& p, const std::vector<int>& lost) { prepare(p, lost, false); },
-           "lost"_a)
       .def_prop_ro("lost", [](const Pipeline& p) { return p.value->lost(); })
       .def("rest", &rest)
       .def("transitions", [](const Pipeline& p) { return transitions(*p.value); },

@@ -235,12 +235,14 @@ def test_a_recording_in_parts_gives_the_bits_of_single_samples(chunks):
     assert parts.events == live.events
 
 
-def test_healthy_samples_are_the_whole_robot_s_to_the_last_bit():
+def test_healthy_samples_are_the_whole_robot_s_to_the_last_bit(monkeypatch):
     robot = robot_named("sara")
     q = np.linspace(0.3, 0.9, 7)
     samples = pushed(robot, q, "link5", np.array([0.0, 15.0, -20.0]))
-    plain, ready = tl.Pipeline(robot), tl.Pipeline(robot)
-    ready._core.prepare([0])
+    ready = tl.Pipeline(robot)
+    with monkeypatch.context() as patched:
+        patched.setattr("touchline.pipeline.stand_ins.losses", lambda sensors: [])
+        plain = tl.Pipeline(robot)
     np.testing.assert_array_equal(run(plain, samples)[0].rows, run(ready, samples)[0].rows)
     assert plain.events == ready.events
 

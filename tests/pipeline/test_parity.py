@@ -10,8 +10,10 @@ from touchline.simulation.contacts import Profile, ScriptedContact
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scenario import scripted
 from touchline.simulation.scene import Run
+from touchline.trials.cell import Cell
 from touchline.trials.faults import channels_of
 from touchline.trials.recordings import record
+from touchline.trials.scene import arm_and_skin, make_pipeline, make_scene
 
 BEGIN = 0.6  # s
 RAMP = 40.0  # N/s: no step that a gate would see
@@ -77,3 +79,21 @@ def test_many_samples_at_a_time_say_the_same_as_one_by_one(arm):
     assert first == {f.channel: f.sample for f in whole.faults if f.fault != Fault.NONE} != {}
     np.testing.assert_array_equal(estimate.health, health)
     assert repr(one.events) == repr(whole.events)
+
+
+def test_two_touches_that_cancel_in_one_axis_of_the_base_sensor_contradict_nothing():
+    """Their forces are opposite: only a moment is left, which the joints between them feel too."""
+    robot, skin = arm_and_skin("sara", 1)
+    pipeline = make_pipeline(robot, skin)
+    s = make_scene(Cell("sara", 2, 1, begin="apart"), 2).signals
+    _, told, events = heard(pipeline, s)
+    assert told == [] and events
+
+
+@pytest.mark.parametrize("axis", [3, 4, 5])
+def test_a_torque_of_the_base_sensor_that_nothing_else_feels_is_named(arm, axis):
+    robot, pipeline, samples = arm
+    name = f"base.m{'xyz'[axis - 3]}"
+    _, told, events = heard(pipeline, drifting(robot, samples, name))
+    assert [f.channel for f in told][:1] == [name]
+    assert not [e for e in events if e.level == "collision"]

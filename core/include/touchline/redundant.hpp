@@ -40,7 +40,10 @@ struct StandIn {
 
 class RedundantPipeline {
  public:
-  explicit RedundantPipeline(Robot robot, const Tuning& tuning = {})
+  // `stand_ins`: for the losses of sensors that it carries on after. Where several do, the one that
+  // does without the fewest sensors. Throws std::invalid_argument where one does not fit the robot.
+  explicit RedundantPipeline(Robot robot, const Tuning& tuning = {},
+                             std::vector<StandIn> stand_ins = {})
       : whole_(std::move(robot), tuning),
         gates_(whole_.robot(), tuning.gates),
         parity_(whole_.robot(), whole_.observer(), tuning.gates),
@@ -48,7 +51,6 @@ class RedundantPipeline {
     const Robot& own = whole_.robot();
     const std::size_t n = own.joints.size(), k = own.sensors.size();
     absent_.resize(k, 0);
-    lost_.reserve(k);
     row_.resize(whole_.row_layout().width());
     levels_.resize(own.segment_names.size());
     quiet_.resize(levels_.size());
@@ -65,18 +67,13 @@ class RedundantPipeline {
     faults_ = sound_;
     left_.resize(sound_.size());
     restarts_.resize(n + levels_.size(), 0);
+    for (StandIn& given : stand_ins) {
+      check(given);
+      stand_ins_.push_back(std::make_unique<Second>(std::move(given), tuning, k));
+      find_parts(*stand_ins_.back());
+    }
   }
 
-  // Allocates. Throws std::invalid_argument where it does not fit the robot.
-  void add(StandIn given) {
-    check(given);
-    stand_ins_.push_back(std::make_unique<Second>(std::move(given), tuning(), absent_.size()));
-    find_parts(*stand_ins_.back());
-  }
-  bool stands_in(const std::vector<int>& lost) const {
-    return std::any_of(stand_ins_.begin(), stand_ins_.end(),
-                       [&](const auto& second) { return second->given.lost == lost; });
-  }
   const RowLayout& row_layout() const { return whole_.row_layout(); }
   const Robot& robot() const { return whole_.robot(); }
 
@@ -84,24 +81,13 @@ class RedundantPipeline {
 
   // Takes one sample; see `Pipeline::update`.
   Result update(const Sample& sample) {
-    return update(sample, [](const std::vector<int>&) {});
-  }
-  // The same. Calls `lacking(sensors)` where these are without a usable reading and nothing stands
-  // in for just them: it may `add` that.
-  template <class Lacking>
-  Result update(const Sample& sample, Lacking&& lacking) {
     const Sample believed = gates_.judge(sample);
-    return take(believed, gates_.faults(), gates_.ratios().data(), lacking);
+    return take(believed, gates_.faults(), gates_.ratios().data());
   }
 
   // Takes N samples; see `Pipeline::run`. The bits are those of `update`.
   template <class Each>
   void run(std::size_t samples, const double* time, const Sample& first, double* rows, Each&& each) {
-    run(samples, time, first, rows, each, [](const std::vector<int>&) {});
-  }
-  template <class Each, class Lacking>
-  void run(std::size_t samples, const double* time, const Sample& first, double* rows, Each&& each,
-           Lacking&& lacking) {
     const std::size_t n = joints_, w = 6 * absent_.size(), width = row_.size();
     const auto at = [&](std::size_t i) {
       return Sample{time[i], first.q + i * n, first.qd + i * n, first.tau + i * n,
@@ -130,14 +116,14 @@ class RedundantPipeline {
           return !contradicted_;
         });
         for (; i < end; ++i, ratios += sound_.size()) {  // judged, but not taken any more
-          const Result result = take(at(i), sound_, ratios, lacking);
+          const Result result = take(at(i), sound_, ratios);
           std::copy(result.estimate.row().begin(), result.estimate.row().end(), rows + i * width);
           each(result);
         }
         if (!judged) continue;
       }
       if (!judged) believed = gates_.judge(at(i));
-      const Result result = take(believed, gates_.faults(), gates_.ratios().data(), lacking);
+      const Result result = take(believed, gates_.faults(), gates_.ratios().data());
       std::copy(result.estimate.row().begin(), result.estimate.row().end(), rows + i * width);
       each(result);
       ++i;
@@ -180,17 +166,9 @@ class RedundantPipeline {
   static constexpr std::size_t kAhead = 64;  // samples that are judged before they are taken
 
   // A sample of which the gates believe `judged`.
-  template <class Lacking>
-  Result take(const Sample& judged, const std::vector<Fault>& faults, const double* ratios,
-              Lacking& lacking) {
+  Result take(const Sample& judged, const std::vector<Fault>& faults, const double* ratios) {
     const Sample believed = contradicted_ ? without_contradicted(judged) : judged;
     find_absent(believed);
-    if (any_absent_) {
-      lost_.clear();
-      for (std::size_t s = 0; s < absent_.size(); ++s)
-        if (absent_[s] != 0) lost_.push_back(static_cast<int>(s));
-      if (!stands_in(lost_)) lacking(lost_);
-    }
     const bool whole = healthy();
     const Result result = whole ? whole_.update(believed) : step(believed);
     if (whole) watch_parity(result, believed.time);
@@ -637,7 +615,7 @@ class RedundantPipeline {
   std::size_t joints_ = 0;
   std::vector<char> absent_;  // per sensor, at the last sample
   std::vector<double> row_, quiet_, normalized_, drift_;
-  std::vector<int> levels_, none_, lost_;
+  std::vector<int> levels_, none_;
   std::vector<Contact> contacts_;
   std::vector<EventChange> changes_;
   std::vector<Renumbered> renumbered_;

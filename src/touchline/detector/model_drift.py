@@ -5,6 +5,9 @@ Masses, inertias and centres of mass are taken to be off by a stated part. What 
 rows follows from inverse dynamics of arms that are off at random, in random poses and motions.
 """
 
+from dataclasses import dataclass
+from functools import lru_cache
+
 import numpy as np
 
 from touchline.arrays import Array
@@ -15,6 +18,62 @@ from touchline.tuning import DEFAULTS
 
 ARMS, POSES = 6, 32  # that are drawn
 WAY = DEFAULTS["detector.drift_way"]  # rad
+
+
+@dataclass(frozen=True)
+class LinkErrors:
+    """What errors of the links of each segment of a robot do to joints and sensors.
+
+    Three mean squares each: of what changes on a way of `WAY`; per squared speed; per acceleration.
+
+    Attributes:
+        segments: (m) names.
+        sensors: (k) names.
+        torques: (m, n, 3) at each joint.
+        wrenches: (m, k, 6, 3) at each sensor, in its frame.
+    """
+
+    segments: tuple[str, ...]
+    sensors: tuple[str, ...]
+    torques: Array
+    wrenches: Array
+
+    def drift(self, robot: Robot, parts: dict[str, list[str]]) -> tuple[Array, Array]:
+        """As `guess_drift`, of this robot or of one that has lost some of its sensors.
+
+        Args:
+            robot: that one.
+            parts: names of segments here that each of its segments consists of.
+        """
+        at = {name: [self.segments.index(part) for part in parts[name]] for name in parts}
+        joints = robot.joint_segments
+        torques = np.array([self.torques[at[name], j].sum(axis=0) for j, name in enumerate(joints)])
+        wrenches = np.zeros((len(robot.segment_names), 6, 3))
+        for g, name in enumerate(robot.segment_names):
+            if name != "root":
+                wrenches[g] = self.wrenches[at[name], self.sensors.index(name)].sum(axis=0)
+        return np.sqrt(torques), np.sqrt(wrenches)
+
+
+@lru_cache(maxsize=4)
+def link_errors(robot: Robot, error: float) -> LinkErrors:
+    """By inverse dynamics of arms that are off at random; `error` as of `guess_drift`.
+
+    Takes some 50 ms for seven joints and three sensors, so that the last ones are kept.
+    """
+    n, k, m = len(robot.joint_names), len(robot.sensor_names), len(robot.segment_names)
+    torques, wrenches = np.zeros((m, n, 3)), np.zeros((m, k, 6, 3))
+    rng = np.random.default_rng(0)
+    states = _states(robot, rng)
+    right = inverse_dynamics(robot, *states)
+    for g, segment in enumerate(robot.segment_names):
+        links = {name for body in robot.bodies if body.segment == segment for name in body.links}
+        for _ in range(ARMS):
+            mechanism = perturbed(robot.mechanism, error, rng, links)
+            wrong = inverse_dynamics(Robot(robot.description, mechanism), *states)
+            torques[g] += _squares(wrong.torque - right.torque) / ARMS
+            wrenches[g] += _squares(wrong.wrench - right.wrench) / ARMS
+    return LinkErrors(robot.segment_names, robot.sensor_names, torques, wrenches)
 
 
 def guess_drift(robot: Robot, error: float) -> tuple[Array, Array]:
@@ -31,22 +90,8 @@ def guess_drift(robot: Robot, error: float) -> tuple[Array, Array]:
         (n, 3) for the joints and (m, 6, 3) for the segments, in the frames of their sensors: what
         changes on a way of `WAY`; per squared speed; per acceleration.
     """
-    n, m = len(robot.joint_names), len(robot.segment_names)
-    torques, wrenches = np.zeros((n, 3)), np.zeros((m, 6, 3))
-    rng = np.random.default_rng(0)
-    states = _states(robot, rng)
-    right = inverse_dynamics(robot, *states)
-    for g, segment in enumerate(robot.segment_names):
-        links = {name for body in robot.bodies if body.segment == segment for name in body.links}
-        joints = [j for j in range(n) if robot.joint_segments[j] == segment]
-        for _ in range(ARMS):
-            mechanism = perturbed(robot.mechanism, error, rng, links)
-            wrong = inverse_dynamics(Robot(robot.description, mechanism), *states)
-            torques[joints] += _squares(wrong.torque - right.torque)[joints] / ARMS
-            if segment != "root":
-                s = robot.sensor_names.index(segment)
-                wrenches[g] += _squares(wrong.wrench[:, s] - right.wrench[:, s]) / ARMS
-    return np.sqrt(torques), np.sqrt(wrenches)
+    own = {segment: [segment] for segment in robot.segment_names}
+    return link_errors(robot, error).drift(robot, own)
 
 
 def _states(robot: Robot, rng: np.random.Generator) -> tuple[Array, Array, Array]:

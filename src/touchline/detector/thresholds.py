@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """When a residual counts as a contact: thresholds from the noise figures or from `detection`."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -117,17 +118,23 @@ def _calibration(robot: Robot, period: float) -> tuple[CalibrationDescription | 
     return given, None
 
 
-def expect_drift(robot: Robot, thresholds: Thresholds, error: float) -> Thresholds:
+def expect_drift(
+    robot: Robot,
+    thresholds: Thresholds,
+    error: float,
+    guess: Callable[[Robot, float], tuple[Array, Array]] = guess_drift,
+) -> Thresholds:
     """The same tests; where they are not calibrated, the localizer reckons with a guess.
 
     Args:
         robot: the robot.
         thresholds: its tests.
         error: 1 sigma of the relative error of the model's masses and inertias; 0: it is right.
+        guess: what does.
     """
     if thresholds.calibrated or error == 0.0:
         return thresholds
-    torques, wrenches = guess_drift(robot, error)
+    torques, wrenches = guess(robot, error)
     rows = []
     for row in thresholds.rows:
         found = torques[row.joint] if row.component < 0 else wrenches[row.segment, row.component]

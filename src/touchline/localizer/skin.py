@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The surfaces of all links of a robot, ready for lines and points."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from touchline.arrays import Array
-from touchline.model.robot import Robot
+from touchline.model.robot import Body, Robot
 from touchline.model.surface import Surface, mechanism_surfaces
 from touchline.model.tree import invert
 from touchline.native import core
@@ -73,10 +73,21 @@ class Skin:
         names = set(robot.segment_names)
         bodies = {link: body for body in robot.bodies for link in body.links}
         self.patches = tuple(
-            _patch(robot, link, surface, bodies[link].name, bodies[link].segment, names)
+            _patch(robot, link, surface, bodies[link], names)
             for link, surface in surfaces.by_link.items()
             if link in bodies
         )
+
+    def on(self, robot: Robot) -> "Skin":
+        """The same surfaces on a robot of the same links with other sensors."""
+        skin = object.__new__(Skin)
+        skin.robot, skin.lost, skin.doubts = robot, self.lost, self.doubts
+        names = set(robot.segment_names)
+        bodies = {link: body for body in robot.bodies for link in body.links}
+        skin.patches = tuple(
+            _moved_patch(robot, patch, bodies[patch.link], names) for patch in self.patches
+        )
+        return skin
 
     def check_robot(self, robot: Robot) -> None:
         """Checks that these are the surfaces of a robot, or of one with the same links.
@@ -141,16 +152,28 @@ class Skin:
         return float(row[0]), T[:3, :3] @ row[2:5] + T[:3, 3]
 
 
-def _patch(
-    robot: Robot, link: str, surface: Surface, body: str, segment: str, segments: set[str]
-) -> Patch:
+def _patch(robot: Robot, link: str, surface: Surface, body: Body, segments: set[str]) -> Patch:
     place = robot.places[link]
     T = place.T_node_link
     vertices = surface.vertices @ T[:3, :3].T + T[:3, 3]
     mesh = core.mesh(np.ascontiguousarray(vertices), np.ascontiguousarray(surface.faces, np.int64))
-    # What stands on the world inboard of all joints and sensors is felt by nothing.
-    felt = segment in segments and (segment != "root" or _moves(robot, place.node))
-    return Patch(link, body, place.node, segment if felt else None, T, surface, mesh)
+    felt = _felt(robot, body, place.node, segments)
+    return Patch(link, body.name, place.node, felt, T, surface, mesh)
+
+
+def _moved_patch(robot: Robot, patch: Patch, body: Body, segments: set[str]) -> Patch:
+    """The same surface where a robot of the same links carries it."""
+    place = robot.places[patch.link]
+    if not np.array_equal(place.T_node_link, patch.T_node_link):
+        return _patch(robot, patch.link, patch.surface, body, segments)
+    felt = _felt(robot, body, place.node, segments)
+    return replace(patch, body=body.name, node=place.node, segment=felt)
+
+
+def _felt(robot: Robot, body: Body, node: int, segments: set[str]) -> str | None:
+    """The segment that feels a body. What stands inboard of all joints and sensors none feels."""
+    felt = body.segment in segments and (body.segment != "root" or _moves(robot, node))
+    return body.segment if felt else None
 
 
 def _moves(robot: Robot, node: int) -> bool:

@@ -5,7 +5,6 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from weakref import ref
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,7 +27,7 @@ from touchline.native import core
 from touchline.observer.observer import Estimate, Observer, require_seconds
 from touchline.pipeline.native_robot import native_robot, write_robot
 from touchline.pipeline.result import Layout, Result
-from touchline.pipeline.stand_ins import stand_in
+from touchline.pipeline.stand_ins import StandIns
 from touchline.pipeline.table import ContactTable
 from touchline.result.event import Event
 from touchline.result.fault import FaultChange, changes_of, channel_names
@@ -127,14 +126,8 @@ class Pipeline:
         self._method = method
         self._weights = period, bandwidth, wrench_error, torque_error, pushes, self.tuning
         self._model_error = model_error
-        own = ref(self)  # the native pipeline must not keep this one alive
-
-        def build(lost: list[int]) -> core.StandIn | None:
-            pipeline = own()
-            return pipeline._stand_in(lost) if pipeline is not None else None
-
-        self._made = self._native()
-        self._core = core.Pipeline(self._made, native, build)
+        self._made, self._stand_ins = self._native(), self._make_stand_ins()
+        self._core = core.Pipeline(self._made, native, self._stand_ins)
         self._update = self._core.update
         names = Names.of(
             robot.segment_names,
@@ -239,7 +232,7 @@ class Pipeline:
 
     def reset(self) -> None:
         """Forgets the past, as after a long gap; events that last end, their numbers go on."""
-        self._core.restart(self._made)
+        self._core.restart(self._made, self._stand_ins)
 
     def tare(self) -> Tare:
         """Takes what is felt now for the sensors' and joints' offsets: nothing may touch the arm.
@@ -301,22 +294,21 @@ class Pipeline:
     def _go_on_with(self, robot: Robot) -> None:
         before, self.robot = self.robot, robot
         try:
-            made = self._native()
-            self._core.restart(made)
-            self._made = made
+            made, stand_ins = self._native(), self._make_stand_ins()
+            self._core.restart(made, stand_ins)
+            self._made, self._stand_ins = made, stand_ins
         except BaseException:
             self.robot = before
             raise
 
-    def _stand_in(self, lost: list[int]) -> core.StandIn | None:
-        """What carries on where these sensors are lost."""
+    def _make_stand_ins(self) -> list[core.StandIn]:
+        """What carries on where sensors are lost: made beforehand, so that no sample is late."""
 
-        def make(robot: Robot) -> tuple[core.Robot, Thresholds, Skin]:
-            rough = make_thresholds(robot, self._weights[0])
-            thresholds, skin = expect_drift(robot, rough, self._model_error), Skin(robot)
-            return native_robot(robot, thresholds, skin, *self._weights), thresholds, skin
+        def make(robot: Robot, thresholds: Thresholds, skin: Skin) -> core.Robot:
+            return native_robot(robot, thresholds, skin, *self._weights)
 
-        return stand_in(self.robot, self.thresholds, lost, make)
+        period, error = self._weights[0], self._model_error
+        return StandIns(self.robot, self.thresholds, self.skin, period, error, make).all()
 
     def _native(self) -> core.Robot:
         return native_robot(self.robot, self.thresholds, self.skin, *self._weights)
@@ -355,9 +347,6 @@ class Pipeline:
         Args:
             slots: samples and results that may wait.
         """
-        sensors = range(len(self.robot.sensor_names))
-        for lost in [*([s] for s in sensors), list(sensors)]:
-            self._core.prepare(lost)  # the thread has no time to make them
         return core.Runner(self._core, slots)
 
     def writer(

@@ -3,11 +3,21 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import combinations
 
-from touchline.detector.thresholds import RowThreshold, Thresholds
+from touchline.arrays import Array
+from touchline.detector.model_drift import link_errors
+from touchline.detector.thresholds import (
+    RowThreshold,
+    Thresholds,
+    expect_drift,
+    make_thresholds,
+)
 from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
 from touchline.native import core
+
+SETS = 3  # sensors, of which any set may be lost: seven pipelines of 9 ms each
 
 
 def robot_without(robot: Robot, lost: Sequence[int]) -> Robot:
@@ -22,31 +32,70 @@ def robot_without(robot: Robot, lost: Sequence[int]) -> Robot:
     return Robot(replace(description, sensors=sensors, joints=joints), robot.mechanism)
 
 
-def stand_in(
-    robot: Robot,
-    thresholds: Thresholds,
-    lost: Sequence[int],
-    make: Callable[[Robot], tuple[core.Robot, Thresholds, Skin]],
-) -> core.StandIn | None:
-    """What stands in for lost sensors; None where nothing that is left feels anything.
+def losses(sensors: int) -> list[tuple[int, ...]]:
+    """The sets of sensors (indices) that a robot carries on without: what is made beforehand.
+
+    Up to `SETS` sensors: any of them. With more, each alone, and all: who loses two does without
+    all of them.
+    """
+    some = range(1, sensors + 1) if sensors <= SETS else sorted({1, sensors})
+    return [lost for count in some for lost in combinations(range(sensors), count)]
+
+
+class StandIns:
+    """Makes what stands in for lost sensors.
 
     Args:
         robot: whole.
         thresholds: of the whole robot.
-        lost: indices of its lost sensors.
-        make: of the robot without them, all that a native pipeline needs.
+        skin: its surfaces.
+        period: time between samples [s].
+        model_error: as of `Pipeline`.
+        make: of a robot, its thresholds and surfaces, all that a native pipeline needs.
     """
-    rest = robot_without(robot, lost)
-    measured = any(joint.measured for joint in rest.description.joints)
-    if not rest.sensor_names and not measured:
-        return None
-    native, own, skin = make(rest)
-    segments = [_segment_in(robot, rest, name, lost) for name in rest.segment_names]
-    at = {_key(robot, row): i for i, row in enumerate(thresholds.rows)}
-    rows = [at.get(_key(rest, row), -1) for row in own.rows]
-    sensors = [robot.sensor_names.index(name) for name in rest.sensor_names]
-    watch = [_watch(robot, rest, own, skin, name) for name in robot.segment_names]
-    return core.StandIn(list(lost), native, sensors, segments, rows, watch)
+
+    def __init__(
+        self,
+        robot: Robot,
+        thresholds: Thresholds,
+        skin: Skin,
+        period: float,
+        model_error: float,
+        make: Callable[[Robot, Thresholds, Skin], core.Robot],
+    ) -> None:
+        self._robot, self._thresholds, self._skin = robot, thresholds, skin
+        self._period, self._model_error, self._make = period, model_error, make
+
+    def all(self) -> list[core.StandIn]:
+        """Of all losses after which something is left that feels."""
+        made = (self.after(lost) for lost in losses(len(self._robot.sensor_names)))
+        return [stand_in for stand_in in made if stand_in is not None]
+
+    def after(self, lost: Sequence[int]) -> core.StandIn | None:
+        """Of lost sensors (indices); None where nothing that is left feels anything."""
+        robot, rest = self._robot, robot_without(self._robot, lost)
+        measured = any(joint.measured for joint in rest.description.joints)
+        if not rest.sensor_names and not measured:
+            return None
+        rough = make_thresholds(rest, self._period)
+        own = expect_drift(rest, rough, self._model_error, self._drift)
+        skin = self._skin.on(rest)
+        segments = [_segment_in(robot, rest, name, lost) for name in rest.segment_names]
+        at = {_key(robot, row): i for i, row in enumerate(self._thresholds.rows)}
+        rows = [at.get(_key(rest, row), -1) for row in own.rows]
+        sensors = [robot.sensor_names.index(name) for name in rest.sensor_names]
+        watch = [_watch(robot, rest, own, skin, name) for name in robot.segment_names]
+        native = self._make(rest, own, skin)
+        return core.StandIn(list(lost), native, sensors, segments, rows, watch)
+
+    def _drift(self, rest: Robot, error: float) -> tuple[Array, Array]:
+        """As `guess_drift`: links that are off are the same whatever sensors there are."""
+        parts: dict[str, list[str]] = {name: [] for name in rest.segment_names}
+        for body in self._robot.bodies:
+            part = parts.get(rest.body_of(body.links[0]).segment, [])
+            if body.segment in self._robot.segment_names and body.segment not in part:
+                part.append(body.segment)
+        return link_errors(self._robot, error).drift(rest, parts)
 
 
 def _key(robot: Robot, row: RowThreshold) -> tuple[str, int]:

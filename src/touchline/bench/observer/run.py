@@ -27,6 +27,7 @@ from touchline.trials.fast_motion import Motion, fast_motion, pushed_link, two_s
 BANDWIDTH = 100.0  # [rad/s]
 RUN_SAMPLES, SAMPLES = 8000, 250  # per round: of `run`, and of what takes one at a time
 RUN, UPDATE, STEP = "Observer.run", "Observer.update", "native step, no result"
+READ = "  the same, segment_wrench, tau_ext and health read"
 
 
 @dataclass(frozen=True)
@@ -112,8 +113,8 @@ def run_benchmark(
 
 
 def own_candidates(robot: Robot, motion: Motion) -> list[Candidate]:
-    """A recording at once, sample by sample, and the native step alone."""
-    whole, single, bare = (Observer(robot, bandwidth=BANDWIDTH) for _ in range(3))
+    """A recording at once, sample by sample, with its result read, and the native step alone."""
+    whole, single, used, bare = (Observer(robot, bandwidth=BANDWIDTH) for _ in range(4))
     samples = _samples(motion)
 
     def run() -> object:
@@ -128,9 +129,16 @@ def own_candidates(robot: Robot, motion: Motion) -> list[Candidate]:
 
         return work
 
+    def read() -> None:
+        used.reset()
+        for sample in samples:
+            estimate = used.update(*sample)
+            _ = estimate.segment_wrench, estimate.tau_ext, estimate.health
+
     return [
         Candidate(RUN, run, len(motion.time)),
         Candidate(UPDATE, each(single.reset, single.update), len(samples)),
+        Candidate(READ, read, len(samples)),
         Candidate(STEP, each(bare.reset, bare.kernel.step), len(samples)),
     ]
 

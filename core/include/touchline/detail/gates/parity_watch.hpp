@@ -7,7 +7,8 @@
 // the inner sensor feels nothing. Two contacts that squeeze the arm between them do that as well, but
 // not along one axis of the sensor without a moment about its origin: only that counts.
 //
-// A torque at the innermost sensor without a force is no touch: no link is as far away.
+// A torque at the innermost sensor without a force is no single touch: no link is as far away. Two
+// may cancel, but then the joints between them feel it, or a sensor does. So nothing else may.
 //
 // What two quantities alone tell is not judged. A force at the innermost sensor that no joint feels
 // may be a push on the link that carries it, and a torque of one joint a hand that pinches it.
@@ -56,6 +57,16 @@ class ParityWatch {
     for (const Pair& pair : pairs_)
       innermost_.erase(std::remove(innermost_.begin(), innermost_.end(), pair.outer),
                        innermost_.end());
+    for (const int g : innermost_) {
+      witnesses_.emplace_back();
+      const int own = observer.sensors()[layout.segments[g].sensor].node;
+      for (std::size_t i = 0; i < rows_.size(); ++i) {
+        const int s = layout.segments[rows_[i].segment].sensor;
+        const bool its_own = rows_[i].segment == g && rows_[i].joint < 0;
+        if (!its_own && s >= 0 && layout.is_outboard(observer.sensors()[s].node, own))
+          witnesses_.back().push_back(i);
+      }
+    }
   }
 
   // Takes what the whole robot says of a sample at `time` [s]. Calls `contradicted(channel)` for each
@@ -67,7 +78,8 @@ class ParityWatch {
     const bool goes_on = dt > 0.0 && dt < tuning_.step_periods * period_;
     if (!goes_on || (result.health & kSettling) != 0) return begin_anew();
     for (const Pair& pair : pairs_) compare(pair, result, dt, contradicted);
-    for (const int g : innermost_) compare_couple(g, result, dt, contradicted);
+    for (std::size_t i = 0; i < innermost_.size(); ++i)
+      compare_couple(innermost_[i], witnesses_[i], result, dt, contradicted);
   }
 
   // What was suspected counts no more: samples are missing.
@@ -152,9 +164,11 @@ class ParityWatch {
     return most;
   }
 
-  // A torque at the innermost sensor with a force so small that it would act beyond reach.
+  // A torque at the innermost sensor with a force so small that it would act beyond reach, where
+  // nothing else outboard feels anything.
   template <class Contradicted>
-  void compare_couple(int g, const Result& result, double dt, Contradicted&& contradicted) {
+  void compare_couple(int g, const std::vector<std::size_t>& witnesses, const Result& result,
+                      double dt, Contradicted&& contradicted) {
     const double* x = result.normalized.data() + first_[g];
     bool now = result.estimate.segment_settled(g) &&
                std::max({std::fabs(x[3]), std::fabs(x[4]), std::fabs(x[5])}) > tuning_.parity_clear;
@@ -165,6 +179,9 @@ class ParityWatch {
           tuning_.parity_noise * rows_[first_[g] + i].contact);
       now = norm(w.angular) > tuning_.reach * (norm(w.linear) + unsure);
     }
+    now = now && std::none_of(witnesses.begin(), witnesses.end(), [&](std::size_t i) {
+      return std::fabs(result.normalized[i]) > tuning_.parity_noise;
+    });
     const int sensor = observer_.layout().segments[g].sensor;
     const std::size_t first = at_.wrench() + 6 * static_cast<std::size_t>(sensor);
     const int axis = now ? only_axis(sensor, x) : -1;
@@ -179,6 +196,7 @@ class ParityWatch {
   std::vector<int> first_;  // per segment: its first row of six of a wrench; -1: none
   std::vector<Pair> pairs_;
   std::vector<int> innermost_;  // segments whose sensor has none inboard
+  std::vector<std::vector<std::size_t>> witnesses_;  // of each: other rows that its loads pass
   std::vector<double> since_;  // per channel: for how long its relation has been broken [s]
   double time_ = std::numeric_limits<double>::quiet_NaN();
 };

@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -43,26 +44,15 @@ struct Triangle {
 
 class Mesh {
  public:
-  Mesh() = default;  // without triangles
-  Mesh(const std::vector<Vec3>& vertices, const std::vector<std::array<int, 3>>& faces) {
-    for (std::size_t i = 0; i < faces.size(); ++i) {
-      const Vec3 a = vertices[faces[i][0]];
-      const Vec3 ab = vertices[faces[i][1]] - a, ac = vertices[faces[i][2]] - a;
-      const Vec3 n = cross(ab, ac);
-      const double length = norm(n);
-      if (length > 0.0) triangles_.push_back({a, ab, ac, (1.0 / length) * n, static_cast<int>(i)});
-    }
-    order();
-  }
+  Mesh() : Mesh(std::vector<Triangle>{}) {}  // without triangles
+  Mesh(const std::vector<Vec3>& vertices, const std::vector<std::array<int, 3>>& faces)
+      : tree_(std::make_shared<Hierarchy>(triangles_of(vertices, faces))) {}
   // From the triangles of another mesh, in any order: answers are the same, to the last bit.
-  explicit Mesh(std::vector<Triangle> triangles) : triangles_(std::move(triangles)) {
-    std::sort(triangles_.begin(), triangles_.end(),
-              [](const Triangle& s, const Triangle& t) { return s.face < t.face; });
-    order();
-  }
+  explicit Mesh(std::vector<Triangle> triangles)
+      : tree_(std::make_shared<Hierarchy>(by_face(std::move(triangles)))) {}
 
-  const std::vector<Triangle>& triangles() const { return triangles_; }
-  bool empty() const { return triangles_.empty(); }
+  const std::vector<Triangle>& triangles() const { return tree_->triangles; }
+  bool empty() const { return tree_->triangles.empty(); }
 
   // Calls `visit(Crossing)` for each crossing of the whole line, in no order. A line through an
   // edge is reported by both triangles and never by none.
@@ -100,7 +90,7 @@ class Mesh {
     int count = 0;
     visit_triangles(
         [&](const Box& box, int index) {
-          return faces_[index].may_stand_against(line.direction, steep) &&
+          return tree_->faces[index].may_stand_against(line.direction, steep) &&
                  crosses(box, line.origin, inverse, limit);
         },
         [&](const Triangle& tri) {
@@ -161,105 +151,131 @@ class Mesh {
     static constexpr double kRounded = 1e-5;  // of the cosines, which are floats
   };
 
-  void order() {
-    boxes_.reserve(triangles_.size() + 1);
-    if (!triangles_.empty()) build(0, static_cast<int>(triangles_.size()));
-    faces_.resize(boxes_.size());
-    for (std::size_t i = boxes_.size(); i-- > 0;) {
-      int end = static_cast<int>(i);  // the last leaf of this box
-      while (boxes_[end].count == 0) end = boxes_[end].next;
-      int begin = static_cast<int>(i);
-      while (boxes_[begin].count == 0) ++begin;
-      faces_[i] = facing(boxes_[begin].next, boxes_[end].next + boxes_[end].count);
+  // Triangles in the order of their boxes. Copies of a mesh share it: it never changes.
+  struct Hierarchy {
+    explicit Hierarchy(std::vector<Triangle> of) : triangles(std::move(of)) {
+      boxes.reserve(triangles.size() + 1);
+      if (!triangles.empty()) build(0, static_cast<int>(triangles.size()));
+      faces.resize(boxes.size());
+      for (std::size_t i = boxes.size(); i-- > 0;) {
+        int end = static_cast<int>(i);  // the last leaf of this box
+        while (boxes[end].count == 0) end = boxes[end].next;
+        int begin = static_cast<int>(i);
+        while (boxes[begin].count == 0) ++begin;
+        faces[i] = facing(boxes[begin].next, boxes[end].next + boxes[end].count);
+      }
     }
-  }
 
-  Facing facing(int begin, int end) const {
-    Vec3 sum;
-    for (int i = begin; i < end; ++i) sum += triangles_[i].normal;
-    const double size = norm(sum);
-    if (!(size > 0.0)) return {};
-    const Vec3 axis = (1.0 / size) * sum;
-    double cosine = 1.0;
-    for (int i = begin; i < end; ++i) cosine = std::min(cosine, dot(axis, triangles_[i].normal));
-    Facing out;
-    out.axis = {static_cast<float>(axis.x), static_cast<float>(axis.y), static_cast<float>(axis.z)};
-    out.cosine = static_cast<float>(cosine);
-    out.sine = static_cast<float>(std::sqrt(std::max(0.0, 1.0 - cosine * cosine)));
+    Facing facing(int begin, int end) const {
+      Vec3 sum;
+      for (int i = begin; i < end; ++i) sum += triangles[i].normal;
+      const double size = norm(sum);
+      if (!(size > 0.0)) return {};
+      const Vec3 axis = (1.0 / size) * sum;
+      double cosine = 1.0;
+      for (int i = begin; i < end; ++i) cosine = std::min(cosine, dot(axis, triangles[i].normal));
+      Facing out;
+      out.axis = {static_cast<float>(axis.x), static_cast<float>(axis.y), static_cast<float>(axis.z)};
+      out.cosine = static_cast<float>(cosine);
+      out.sine = static_cast<float>(std::sqrt(std::max(0.0, 1.0 - cosine * cosine)));
+      return out;
+    }
+
+    int build(int begin, int end) {
+      const int index = static_cast<int>(boxes.size());
+      boxes.push_back({});
+      const Bounds exact = bounds(begin, end);
+      Box box{rounded(exact.low, -kInfinity), rounded(exact.high, kInfinity), begin, end - begin};
+      if (box.count > kLeaf) {
+        split(begin, end, exact);
+        boxes[index] = box;
+        build(begin, (begin + end) / 2);
+        box.next = build((begin + end) / 2, end);
+        box.count = 0;
+      }
+      boxes[index] = box;
+      return index;
+    }
+
+    static BasicVec3<float> rounded(const Vec3& v, float towards) {
+      const auto round = [towards](double x) {
+        return std::nextafter(static_cast<float>(x), towards);
+      };
+      return {round(v.x), round(v.y), round(v.z)};
+    }
+
+    void split(int begin, int end, const Bounds& box) {
+      const Vec3 size = box.high - box.low;
+      const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+      const auto centre = [axis](const Triangle& t) {
+        const Vec3 c = 3.0 * t.a + t.ab + t.ac;
+        return axis == 0 ? c.x : axis == 1 ? c.y : c.z;
+      };
+      std::nth_element(triangles.begin() + begin, triangles.begin() + (begin + end) / 2,
+                       triangles.begin() + end, [&](const Triangle& s, const Triangle& t) {
+                         return centre(s) < centre(t);
+                       });
+    }
+
+    Bounds bounds(int begin, int end) const {
+      constexpr double inf = std::numeric_limits<double>::infinity();
+      Bounds box{{inf, inf, inf}, {-inf, -inf, -inf}};
+      for (int i = begin; i < end; ++i) {
+        const Triangle& t = triangles[i];
+        for (const Vec3& p : {t.a, t.a + t.ab, t.a + t.ac}) {
+          box.low = {std::min(box.low.x, p.x), std::min(box.low.y, p.y), std::min(box.low.z, p.z)};
+          box.high = {std::max(box.high.x, p.x), std::max(box.high.y, p.y),
+                      std::max(box.high.z, p.z)};
+        }
+      }
+      const double pad = 1e-9 * (1.0 + norm(box.high - box.low));  // flat boxes, edge tolerance
+      box.low = box.low - Vec3{pad, pad, pad};
+      box.high = box.high + Vec3{pad, pad, pad};
+      return box;
+    }
+
+    std::vector<Triangle> triangles;
+    std::vector<Box> boxes;
+    std::vector<Facing> faces;  // per box
+  };
+
+  static std::vector<Triangle> triangles_of(const std::vector<Vec3>& vertices,
+                                            const std::vector<std::array<int, 3>>& faces) {
+    std::vector<Triangle> out;
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+      const Vec3 a = vertices[faces[i][0]];
+      const Vec3 ab = vertices[faces[i][1]] - a, ac = vertices[faces[i][2]] - a;
+      const Vec3 n = cross(ab, ac);
+      const double length = norm(n);
+      if (length > 0.0) out.push_back({a, ab, ac, (1.0 / length) * n, static_cast<int>(i)});
+    }
     return out;
   }
-
-  int build(int begin, int end) {
-    const int index = static_cast<int>(boxes_.size());
-    boxes_.push_back({});
-    const Bounds exact = bounds(begin, end);
-    Box box{rounded(exact.low, -kInfinity), rounded(exact.high, kInfinity), begin, end - begin};
-    if (box.count > kLeaf) {
-      split(begin, end, exact);
-      boxes_[index] = box;
-      build(begin, (begin + end) / 2);
-      box.next = build((begin + end) / 2, end);
-      box.count = 0;
-    }
-    boxes_[index] = box;
-    return index;
+  static std::vector<Triangle> by_face(std::vector<Triangle> triangles) {
+    std::sort(triangles.begin(), triangles.end(),
+              [](const Triangle& s, const Triangle& t) { return s.face < t.face; });
+    return triangles;
   }
 
   // Calls `visit(Triangle)` for all in boxes that are `reached(Box, its number)`, in no order.
   template <class Reached, class Visit>
   void visit_triangles(Reached&& reached, Visit&& visit) const {
     if (empty()) return;
+    const Box* const boxes = tree_->boxes.data();
+    const Triangle* const triangles = tree_->triangles.data();
     int stack[kDepth], size = 0;
     stack[size++] = 0;
     while (size > 0) {
       const int index = stack[--size];
-      const Box& box = boxes_[index];
+      const Box& box = boxes[index];
       if (!reached(box, index)) continue;
       if (box.count == 0) {
         stack[size++] = index + 1;
         stack[size++] = box.next;
         continue;
       }
-      for (int i = box.next; i < box.next + box.count; ++i) visit(triangles_[i]);
+      for (int i = box.next; i < box.next + box.count; ++i) visit(triangles[i]);
     }
-  }
-
-  static BasicVec3<float> rounded(const Vec3& v, float towards) {
-    const auto round = [towards](double x) {
-      return std::nextafter(static_cast<float>(x), towards);
-    };
-    return {round(v.x), round(v.y), round(v.z)};
-  }
-  static Vec3 exact(const BasicVec3<float>& v) { return {v.x, v.y, v.z}; }
-
-  void split(int begin, int end, const Bounds& box) {
-    const Vec3 size = box.high - box.low;
-    const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-    const auto centre = [axis](const Triangle& t) {
-      const Vec3 c = 3.0 * t.a + t.ab + t.ac;
-      return axis == 0 ? c.x : axis == 1 ? c.y : c.z;
-    };
-    std::nth_element(triangles_.begin() + begin, triangles_.begin() + (begin + end) / 2,
-                     triangles_.begin() + end, [&](const Triangle& s, const Triangle& t) {
-                       return centre(s) < centre(t);
-                     });
-  }
-
-  Bounds bounds(int begin, int end) const {
-    constexpr double inf = std::numeric_limits<double>::infinity();
-    Bounds box{{inf, inf, inf}, {-inf, -inf, -inf}};
-    for (int i = begin; i < end; ++i) {
-      const Triangle& t = triangles_[i];
-      for (const Vec3& p : {t.a, t.a + t.ab, t.a + t.ac}) {
-        box.low = {std::min(box.low.x, p.x), std::min(box.low.y, p.y), std::min(box.low.z, p.z)};
-        box.high = {std::max(box.high.x, p.x), std::max(box.high.y, p.y),
-                    std::max(box.high.z, p.z)};
-      }
-    }
-    const double pad = 1e-9 * (1.0 + norm(box.high - box.low));  // flat boxes, edge tolerance
-    box.low = box.low - Vec3{pad, pad, pad};
-    box.high = box.high + Vec3{pad, pad, pad};
-    return box;
   }
 
   static Vec3 invert(const Vec3& d) {
@@ -300,21 +316,23 @@ class Mesh {
     SurfacePoint best;
     best.distance = limit;
     if (empty()) return best;
+    const Box* const boxes = tree_->boxes.data();
+    const Triangle* const triangles = tree_->triangles.data();
     struct Entry {
       double bound;
       int box;
     } stack[kDepth];
     int size = 0;
-    stack[size++] = {bound(boxes_[0]), 0};
+    stack[size++] = {bound(boxes[0]), 0};
     while (size > 0) {
       const Entry entry = stack[--size];
       if (entry.bound >= measure(best.distance)) continue;
-      const Box& box = boxes_[entry.box];
+      const Box& box = boxes[entry.box];
       if (box.count > 0) {
-        for (int i = box.next; i < box.next + box.count; ++i) offer_triangle(triangles_[i], best);
+        for (int i = box.next; i < box.next + box.count; ++i) offer_triangle(triangles[i], best);
         continue;
       }
-      Entry near{bound(boxes_[entry.box + 1]), entry.box + 1}, far{bound(boxes_[box.next]), box.next};
+      Entry near{bound(boxes[entry.box + 1]), entry.box + 1}, far{bound(boxes[box.next]), box.next};
       if (near.bound > far.bound) std::swap(near, far);
       stack[size++] = far;
       stack[size++] = near;
@@ -425,9 +443,9 @@ class Mesh {
     return tri.a + (vb * scale) * tri.ab + (vc * scale) * tri.ac;
   }
 
-  std::vector<Triangle> triangles_;
-  std::vector<Box> boxes_;
-  std::vector<Facing> faces_;  // per box
+  static Vec3 exact(const BasicVec3<float>& v) { return {v.x, v.y, v.z}; }
+
+  std::shared_ptr<const Hierarchy> tree_;
 };
 
 }  // namespace touchline
