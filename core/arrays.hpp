@@ -12,7 +12,7 @@
 #include <initializer_list>
 #include <vector>
 
-namespace arrays {
+namespace touchline::arrays {
 
 namespace nb = nanobind;
 
@@ -117,4 +117,4 @@ inline nb::object table(const std::vector<double>& values, std::size_t columns) 
   return out.release();
 }
 
-}  // namespace arrays
+}  // namespace touchline::arrays

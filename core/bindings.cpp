@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The native core for Python: thin, no logic of its own.
+// The native core for Python: thin, no logic of its own. Compiled twice: as it is, for any
+// processor, and by bindings_avx2.cpp.
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -26,11 +27,13 @@
 #define TOUCHLINE_ARRAY "numpy.typing.NDArray[numpy.float64]"
 #define TOUCHLINE_SIGNALS "q: object, qd: object, tau: object, wrench: object"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-namespace tl = touchline;
+namespace touchline::bindings {
 
 namespace {
+
+namespace nb = nanobind;
+namespace tl = touchline;
+using namespace nb::literals;
 
 tl::Vec3 vec3(const std::vector<double>& v) {
   if (v.size() != 3) throw std::invalid_argument("three numbers are needed");
@@ -223,16 +226,7 @@ void bind_enums(nb::module_& m) {
 
 }  // namespace
 
-// The module is built twice from this source: for any processor, and as `_core_avx2` for those
-// with AVX2. The numbers are the same.
-#ifndef TOUCHLINE_MODULE
-#define TOUCHLINE_MODULE _core
-#endif
-
-NB_MODULE(TOUCHLINE_MODULE, m) {
-#if defined(__AVX2__)
-  if (!__builtin_cpu_supports("avx2")) throw nb::import_error("this processor has no AVX2");
-#endif
+void bind(nanobind::module_& m) {
   arrays::initialize();
   m.attr("VERSION") = tl::kVersion;
   bind_enums(m);
@@ -278,3 +272,5 @@ NB_MODULE(TOUCHLINE_MODULE, m) {
         return sensors;
       });
 }
+
+}  // namespace touchline::bindings

@@ -12,7 +12,7 @@
 #include "guard.hpp"
 #include "touchline/detail/classifier/classifier.hpp"
 
-namespace classification {
+namespace touchline::classification {
 
 namespace nb = nanobind;
 namespace tl = touchline;
@@ -59,4 +59,4 @@ inline void bind(nb::module_& m) {
       .def("follow", &follow, "time"_a, "rows"_a, "levels"_a);
 }
 
-}  // namespace classification
+}  // namespace touchline::classification

@@ -15,7 +15,7 @@
 #include "samples.hpp"
 #include "touchline/detail/detector/detector.hpp"
 
-namespace detection {
+namespace touchline::detection {
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -227,4 +227,4 @@ inline void bind(nb::module_& m) {
         "tau"_a, "wrench"_a, "every"_a = 1);
 }
 
-}  // namespace detection
+}  // namespace touchline::detection

@@ -9,7 +9,7 @@
 
 #include "touchline/result.hpp"
 
-namespace fields {
+namespace touchline::fields {
 
 namespace nb = nanobind;
 namespace tl = touchline;
@@ -70,4 +70,4 @@ inline void bind(nb::module_& m) {
   m.attr("ZONES") = nb::make_tuple("structure", "end_effector", "handle", "open");
 }
 
-}  // namespace fields
+}  // namespace touchline::fields

@@ -7,7 +7,7 @@
 #include <mutex>
 #include <utility>
 
-namespace guard {
+namespace touchline::guard {
 
 namespace nb = nanobind;
 
@@ -49,4 +49,4 @@ struct Attached {
   std::mutex& turn;
 };
 
-}  // namespace guard
+}  // namespace touchline::guard

@@ -29,7 +29,7 @@
 #include "pipeline_bindings.hpp"
 #include "touchline/live.hpp"
 
-namespace live {
+namespace touchline::live {
 
 namespace nb = nanobind;
 namespace tl = touchline;
@@ -400,4 +400,4 @@ inline void bind(nb::module_& m) {
 #endif
 }
 
-}  // namespace live
+}  // namespace touchline::live

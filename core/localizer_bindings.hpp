@@ -18,7 +18,7 @@
 #include "mesh_bindings.hpp"
 #include "touchline/detail/events/describe.hpp"
 
-namespace localization {
+namespace touchline::localization {
 
 namespace nb = nanobind;
 namespace tl = touchline;
@@ -129,4 +129,4 @@ inline void bind(nb::module_& m) {
       });
 }
 
-}  // namespace localization
+}  // namespace touchline::localization

@@ -13,7 +13,7 @@
 
 #include "touchline/detail/model/mesh.hpp"
 
-namespace meshes {
+namespace touchline::meshes {
 
 namespace nb = nanobind;
 namespace tl = touchline;
@@ -98,4 +98,4 @@ inline void bind(nb::module_& m) {
   m.def("mesh", &mesh, "vertices"_a, "faces"_a);
 }
 
-}  // namespace meshes
+}  // namespace touchline::meshes

@@ -27,7 +27,7 @@
 #include "touchline/redundant.hpp"
 #include "touchline/touchline.hpp"
 
-namespace pipelines {
+namespace touchline::pipelines {
 
 namespace nb = nanobind;
 namespace tl = touchline;
@@ -452,4 +452,4 @@ inline void bind(nb::module_& m) {
       .def_prop_ro("slices", &slices);
 }
 
-}  // namespace pipelines
+}  // namespace touchline::pipelines

@@ -31,7 +31,7 @@
 #include "topics.hpp"
 #include "touchline/live.hpp"
 
-namespace live {
+namespace touchline::live {
 
 // rcutils_allocator_t and rcutils_uint8_array_t.
 struct RclAllocator {
@@ -515,4 +515,4 @@ inline void bind_ros(nb::module_& m) {
   m.def("publish_with", &publish_with, "pipeline"_a, "writer"_a.none(), nb::keep_alive<1, 2>());
 }
 
-}  // namespace live
+}  // namespace touchline::live

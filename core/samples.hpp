@@ -7,7 +7,7 @@
 #include "arrays.hpp"
 #include "touchline/detail/observer/observer.hpp"
 
-namespace samples {
+namespace touchline::samples {
 
 namespace nb = nanobind;
 namespace tl = touchline;
@@ -36,4 +36,4 @@ inline Many many(const tl::RowLayout& layout, nb::handle time, nb::handle q, nb:
            arrays::numbers(tau, {rows, n}), arrays::numbers(wrench, {rows, k, 6})}};
 }
 
-}  // namespace samples
+}  // namespace touchline::samples

@@ -7,6 +7,8 @@ import numpy.typing
 from numpy.typing import NDArray
 
 
+INSTRUCTIONS: str = 'avx2'
+
 VERSION: str = '0.1.0'
 
 class NodeKind(enum.Enum):
