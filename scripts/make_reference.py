@@ -42,7 +42,13 @@ OWN = {  # columns that are no field of a contact
     "health": ("whole number", "", "Sum of the health bits below; 0 when all is well."),
 }
 LOG_COLUMNS = [
-    ("time", "number", "s", "required", "Time stamp; it need not begin at 0."),
+    (
+        "time",
+        "number",
+        "s",
+        "required",
+        "Time stamp; it need not begin at 0. Dates are read, too, and nanoseconds, which is told.",
+    ),
     ("q.JOINT", "number", "rad or m", "required", "Position of an observed joint."),
     ("qd.JOINT", "number", "rad/s or m/s", "estimated from q", "Velocity."),
     ("tau.JOINT", "number", "Nm or N", "NaN: not measured", "Torque, as `joints[].torque` says."),

@@ -14,6 +14,20 @@ def did_you_mean(word: Any, allowed: Iterable[str]) -> str:
     return f" (did you mean '{close[0]}'?)" if close else ""
 
 
+def near_misses(word: Any, allowed: Iterable[str]) -> str:
+    """Return ` Did you mean 'a.X', 'b.X' or 'Z'?` for at most three near names, or nothing.
+
+    Names that have the word behind their last dot come first.
+    """
+    allowed, word = list(allowed), str(word)
+    near = [name for name in allowed if name.rpartition(".")[2] == word]
+    near += [name for name in get_close_matches(word, allowed, n=3) if name not in near]
+    told = [f"'{name}'" for name in near[:3]]
+    if not told:
+        return ""
+    return f" Did you mean {' or '.join(filter(None, (', '.join(told[:-1]), told[-1])))}?"
+
+
 def listing(names: Iterable[str], limit: int = 60) -> str:
     """Return the names, comma separated, of many only the first."""
     names = list(names)

@@ -7,9 +7,10 @@ docs/reference/tuning.md. The native `tuning.hpp` has them, and nothing repeats 
 
 from collections.abc import Iterator, Mapping
 from math import isfinite
+from numbers import Real
 
 from touchline.native import core
-from touchline.suggest import unknown
+from touchline.suggest import near_misses
 
 
 class Tuning(Mapping[str, float]):
@@ -31,8 +32,13 @@ class Tuning(Mapping[str, float]):
         self._values: dict[str, float] = {name: value for name, _, value in numbers}
         for name, value in (changes or {}).items():
             if name not in self._values:
-                raise ValueError(unknown(name, "tuning number", self._values))
+                raise ValueError(
+                    f"unknown tuning number '{name}'.{near_misses(name, self._values)} "
+                    f"print(touchline.Tuning()) lists all {len(self)}"
+                )
             whole = isinstance(self._values[name], int)
+            if not isinstance(value, Real):
+                raise ValueError(f"{name} is {value!r}, but must be a number")
             if not isfinite(value) or (whole and value != int(value)):
                 what = "a whole number" if whole else "finite"
                 raise ValueError(f"{name} is {value}, but must be {what}")

@@ -15,6 +15,7 @@ import numpy as np
 
 from touchline.arrays import Array
 
+PROBABILITIES = ("probability", "body_probability")
 Decode = Callable[[Array, Any], Any]
 
 
@@ -93,16 +94,19 @@ class Value:
     def __reduce__(self) -> tuple[Any, ...]:
         return _restored, (type(self), self._known())
 
+    def _told(self) -> dict[str, Any]:
+        """The fields that people read, of those that say something."""
+        return {name: x for name, x in self._known().items() if _says(x)}
+
     def __repr__(self) -> str:
-        told = [f"{name}={told_shortly(x)}" for name, x in self._known().items() if _says(x)]
+        told = [f"{name}={told_shortly(x)}" for name, x in self._told().items()]
         return f"{type(self).__name__}({', '.join(told)})"
 
     def _repr_html_(self) -> str:
         """The value as a notebook shows it: a row for each field that says something."""
         rows = "".join(
-            f"<tr><th>{escape(name)}</th><td>{escape(told_shortly(x))}</td></tr>"
-            for name, x in self._known().items()
-            if _says(x)
+            f"<tr><th>{escape(name)}</th><td>{_cell(name, x)}</td></tr>"
+            for name, x in self._told().items()
         )
         return f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
 
@@ -136,6 +140,24 @@ def _same(a: Any, b: Any) -> bool:
 
 def _says(value: Any) -> bool:
     return not (value is None or (isinstance(value, list | tuple) and not value))
+
+
+def _cell(name: str, value: Any) -> str:
+    """What stands in a cell of a notebook: a table of values, a probability with a bar, or text."""
+    if isinstance(value, list | tuple) and value and all(isinstance(x, Value) for x in value):
+        told = [part._told() for part in value]
+        names = [field.name for field in fields(value[0]) if any(field.name in x for x in told)]
+        head = "".join(f"<th>{escape(key)}</th>" for key in names)
+        rows = "".join(
+            "<tr>"
+            + "".join(f"<td>{_cell(key, row[key]) if key in row else '-'}</td>" for key in names)
+            + "</tr>"
+            for row in told
+        )
+        return f"<table><tr>{head}</tr>{rows}</table>"
+    if name in PROBABILITIES:
+        return f'<meter min="0" max="1" value="{value:.4f}">{value:.4f}</meter> {value:.3g}'
+    return escape(told_shortly(value))
 
 
 def told_shortly(value: Any) -> str:

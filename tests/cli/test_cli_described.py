@@ -50,6 +50,21 @@ def test_calibrate_takes_a_model(tmp_path, model, monkeypatch, capsys):
     assert seen and seen[0].parent == tmp_path and not seen[0].exists()
 
 
+ARM = """<mujoco model="two"><worldbody><body name="one"><joint name="j" axis="0 0 1"/>
+<geom size=".1" mass="2"/></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(("file", "text"), [("arm.urdf", URDF), ("arm.xml", ARM)])
+def test_analyze_takes_a_model(tmp_path, file, text, capsys):
+    (tmp_path / file).write_text(text)
+    robot, log = tl.load_robot(tmp_path / file), tmp_path / "free.parquet"
+    write_table(log, free_motion(robot, seconds=1.0, rate=100.0), robot.description)
+    out = tmp_path / "results"
+    given = ["analyze", str(log), "--robot", str(tmp_path / file), "--out", str(out)]
+    assert main([*given, "--report", "none"]) == 0
+    assert (out / "events.json").is_file() and "results:" in capsys.readouterr().out
+
+
 def test_an_export_into_nowhere_is_told(tmp_path, capsys):
     (tmp_path / "file").write_text("")
     out = tmp_path / "file" / "x.touchline"

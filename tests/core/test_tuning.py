@@ -79,7 +79,13 @@ def test_all_numbers_are_printed_with_their_units():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"detector.hnd": 1.0}, "unknown tuning number 'detector.hnd'.*did you mean"),
+        (
+            {"detector.hnd": 1.0},
+            "unknown tuning number 'detector.hnd'. Did you mean 'detector.hand'",
+        ),
+        ({"hand": 1.0}, r"Did you mean 'detector.hand'\? print\(touchline.Tuning\(\)\) lists all"),
+        ({"xyz": 1.0}, r"unknown tuning number 'xyz'\. print"),
+        ({"gates.sure": "2"}, "gates.sure is '2', but must be a number"),
         ({"detector.hand": np.nan}, "detector.hand is nan, but must be finite"),
         ({"gates.sure": 2.5}, "gates.sure is 2.5, but must be a whole number"),
     ],

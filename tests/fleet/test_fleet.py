@@ -277,18 +277,20 @@ def test_results_in_python(made, tmp_path):
     results = tl.analyze(made / "a" / "whole.parquet", "sara")
     assert results.estimates.num_rows == 400 and len(results.events) == 1
     (event,) = results.events
-    where = event["link"] or event["segment"]
-    told = f"0: {event['level']} at {event['detected']:.3f} s on {where}"
+    where = event.link or event.segment
+    told = f"0: {event.level} at {event.detected:.3f} s on {where}"
     assert repr(results).startswith("<Results: 400 samples, 1 events, ")
     assert repr(results).endswith(f"{told}>")
     assert f"<td>{where}</td>" in results._repr_html_()
     tables = results.to_arrow()
     assert set(tables) == {"estimates", "contacts", "events"}
-    assert tables["events"]["segment"].to_pylist() == [results.events[0]["segment"]]
+    assert tables["events"]["segment"].to_pylist() == [event.segment]
+    assert all(str(column.type) != "null" for column in tables["events"])
     np.testing.assert_array_equal(np.diff(results.estimates["time"].to_numpy()) > 0, True)
     kept = tl.analyze(made / "a" / "whole.parquet", "sara", tmp_path / "kept")
     assert kept.estimates.equals(results.estimates)
-    assert (tmp_path / "kept" / "events.json").is_file()
+    written = json.loads((tmp_path / "kept" / "events.json").read_text())
+    assert [event.as_json() for event in results.events] == written
     loaded = tl.analyze(made / "a" / "whole.parquet", tl.load_robot("sara"), tmp_path / "loaded")
     assert loaded.estimates.equals(results.estimates) and loaded.events == results.events
     origin = json.loads((tmp_path / "loaded" / "analysis.json").read_text())

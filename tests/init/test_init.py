@@ -197,6 +197,17 @@ def test_a_file_that_is_there_is_kept(tmp_path, capsys):
     assert not list(tmp_path.glob(".*"))
 
 
+def test_a_floating_robot_is_told(tmp_path, capsys):
+    model = tmp_path / "leg.xml"
+    model.write_text(
+        '<mujoco><worldbody><body name="pelvis"><freejoint/><geom size=".1"/><body name="thigh">'
+        '<joint name="hip"/><geom size=".1"/></body></body></worldbody></mujoco>'
+    )
+    assert main(["init", str(model), "--out", str(tmp_path / "robot.yaml")]) == 0
+    told = "  ! pelvis floats on a free joint; it is taken to stand still on the world\n"
+    assert told in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("log", ["none.csv", "log.txt", "empty.csv", "broken.parquet"])
 def test_a_recording_that_cannot_be_read_is_one_line(tmp_path, capsys, log):
     model, path = chain(tmp_path), tmp_path / log

@@ -24,6 +24,12 @@ def write_csv(path, *lines, header=COLUMNS):
     return path
 
 
+def write_table_as_text(table, path):
+    import pyarrow.csv
+
+    pyarrow.csv.write_csv(table, path)
+
+
 def rows(count, first=0):
     return [",".join(f"{(first + i) * 0.001 + j}" for j in range(7)) for i in range(count)]
 
@@ -119,6 +125,38 @@ def test_integers_and_nulls_in_parquet(tmp_path):
     columns = {name: pa.array([1, None, 3]) for name in COLUMNS.split(",")}
     pq.write_table(pa.table(columns), tmp_path / "log.parquet")
     np.testing.assert_array_equal(read_log(tmp_path / "log.parquet", ROBOT).time, [1, np.nan, 3])
+
+
+FORMS = ["nanoseconds.parquet", "nanoseconds.csv", "dates.parquet", "milliseconds.parquet"]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_stamps_that_are_no_seconds(tmp_path, form):
+    samples, path = make_samples(5000), tmp_path / form
+    write_table(tmp_path / "log.parquet", samples, describe())
+    table, unit = pq.read_table(tmp_path / "log.parquet"), 10**6 if "milli" in form else 1
+    stamps = np.round(samples.time * 1e9).astype(np.int64) + 1_700_000_000_000_000_000
+    column = pa.array(stamps // unit)
+    column = column.cast(pa.timestamp("ns", "UTC")) if "dates" in form else column
+    table = table.set_column(table.column_names.index("time"), "time", column)
+    pq.write_table(table, path) if path.suffix == ".parquet" else write_table_as_text(table, path)
+    with open_log(path, describe()) as log:
+        (part,) = log.chunks(5000)
+        told = any("'time' is taken as nanoseconds: the median step" in w for w in log.warnings)
+        assert told == form.startswith("nano") and part.qd.shape == samples.qd.shape
+        if log.duration is not None and unit == 1:
+            assert log.duration == pytest.approx(np.ptp(samples.time), abs=1e-5)
+    true = (samples.time - samples.time[0]) * (1.0 if unit == 1 else 1e3)  # told by `check`
+    near = 1e-6 if unit == 1 else 2.0
+    np.testing.assert_allclose(part.time - part.time[0], true, atol=near)
+
+
+def test_a_factor_that_is_given_counts_for_nanoseconds_too(tmp_path):
+    robot = describe(2, (), log={"time": {"column": "time", "factor": 2e-9}})
+    write_csv(tmp_path / "log.csv", *(f"{i * 1000000},0,0,0,0,0,0" for i in range(9)))
+    with open_log(tmp_path / "log.csv", robot) as log:
+        (part,) = log.chunks()
+        assert log.warnings == [] and part.time[-1] == pytest.approx(0.016)
 
 
 @pytest.mark.parametrize("ending", ["csv", "csv.gz"])

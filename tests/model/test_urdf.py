@@ -164,7 +164,10 @@ MESH = '<collision><geometry><mesh filename="{}"{}/></geometry></collision>'
             "joint 'j': type 'revolut' is not allowed; allowed: revolute, prismatic, fixed, "
             "continuous (did you mean 'revolute'?)",
         ),
-        ((*PAIR, joint("j", "a", "b", "floating")), "joint 'j': type 'floating' is not supported"),
+        (
+            (*PAIR, link("c"), joint("i", "a", "b"), joint("j", "b", "c", "floating")),
+            "joint 'j': type 'floating' is not supported",
+        ),
         ((*PAIR, joint("j", "a", "b", "planar")), "joint 'j': type 'planar' is not supported"),
         ((*PAIR, joint("j", "a", "B")), "joint 'j': child link 'B' does not exist"),
         ((*PAIR, joint("j", "bb", "b")), "joint 'j': parent link 'bb' does not exist (did you m"),
@@ -232,6 +235,17 @@ def test_one_error(tmp_path, elements, problem):
     found = problems_of(write(tmp_path, *elements))
     assert len(found) == 1, found
     assert found[0].startswith(problem)
+
+
+def test_a_robot_on_a_floating_joint_stands_still_and_is_told(tmp_path):
+    parts = (*PAIR, link("c"), joint("i", "a", "b", "floating"), joint("j", "b", "c"))
+    mechanism = load_urdf(write(tmp_path, *parts))
+    assert {name: j.kind for name, j in mechanism.joints.items()} == {
+        "i": "fixed",
+        "j": "revolute",
+    }
+    (warning,) = mechanism.warnings
+    assert "b floats on a free joint; it is taken to stand still on the world" in warning
 
 
 def test_all_errors_at_once(tmp_path):

@@ -39,6 +39,15 @@ def test_integer_nanoseconds_are_told(touched, kind):
             kind(robot).update(stamp, s.q[0], s.qd[0], s.tau[0], s.wrench[0])
 
 
+def test_dates_are_told(touched):
+    robot, s = touched
+    stamps = (1e9 * s.time).astype("datetime64[ns]")
+    with pytest.raises(ValueError, match="holds dates; pass"):
+        tl.Pipeline(robot).run(stamps, s.q, s.qd, s.tau, s.wrench)
+    with pytest.raises(ValueError, match="holds dates; pass"):
+        tl.Pipeline(robot).update(stamps[0], s.q[0], s.qd[0], s.tau[0], s.wrench[0])
+
+
 def test_a_whole_number_of_seconds_is_a_time(touched):
     robot, s = touched
     first = s.q[0], s.qd[0], s.tau[0], s.wrench[0]
@@ -68,3 +77,7 @@ def test_a_notebook_shows_results_and_events(touched):
         html = value._repr_html_()
         assert f"<caption>{name}</caption>" in html
         assert len(ElementTree.fromstring(html)) > 4  # whole, and nothing unescaped
+    (bar, *_) = ElementTree.fromstring(event._repr_html_()).iter("meter")
+    assert float(bar.get("value")) == pytest.approx(event.body_probability, abs=1e-4)
+    assert f"<td>{result.contacts[0].event}</td>" in result._repr_html_()  # contacts are a table
+    assert "resets=" not in repr(result) and "ratios=" not in repr(result)

@@ -37,8 +37,8 @@ from touchline.model.description import CalibrationDescription, Noise, RowCalibr
 from touchline.model.learned_rest import write_rest
 from touchline.model.robot import Robot, load_robot
 from touchline.model.robot_file import write_description
+from touchline.model.sources import given_keys
 from touchline.model.values import METHODS
-from touchline.model.yaml_file import read_yaml
 
 LEAST_SECONDS = 20.0  # shorter recordings have no tail
 MOST_LEFT_OUT = 0.3  # of the time; where more seems touched nobody can tell what is usual
@@ -147,7 +147,7 @@ def calibrate(
         raise InputError(f"{robot}: has no file to start from")
     rate = false_alarms or model.description.detection.false_alarms
     chosen = methods or model.description.detection.method
-    given = read_yaml(source).get("detection") or {}
+    given = given_keys(source).get("detection") or {}
     hold = model.description.detection.min_duration if "min_duration" in given else 0.0
     recordings = Recordings(model, logs)
     if identification and not trust:

@@ -8,7 +8,7 @@ from touchline.check.findings import Findings
 from touchline.check.seen import Seen
 from touchline.model.description import AXES
 from touchline.model.robot import Robot
-from touchline.model.yaml_file import read_yaml
+from touchline.model.sources import given_keys
 
 OFF = 1.5  # times the figure in use; thresholds follow from it
 ODD = 2.0  # times what is usual among the joints: one that stands out is told by itself
@@ -21,8 +21,7 @@ def check_noise(robot: Robot, seen: Seen, findings: Findings) -> None:
     more noise is one: a driver that filters its signals shows less per sample, which says nothing
     of what it lets through.
     """
-    source = robot.description.path
-    given = {} if source is None else read_yaml(source).get("noise") or {}
+    given = given_keys(robot.description.path).get("noise") or {}
     _torques(robot, seen, findings, "tau" in given)
     k = len(robot.sensor_names)
     sigma = seen.wrench_noise.sigma().reshape(k, 6)

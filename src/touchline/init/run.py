@@ -15,6 +15,7 @@ from touchline.model.guess import Guess, force_torque_links, guess_description, 
 from touchline.model.loading import load_mechanism, read_robot_file
 from touchline.model.mechanism import Mechanism
 from touchline.model.packages import installed_shares
+from touchline.model.plausibility import floating_warning
 from touchline.model.sources import EXAMPLE_DATA, find_robot
 
 NOTHING = Signals({}, (), False, ())
@@ -103,7 +104,7 @@ def _draft(
         "# observer: {bandwidth: 100.0}      # rad/s; 20 for recordings at 100 Hz",
     ]
     text = "\n".join(part for part in parts if part) + "\n"
-    return Draft(text, tuple(said), guess.cautions)
+    return Draft(text, tuple(said), (*guess.cautions, *floating_warning(mechanism)))
 
 
 def _portable(model: Path, out: Path) -> str:

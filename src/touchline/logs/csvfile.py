@@ -12,6 +12,7 @@ import numpy as np
 from touchline import _logs
 from touchline.errors import InputError
 from touchline.logs.blocks import Block, take
+from touchline.logs.clock import in_seconds
 from touchline.logs.columns import Selection, select_columns
 from touchline.logs.lines import WholeLines
 from touchline.logs.naming import Naming
@@ -68,6 +69,8 @@ class CsvSource:
         self.losses = self.warnings  # there is nothing else to warn of
         self.delayed_wrenches = True
         self._stream: WholeLines | None = None
+        naming = in_seconds(naming, path, self.warnings, lambda: self.head()["time"], None)
+        self._selection = select_columns(description, naming, names, str(path))
 
     def head(self) -> Block:
         """The first rows."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from touchline.errors import InputError
 from touchline.logs.blocks import Block
+from touchline.logs.clock import in_seconds
 from touchline.logs.columns import select_columns
 from touchline.logs.naming import Naming
 from touchline.logs.source import HEAD_ROWS
@@ -50,7 +51,11 @@ class ParquetSource:
         self.delayed_wrenches = True
         try:
             self._selection = select_columns(description, naming, list(self.columns), str(path))
-            self._check_types()
+            self._check_types(naming.time.name)
+            naming = in_seconds(
+                naming, path, self.warnings, lambda: self.head()["time"], self._unit(naming)
+            )
+            self._selection = select_columns(description, naming, list(self.columns), str(path))
             if not self._file.metadata.num_rows:
                 raise InputError(f"{path}: the table has no rows")
         except InputError:
@@ -66,13 +71,19 @@ class ParquetSource:
             raise InputError(f"{path}: damaged footer: {first_line(error)}") from error
         self._read_rows = 0
 
-    def _check_types(self) -> None:
+    def _unit(self, naming: Naming) -> str | None:
+        """The unit of the stamps, where they are dates."""
+        kind = self._file.schema_arrow.field(naming.time.name).type
+        return getattr(kind, "unit", None)
+
+    def _check_types(self, time: str) -> None:
         import pyarrow.types as types
 
         problems = []
         for name in self._selection.names:
             kind = self._file.schema_arrow.field(name).type
-            if not (types.is_floating(kind) or types.is_integer(kind) or types.is_null(kind)):
+            fits = types.is_floating(kind) or types.is_integer(kind) or types.is_null(kind)
+            if not fits and not (name == time and types.is_timestamp(kind)):
                 problems.append(f"{self.path}: column {name!r} holds {kind}, not numbers")
         if problems:
             raise InputError(problems)
@@ -88,7 +99,7 @@ class ParquetSource:
         meta = self._file.metadata
         read_first_rows(self._file, naming.time.name)
         chunks = [meta.row_group(g).column(at).statistics for g in range(meta.num_row_groups)]
-        ranges = [(s.min, s.max) for s in chunks if s is not None and s.has_min_max]
+        ranges = [(s.min_raw, s.max_raw) for s in chunks if s is not None and s.has_min_max]
         if not ranges or len(ranges) < len(chunks):
             return None
         span = max(high for _, high in ranges) - min(low for low, _ in ranges)
@@ -160,6 +171,8 @@ def first_line(error: Exception) -> str:
 
 def numbers(column: Any) -> np.ndarray:
     """An Arrow array as (N,) float64 with NaN for null."""
+    if hasattr(column.type, "tz"):  # dates: whole numbers of their unit
+        column = column.cast("int64")
     return np.asarray(column.to_numpy(zero_copy_only=False), dtype=np.float64)
 
 

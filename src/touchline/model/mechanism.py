@@ -98,7 +98,10 @@ class Joint:
 
 @dataclass(frozen=True)
 class Mechanism:
-    """A tree of links. `links` and `joints` are in file order, `root` names the root link."""
+    """A tree of links. `links` and `joints` are in file order, `root` names the root link.
+
+    `floating` is the link that a free joint carries in the file; it is taken to stand on the world.
+    """
 
     name: str
     root: str
@@ -106,3 +109,4 @@ class Mechanism:
     joints: dict[str, Joint]
     gravity: Array
     warnings: tuple[str, ...] = ()
+    floating: str | None = None

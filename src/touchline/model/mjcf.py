@@ -47,9 +47,6 @@ def load_mjcf(path: Path | str) -> Mechanism:
         raise InputError(problems)
     links, joints = reader.tree()
     joints, notes = reader.couple(joints)
-    if reader.floating is not None:
-        body = model.body(model.jnt_bodyid[reader.floating]).name or "the first body"
-        notes.append(f"{body} floats on a free joint; it is taken to stand still on the world")
 
     def fault(where: str, what: str) -> None:
         problems.append(f"{path}: {where}: {what}")
@@ -58,7 +55,10 @@ def load_mjcf(path: Path | str) -> Mechanism:
     if problems:
         raise InputError(problems)
     warnings = tuple(f"{path}: {note}" for note in notes)
-    mechanism = Mechanism(reader.name, "world", links, joints, reader.gravity(), warnings)
+    floating = None
+    if reader.floating is not None:
+        floating = model.body(model.jnt_bodyid[reader.floating]).name or "the first body"
+    mechanism = Mechanism(reader.name, "world", links, joints, reader.gravity(), warnings, floating)
     return mechanism_warnings(mechanism, path)
 
 

@@ -12,11 +12,18 @@ from touchline.model.topology import outboard_links
 
 
 def mechanism_warnings(mechanism: Mechanism, path: Path) -> Mechanism:
-    """Return the mechanism with its warnings appended: meshes, inertias, massless bodies."""
-    found = (*mesh_warnings(mechanism), *inertia_warnings(mechanism))
+    """Return the mechanism with its warnings appended: free joint, meshes, inertias, no mass."""
+    found = (*floating_warning(mechanism), *mesh_warnings(mechanism), *inertia_warnings(mechanism))
     return replace(
         mechanism, warnings=(*mechanism.warnings, *(f"{path}: {line}" for line in found))
     )
+
+
+def floating_warning(mechanism: Mechanism) -> Iterator[str]:
+    """Yield a line where the robot floats in the file."""
+    if mechanism.floating:
+        what = "floats on a free joint; it is taken to stand still on the world"
+        yield f"{mechanism.floating} {what}"
 
 
 def inertia_warnings(mechanism: Mechanism, locked: Collection[str] = ()) -> Iterator[str]:

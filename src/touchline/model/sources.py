@@ -20,6 +20,7 @@ from unittest import mock
 
 from touchline.errors import InputError
 from touchline.model.packages import installed_shares, shipped_descriptions
+from touchline.model.yaml_file import read_yaml
 from touchline.suggest import did_you_mean
 
 DESCRIPTIONS = (".yaml", ".yml")
@@ -64,6 +65,17 @@ def find_robot(robot: str | Path) -> Source:
     if cached is not None:
         return Source("model", cached)
     raise InputError(_unknown(name, list(shipped), list(examples)))
+
+
+def given_keys(source: Path | None) -> dict[Any, Any]:
+    """What the file of a robot says; nothing where it is a model or there is none.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    if source is None or find_robot(source).kind == "model":
+        return {}
+    return read_yaml(source)
 
 
 def example_models() -> dict[str, Path]:

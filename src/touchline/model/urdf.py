@@ -7,6 +7,7 @@ Reference: http://wiki.ros.org/urdf/XML. Materials, transmissions, sensors and t
 import sys
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -26,7 +27,8 @@ from touchline.model.yaml_file import read_bytes
 from touchline.suggest import did_you_mean
 
 KINDS = {name: name for name in ("revolute", "prismatic", "fixed")} | {"continuous": "revolute"}
-MANY_DOF = ("floating", "planar")
+UNMOVED = ("fixed", "floating")  # no axis
+STANDING = "a robot must stand on the world; make it fixed, or split it into single joints"
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)  # of the contract; a URDF has no gravity
 
 
@@ -102,18 +104,34 @@ def _expanded(path: Path, package_dirs: Sequence[Path]) -> str:
 def _mechanism(
     reader: Reader, robot: Element, links: dict[str, Link], joints: dict[str, Joint]
 ) -> Mechanism:
-    root = ""
+    root, floating = "", None
     if not links:
         reader.problems.append(f"{reader.path}: no <link> in it")
     elif not reader.problems:
         # A joint or link that could not be read would make the tree look broken.
         root = find_root(links, joints, reader.fault)
+        joints, floating = _standing(reader, joints, root)
         joints = resolve_mimics(joints, reader.fault)
     if reader.problems:
         raise InputError(reader.problems)
     name = robot.get("name") or reader.path.stem
-    mechanism = Mechanism(name, root, links, joints, np.array(STANDARD_GRAVITY))
+    gravity = np.array(STANDARD_GRAVITY)
+    mechanism = Mechanism(name, root, links, joints, gravity, floating=floating)
     return mechanism_warnings(mechanism, reader.path)
+
+
+def _standing(
+    reader: Reader, joints: dict[str, Joint], root: str
+) -> tuple[dict[str, Joint], str | None]:
+    """The joints with a floating one on the root fixed, and the link that it carries."""
+    floating = None
+    for name, joint in joints.items():
+        if joint.kind == "floating" and joint.parent == root and floating is None:
+            floating = joint.child
+            joints = joints | {name: replace(joint, kind="fixed")}
+        elif joint.kind == "floating":
+            reader.fault(f"joint '{name}'", f"type 'floating' is not supported: {STANDING}")
+    return joints, floating
 
 
 def _link(reader: Reader, name: str, element: Element) -> Link:
@@ -131,7 +149,7 @@ def _joint(reader: Reader, name: str, element: Element, links: dict[str, Link]) 
     kind = _kind(reader, element, where)
     parent, child = (_end(reader, element, end, links, where) for end in ("parent", "child"))
     T = reader.origin(element, where)
-    axis = _axis(reader, element, where) if kind != "fixed" else np.array([0.0, 0.0, 1.0])
+    axis = _axis(reader, element, where) if kind not in UNMOVED else np.array([0.0, 0.0, 1.0])
     lower, upper, velocity, effort = _limits(reader, element, where)
     mimic = _mimic(reader, element, where) if kind != "fixed" else None
     if not (kind and parent and child):
@@ -143,9 +161,10 @@ def _kind(reader: Reader, element: Element, where: str) -> str | None:
     kind = element.get("type", "")
     if kind in KINDS:
         return KINDS[kind]
-    if kind in MANY_DOF:
-        what = "a robot must stand on the world; make it fixed, or split it into single joints"
-        reader.fault(where, f"type '{kind}' is not supported: {what}")
+    if kind == "floating":
+        return kind
+    if kind == "planar":
+        reader.fault(where, f"type '{kind}' is not supported: {STANDING}")
     else:
         allowed = list(KINDS)
         what = f"type '{kind}' is not allowed; allowed: {', '.join(allowed)}"

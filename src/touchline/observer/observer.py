@@ -256,9 +256,13 @@ def require_seconds(time: ArrayLike) -> None:
     """Makes sure that integer stamps, () or (N,), are no nanoseconds, as ROS keeps them.
 
     Raises:
-        ValueError: they are too late, or too far apart, to be seconds.
+        ValueError: they are too late, or too far apart, to be seconds; or they are dates.
     """
     stamps = np.atleast_1d(np.asarray(time))
+    if stamps.dtype.kind == "M":
+        raise ValueError(
+            "time is in seconds, but holds dates; pass (time - time[0]) / np.timedelta64(1, 's')"
+        )
     if stamps.dtype.kind not in "iu" or stamps.ndim != 1 or not len(stamps):
         return
     step = float(np.median(np.diff(stamps.astype(float)))) if len(stamps) > 1 else 0.0

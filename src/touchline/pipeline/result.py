@@ -2,6 +2,7 @@
 """What one sample brought."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -88,6 +89,13 @@ class Result(Value):
     faults: tuple[ChannelFault, ...] = ()
     ratios: Array = field(default_factory=lambda: np.empty(0))
     resets: tuple[Reset, ...] = ()
+
+    def _told(self) -> dict[str, Any]:
+        """Without what stands behind contacts and faults, and estimates that go on undisturbed."""
+        told = super()._told()
+        del told["detection"], told["ratios"]
+        told["resets"] = tuple(reset for reset in self.resets if reset.count)
+        return told if told["resets"] else {k: x for k, x in told.items() if k != "resets"}
 
 
 def _time(row: Array, at: Layout) -> float:

@@ -3,7 +3,7 @@
 
 import json
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from html import escape
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,6 +12,8 @@ from typing import Any
 from touchline.model.robot import Robot
 from touchline.report.analysis import analyze as analyze_files
 from touchline.report.outputs import CONTACTS, ESTIMATES, EVENTS
+from touchline.result.event import Event
+from touchline.result.native import EVENT
 
 MOST_SHOWN, MOST_ROWS = 3, 20  # events in a line, and in a notebook
 # Titles of a notebook's columns, and what stands in them.
@@ -35,17 +37,17 @@ class Results:
     Attributes:
         estimates: Arrow table, a row per sample.
         contacts: Arrow table, a row per contact and sample.
-        events: a dictionary per event, as in `events.json`.
+        events: all events, in the order of detection.
         warnings: what the user should know.
     """
 
     estimates: Any
     contacts: Any
-    events: list[dict[str, Any]]
+    events: list[Event]
     warnings: list[str]
 
     def __repr__(self) -> str:
-        collisions = sum(event["level"] == "collision" for event in self.events)
+        collisions = sum(event.level == "collision" for event in self.events)
         events = "; ".join(_line(event) for event in self.events[:MOST_SHOWN])
         more = len(self.events) - MOST_SHOWN
         return (
@@ -59,7 +61,7 @@ class Results:
         head = "".join(f"<th>{escape(title)}</th>" for title in SHOWN)
         rows = "".join(
             "<tr>"
-            + "".join(f"<td>{escape(_told(event[key]))}</td>" for key in SHOWN.values())
+            + "".join(f"<td>{escape(_told(getattr(event, key)))}</td>" for key in SHOWN.values())
             + "</tr>"
             for event in self.events[:MOST_ROWS]
         )
@@ -72,7 +74,14 @@ class Results:
         """The tables `estimates`, `contacts` and `events`, as Arrow tables."""
         import pyarrow as pa
 
-        events = pa.Table.from_pylist(self.events)
+        kinds = {"number": pa.float64(), "count": pa.int64(), "flag": pa.bool_()}
+        kinds |= {"vector": (vector := pa.list_(pa.float64()))}
+        candidate = [("link", pa.string()), ("body", pa.string()), ("probability", pa.float64())]
+        candidate += [("position", vector), ("radius", pa.float64())]
+        kinds["candidates"] = pa.list_(pa.struct(candidate))
+        kind_of = {field.name: field.kind for field in EVENT}
+        schema = [(f.name, kinds.get(kind_of.get(f.name, ""), pa.string())) for f in fields(Event)]
+        events = pa.Table.from_pylist([e.as_json() for e in self.events], pa.schema(schema))
         return {"estimates": self.estimates, "contacts": self.contacts, "events": events}
 
     def to_pandas(self) -> dict[str, Any]:
@@ -86,11 +95,11 @@ class Results:
         return {name: table.to_pandas() for name, table in self.to_arrow().items()}
 
 
-def _line(event: dict[str, Any]) -> str:
-    where = event["link"] or event["segment"]
-    if event["status"] != "located":
-        where += f" ({event['status'].replace('_', ' ')})"
-    return f"{event['id']}: {event['level']} at {event['detected']:.3f} s on {where}"
+def _line(event: Event) -> str:
+    where = event.link or event.segment
+    if event.status != "located":
+        where += f" ({event.status.replace('_', ' ')})"
+    return f"{event.id}: {event.level} at {event.detected:.3f} s on {where}"
 
 
 def _told(value: Any) -> str:
@@ -129,4 +138,4 @@ def analyze(
     estimates = pq.read_table(folder / ESTIMATES, memory_map=False)
     contacts = pq.read_table(folder / CONTACTS, memory_map=False)
     events = json.loads((folder / EVENTS).read_text(encoding="utf-8"))
-    return Results(estimates, contacts, events, analysis.warnings)
+    return Results(estimates, contacts, [Event.from_json(e) for e in events], analysis.warnings)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Events: from the sample at which a test fires to the one at which the contact is gone."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,7 +9,7 @@ import numpy as np
 
 from touchline.arrays import Array
 from touchline.result.contact import Candidate, least_contacts
-from touchline.result.kinds import ContactLevel, Happened, Status
+from touchline.result.kinds import ContactLevel, Happened, Status, Zone
 from touchline.result.native import EVENT, decoders
 from touchline.value import Value, lazily
 
@@ -78,6 +79,12 @@ class Event(Value):
         """The event as in `events.json`."""
         return {name: _plain(value) for name, value in self._known().items()}
 
+    @staticmethod
+    def from_json(known: Mapping[str, Any]) -> "Event":
+        """An event of `events.json`."""
+        kinds = {field.name: field.kind for field in EVENT}
+        return Event(**{name: _read(x, kinds.get(name)) for name, x in known.items()})
+
 
 # Fields that are not the core's (docs/architecture.md): it knows no widgets, and no result has one;
 # who follows a `Touch` beside the pipeline adds it.
@@ -91,6 +98,17 @@ class EventChange(Value):
 
     happened: Happened
     event: Event
+
+
+WORDS = {"level": ContactLevel, "status": Status, "zone": Zone}
+
+
+def _read(value: Any, kind: str | None) -> Any:
+    if kind == "candidates":
+        return tuple(Candidate(**{k: _read(x, "vector") for k, x in c.items()}) for c in value)
+    if isinstance(value, list):
+        return np.array(value, float)
+    return value if value is None or kind not in WORDS else WORDS[kind](value)
 
 
 def _plain(value: Any) -> Any:
