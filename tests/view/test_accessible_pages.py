@@ -21,6 +21,13 @@ from touchline.view.replay import Replay
 from touchline.view.replay_page import ReplayPage
 from touchline.view.server import PageServer
 
+# On a telephone: is the panel as wide as the page, and below the view?
+BELOW = """(() => {
+  const view = document.querySelector("canvas").getBoundingClientRect();
+  const panel = document.querySelector(".mantine-Paper-root").getBoundingClientRect();
+  return view.height > 300 && view.bottom <= panel.top + 1 && panel.width === innerWidth;
+})()"""
+
 
 def check(browser, server, words):
     """The page as it opens, in the system's colours."""
@@ -31,6 +38,8 @@ def check(browser, server, words):
         browser.wait_for(words)
         scheme_is = "document.documentElement.dataset.mantineColorScheme"
         assert browser.run(scheme_is) == scheme
+        if width < 576:
+            until(lambda: browser.run(BELOW), pause=browser.rest, what="the panel below the view")
         until(lambda: serious(browser) == [], pause=browser.rest, what="no finding of axe-core")
 
 

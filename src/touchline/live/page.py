@@ -94,10 +94,13 @@ class RobotPage:
                     lines.append(f"segment {html.escape(segment)}: <b>{watch}</b>")
             for contact in result.contacts:
                 where = contact.link or contact.likely_link or contact.segment
-                lines.append(f"<b>{html.escape(where)}</b>: {contact.size:.1f} N, {contact.status}")
+                told = contact.status.replace("_", " ")
+                if contact.status != "located" and contact.body_probability is not None:
+                    told += f", {contact.body_probability:.0%}"
+                lines.append(f"<b>{html.escape(where)}</b>: {contact.size:.1f} N, {told}")
                 able = self._can_be_felt.get(where)
                 if able is not None and (told := able.faint("faint", contact.size)) is not None:
                     lines.append(html.escape(told))
         if self._answer:
             lines.append(html.escape(self._answer))
-        return f'<div style="font-size:12px;padding:0 0.75em">{"<br>".join(lines)}</div>'
+        return f'<div style="font-size:12px;padding:0 0.75em 0.75em">{"<br>".join(lines)}</div>'

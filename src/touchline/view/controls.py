@@ -16,7 +16,7 @@ ADVICE = (
     "drag beside it to look from elsewhere."
 )
 LEGEND = f"""\
-<div style="font-size:12px;padding:0 0.75em">
+<div style="font-size:12px;padding:0 0.75em 0.5em">
 <span style="color:{FELT}">&#9679;</span> felt, with line of action and uncertainty (2 sigma);
 <span style="color:{TRUE}">&#9675;</span> true</div>"""
 MOTIONS = {"stands": False, "moves": True}

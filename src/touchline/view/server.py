@@ -31,6 +31,17 @@ CONTRAST = """
 .mantine-Button-root { --button-bg: #1864ab !important; --button-hover: #144f87 !important; }
 .mantine-Button-root { --button-color: #fff !important; }
 """
+# On a telephone viser's panel lies over the view and hides the arm. Here it stands below the view.
+NARROW = """
+@media (max-width: 576px) {
+  div:has(> .mantine-Paper-root[style*="position: fixed"]) { flex-direction: column; }
+  div:has(> div > div > div > canvas) { flex: 1 1 0 !important; min-height: 0; }
+  .mantine-Paper-root[style*="position: fixed"] {
+    position: relative !important; flex: none; width: 100% !important; max-height: 55vh !important;
+  }
+  .mantine-Paper-root[style*="position: fixed"] [style*="width: 20em"] { width: 100% !important; }
+}
+"""
 # viser's page is dark where its address says so. This runs before viser does.
 SCHEME = """
 (() => {
@@ -188,7 +199,7 @@ def _put_title(response: Response) -> None:
 def _titled(page: bytes, packed: bool) -> bytes:
     html = gzip.decompress(page) if packed else page
     scripts = f"<script>{SCHEME}</script><script>{NAMES}</script>"
-    head = f"<title>Touchline</title>\n<style>{CONTRAST}</style>{scripts}"
+    head = f"<title>Touchline</title>\n<style>{CONTRAST}{NARROW}</style>{scripts}"
     html = html.replace(b"<title>Viser</title>", head.encode(), 1)
     return gzip.compress(html) if packed else html
 
