@@ -181,6 +181,7 @@ class TopicReader {
   }
 
   void work() {
+    go_ahead();
     while (true) {
       {
         std::unique_lock<std::mutex> lock(bell_lock_);

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 INSTRUCTIONS: str = 'avx2'
 
+AHEAD: int = -11
+
 VERSION: str = '0.1.0'
 
 class NodeKind(enum.Enum):

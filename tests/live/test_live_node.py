@@ -5,7 +5,6 @@ import json
 import subprocess
 import sys
 
-import pytest
 from test_live_ros import HERE, environment, needs_ros
 
 import touchline as tl
@@ -94,9 +93,3 @@ def test_without_ros_the_node_says_what_to_install(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "rclpy", None)
     assert main([]) == 2
     assert "touchline[ros2]" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("name", ["touchline.launch.py"])
-def test_the_launch_file_is_python(name):
-    path = HERE.parents[1] / "ros" / "touchline" / "launch" / name
-    compile(path.read_text(), str(path), "exec")

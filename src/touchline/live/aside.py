@@ -15,6 +15,7 @@ import struct
 import subprocess
 import sys
 import time
+from contextlib import suppress
 
 import numpy as np
 
@@ -300,6 +301,8 @@ def main(number: int) -> int:
     link = socket.socket(fileno=number)
     name, description, mechanism = pickle.loads(sys.stdin.buffer.read())
     settle()
+    with suppress(OSError, AttributeError):
+        os.nice(core.AHEAD)
     try:
         _Reading(link, own_source(name, Robot(description, mechanism))).run()
     except InputError as error:
