@@ -23,6 +23,15 @@ COLORS = {
     "truth": FAINT,
 }
 SHADES = ("#1f5d94", "#c8602c", "#4f9a86", "#8a6bae", "#b8962e", "#6d7780", "#a8485f")
+# One behind the other, so that curves that lie on each other are all seen: the first is the widest.
+LINES: tuple[dict[str, Any], ...] = (
+    {"lw": 2.4, "ls": "-"},
+    {"lw": 1.9, "ls": (0, (6, 2))},
+    {"lw": 1.5, "ls": (0, (3, 1.5))},
+    {"lw": 1.2, "ls": (0, (1, 1))},
+    {"lw": 0.9, "ls": (0, (5, 1, 1, 1))},
+    {"lw": 0.8, "ls": "-"},
+)
 POINTS = 2000  # of a curve, at most
 STYLE: Any = {
     "font.family": "STIXGeneral",

@@ -11,6 +11,7 @@ from touchline.calibrate.run import Calibration, Thresholds
 from touchline.detector.calibration import Statistics
 from touchline.detector.tail import Tail, alarm_levels
 from touchline.errors import InputError
+from touchline.figure import FAINT, INK, SHADES, new_figure, panel_label, rendered, styled
 from touchline.model.values import METHODS
 
 ENDINGS = ".svg", ".png", ".pdf"
@@ -41,15 +42,21 @@ def draw_calibration(result: Calibration, path: Path) -> None:
     Raises:
         InputError: the file cannot be written.
     """
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    matplotlib.rcParams["svg.hashsalt"] = "touchline"
     thresholds = result.thresholds
     if thresholds is None:
         raise InputError(f"--figure {path}: there are no thresholds to draw")
     names = [name for name in result.robot.segment_names if name in thresholds.tails]
-    figure = Figure(figsize=(2.9 * len(METHODS), 2.6 * len(names)), layout="constrained")
+    figure = new_figure(2.3 * len(METHODS), 2.1 * len(names))
+    with styled():
+        _fill(figure, result, thresholds, names)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(rendered(figure, path.suffix[1:]))
+    except OSError as error:
+        raise InputError(f"--figure {path}: cannot be written: {error.strerror}") from None
+
+
+def _fill(figure: Any, result: Calibration, thresholds: Thresholds, names: list[str]) -> None:
     grid = figure.subplots(len(names), len(METHODS), squeeze=False)
     for line, name in zip(grid, names, strict=True):
         for t, (axes, method) in enumerate(zip(line, METHODS, strict=True)):
@@ -60,18 +67,13 @@ def draw_calibration(result: Calibration, path: Path) -> None:
             g = result.robot.segment_names.index(name)
             _panel(axes, result.share, thresholds, tail, (g, t))
             used = method in result.robot.description.detection.method
-            axes.set_title(f"{name}: {method}{' (in use)' if used else ''}", fontsize=9)
+            panel_label(axes, f"{name}: {method}{' (in use)' if used else ''}")
     drawn = [axes for axes in grid.flat if axes.lines]
-    drawn[0].legend(fontsize=7)
+    drawn[0].legend()
     for axes in grid[:, 0]:
         axes.set_ylabel("alarms an hour")
     for axes in grid[-1]:
         axes.set_xlabel("threshold")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
-    except OSError as error:
-        raise InputError(f"--figure {path}: cannot be written: {error.strerror}") from None
 
 
 def _panel(
@@ -80,22 +82,21 @@ def _panel(
     limit, (low, high) = tail.threshold(share), tail.interval(share)
     most = 1.15 * max(limit, tail.level)
     for part, colour, label in (
-        (thresholds.train, "#1f77b4", "the others"),
-        (thresholds.test, "#ff7f0e", "held out"),
+        (thresholds.train, SHADES[0], "the others"),
+        (thresholds.test, SHADES[1], "held out"),
     ):
         levels, rates = _seen(part, at)
-        axes.step(levels, rates, where="pre", color=colour, lw=1.2, label=label)
+        axes.step(levels, rates, where="pre", color=colour, label=label)
         most = max(most, 1.02 * float(levels.max(initial=0.0)))
     least = tail.level - LEFT_OUT * (most - tail.level)
     x = np.linspace(tail.level, most, 200)
-    axes.plot(x, tail.rate(x), color="k", lw=1.0, label="tail, of all")
-    axes.axvline(limit, color="k", lw=1.0, ls="--")
-    axes.axvspan(low, high, color="k", alpha=0.08, lw=0)
-    axes.axhline(share, color="k", lw=0.5, ls=":")
+    axes.plot(x, tail.rate(x), color=INK, lw=0.8, label="tail, of all")
+    axes.axvline(limit, color=INK, lw=0.8, ls="--")
+    axes.axvspan(low, high, color=INK, alpha=0.08, lw=0)
+    axes.axhline(share, color=FAINT, lw=0.6, ls=":")
     axes.set_yscale("log")
     axes.set_xlim(max(least, 0.0), most)
     axes.set_ylim(0.2 * min(share, 1.0 / tail.hours), 2.0 * tail.per_hour)
-    axes.grid(alpha=0.3)
 
 
 def _seen(found: Statistics, at: tuple[int, int]) -> tuple[Array, Array]:

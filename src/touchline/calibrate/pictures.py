@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from touchline.errors import InputError
+from touchline.figure import FAINT, SHADES, new_figure, panel_label, rendered, styled
 from touchline.identify.fit import Column, column_of
 from touchline.identify.identification import Identification
 
-BEFORE, AFTER = "#9aa5b1", "#1f77b4"
+BEFORE, AFTER = FAINT, SHADES[0]
 PER_ROW = 4  # panels beside each other
 
 
@@ -21,16 +22,14 @@ def draw_identification(found: Identification, folder: Path) -> list[Path]:
         InputError: the folder cannot be written.
         ModuleNotFoundError: matplotlib is missing.
     """
-    import matplotlib
-
-    matplotlib.rcParams["svg.hashsalt"] = "touchline"
-    pictures = {"residuals.svg": _residuals(found), "friction.svg": _friction(found)}
+    with styled():
+        pictures = {"residuals.svg": _residuals(found), "friction.svg": _friction(found)}
     written = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, figure in pictures.items():
             if figure is not None:
-                figure.savefig(folder / name, metadata={"Date": None})
+                (folder / name).write_bytes(rendered(figure, "svg"))
                 written.append(folder / name)
     except OSError as error:
         raise InputError(f"--pictures {folder}: cannot be written: {error.strerror}") from None
@@ -39,14 +38,12 @@ def draw_identification(found: Identification, folder: Path) -> list[Path]:
 
 def _residuals(found: Identification) -> Any:
     """RMS by row on data that played no part; forces and moments in panels of their own."""
-    from matplotlib.figure import Figure
-
     e = found.evidence
     used = np.flatnonzero(e.used)
     force = np.array([r >= e.joints and e.rows.names[r][-2] == "f" for r in used])
     groups = [(used[~force], "Nm"), (used[force], "N")]
     groups = [(rows, unit) for rows, unit in groups if len(rows)]
-    figure = Figure(figsize=(0.55 * len(used) + 2.5, 3.2), layout="constrained")
+    figure = new_figure(0.5 * len(used) + 2.0, 2.6)
     widths = [len(rows) for rows, _ in groups]
     panels = figure.subplots(1, len(groups), squeeze=False, width_ratios=widths)[0]
     for axes, (rows, unit) in zip(panels, groups, strict=True):
@@ -54,18 +51,16 @@ def _residuals(found: Identification) -> Any:
         axes.bar(x - 0.2, found.before[rows], 0.4, color=BEFORE, label="as described")
         axes.bar(x + 0.2, found.after[rows], 0.4, color=AFTER, label="identified")
         names = [e.rows.names[r] for r in rows]
-        axes.set_xticks(x, names, rotation=35, ha="right", fontsize=8)
+        axes.set_xticks(x, names, rotation=35, ha="right")
         axes.set_ylabel(f"residual, RMS [{unit}]")
-        axes.grid(axis="y", alpha=0.3)
-    panels[0].legend(fontsize=8)
-    panels[0].set_title(f"data that played no part ({found.parted})", fontsize=9, loc="left")
+        axes.grid(axis="x", visible=False)
+    panels[0].legend()
+    panel_label(panels[0], f"data that played no part ({found.parted})")
     return figure
 
 
 def _friction(found: Identification) -> Any:
     """Per joint what is left without its friction, over speed, and the law that was found."""
-    from matplotlib.figure import Figure
-
     e = found.evidence
     kinds = ("coulomb", "viscous", "bias")
     columns = [c for c in found.problem.columns if c.row < e.joints and c.kind in kinds]
@@ -76,7 +71,7 @@ def _friction(found: Identification) -> Any:
     part = e.part(~found.touched)
     lines = -(-len(joints) // PER_ROW)
     wide = min(PER_ROW, len(joints))
-    figure = Figure(figsize=(2.7 * wide, 2.3 * lines + 0.3), layout="constrained")
+    figure = new_figure(2.2 * wide, 1.9 * lines + 0.3)
     panels = figure.subplots(lines, wide, squeeze=False).ravel()
     for axes in panels[len(joints) :]:
         axes.axis("off")
@@ -89,11 +84,9 @@ def _friction(found: Identification) -> Any:
         x = np.linspace(-most, most, 400)
         y = sum(found.solution.value(c.kind, j) * _law(c, x) for c in own)
         axes.plot(x, y, color=AFTER, lw=1.6)
-        axes.set_title(e.rows.names[j], fontsize=8)
-        axes.grid(alpha=0.3)
-        axes.tick_params(labelsize=7)
-    figure.supxlabel("velocity [rad/s]", fontsize=9)
-    figure.supylabel("friction and offset [Nm]", fontsize=9)
+        panel_label(axes, e.rows.names[j])
+    figure.supxlabel("velocity [rad/s]", fontsize=8)
+    figure.supylabel("friction and offset [Nm]", fontsize=8)
     return figure
 
 

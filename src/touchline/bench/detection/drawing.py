@@ -6,17 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from touchline.bench.detection.outcome import GOALS
+from touchline.figure import FAINT, LINES, SHADES, new_figure, panel_label, rendered, styled
 
 Line = dict[str, str]
 
-COLOURS = {
-    "rows": "#7f7f7f",
-    "scaled": "#bcbd22",
-    "chi2": "#1f77b4",
-    "glrt": "#d62728",
-    "cusum": "#2ca02c",
-    "lowpass": "#9467bd",
-}
+METHODS = ("rows", "scaled", "chi2", "glrt", "cusum", "lowpass")
+LOOKS = {m: LINES[i] | {"color": SHADES[i], "label": m} for i, m in enumerate(METHODS)}
 COLUMNS = 4
 
 
@@ -37,8 +32,8 @@ def _roc(axes: Any, lines: list[Line], goal: tuple[float, float]) -> None:
         at = [line for line in own if float(line["force_n"]) == force]
         rates = [float(line["alarms_wanted_per_hour"]) for line in at]
         found = [100 * float(line["found_within_goal"]) for line in at]
-        axes.semilogx(rates, found, color=COLOURS[method], label=method)
-    axes.axhline(95, color="k", lw=0.5, ls=":")
+        axes.semilogx(rates, found, **LOOKS[method])
+    axes.axhline(95, color=FAINT, lw=0.6, ls=":")
     axes.set_ylim(0, 103)
     axes.set_xlabel("false alarms per hour, as set")
     axes.set_ylabel(f"% of {force:g} N found within {1e3 * limit:g} ms")
@@ -49,9 +44,9 @@ def _delay(axes: Any, lines: list[Line], goal: tuple[float, float]) -> None:
         at = [line for line in own if float(line["alarms_wanted_per_hour"]) == 1.0]
         forces = [float(line["force_n"]) for line in at]
         median = [1e3 * float(line["delay_median_s"]) for line in at]
-        axes.loglog(forces, median, "o-", ms=3, color=COLOURS[method], label=method)
+        axes.loglog(forces, median, marker="o", ms=2.5, **LOOKS[method])
         axes.set_xticks(forces, [f"{force:g}" for force in forces])
-    axes.axvline(goal[0], color="k", lw=0.5, ls=":")
+    axes.axvline(goal[0], color=FAINT, lw=0.6, ls=":")
     axes.set_xticks([], minor=True)
     axes.set_xlabel("force [N]")
     axes.set_ylabel("median delay at 1 per hour [ms]")
@@ -62,24 +57,20 @@ def _sheet(
     panel: Callable[[Any, list[Line], tuple[float, float]], None],
     path: Path,
 ) -> None:
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    matplotlib.rcParams["svg.hashsalt"] = "touchline"
     settings = dict(sorted(_by(lines, "observer", "rate_hz", "velocity_noise").items(), key=_place))
     columns = min(COLUMNS, len(settings))
     rows = -(-len(settings) // columns)
-    figure = Figure(figsize=(3.6 * columns, 3.1 * rows), layout="constrained")
-    grid = figure.subplots(rows, columns, squeeze=False)
-    for axes in grid.flat[len(settings) :]:
-        axes.axis("off")
-    for axes, (name, own) in zip(grid.flat, settings.items(), strict=False):
-        observer, rate, velocity = name
-        panel(axes, own, GOALS[float(rate), float(velocity)])
-        axes.set_title(f"{observer}, {float(rate) / 1000:g} kHz, {velocity} rad/s", fontsize=9)
-        axes.grid(alpha=0.3)
-        axes.legend(fontsize=7)
-    figure.savefig(path, metadata={"Date": None})
+    figure = new_figure(2.6 * columns, 2.3 * rows)
+    with styled():
+        grid = figure.subplots(rows, columns, squeeze=False)
+        for axes in grid.flat[len(settings) :]:
+            axes.axis("off")
+        for axes, (name, own) in zip(grid.flat, settings.items(), strict=False):
+            observer, rate, velocity = name
+            panel(axes, own, GOALS[float(rate), float(velocity)])
+            panel_label(axes, f"{observer}, {float(rate) / 1000:g} kHz, {velocity} rad/s")
+            axes.legend(handlelength=2.6)
+    path.write_bytes(rendered(figure, "svg"))
 
 
 def _place(setting: tuple[tuple[str, ...], list[Line]]) -> tuple[Any, ...]:

@@ -12,7 +12,7 @@ from touchline.bench.localization.baselines import BASELINES
 from touchline.bench.localization.surface_map import SurfaceMap, framing
 from touchline.bench.localization.touched import NEAR
 from touchline.bench.localization.trial import Trial
-from touchline.figure import FAINT, PAGE, SHADES, new_figure, panel_label, save, styled
+from touchline.figure import FAINT, LINES, PAGE, SHADES, new_figure, panel_label, save, styled
 from touchline.trials.arms import TIERS
 from touchline.trials.cell import Cell
 from touchline.trials.scene import arm_and_skin
@@ -133,7 +133,7 @@ def distributions(trials: Sequence[Trial]) -> Any:
 
 
 def _baselines(axes: Any, trials: Sequence[Trial], cell: Cell) -> None:
-    _curve(axes, _errors(trials, cell), "ours", SHADES[0])
+    _curve(axes, _errors(trials, cell), "ours", SHADES[0], **LINES[5])
     short = {"first": "first entry", "nearest": "nearest to the line", "particles": "particles"}
     for i, name in enumerate(BASELINES):
         errors = [
@@ -143,14 +143,14 @@ def _baselines(axes: Any, trials: Sequence[Trial], cell: Cell) -> None:
             for error in dict(trial.baselines).get(name, ())
         ]
         if errors:
-            _curve(axes, np.array(errors), short[name], SHADES[i + 1])
+            _curve(axes, np.array(errors), short[name], SHADES[i + 1], **LINES[i])
 
 
 def _errors(trials: Sequence[Trial], cell: Cell) -> Array:
     return np.array([t.error for trial in trials if trial.cell == cell for t in trial.touches])
 
 
-def _curve(axes: Any, errors: Array, label: str, color: str) -> None:
+def _curve(axes: Any, errors: Array, label: str, color: str, **look: Any) -> None:
     """Share of the touches that are farther off [%]; what was not located is infinitely far."""
     far = np.sort(np.where(np.isfinite(errors), errors, np.inf))
     beyond = 100.0 * (1.0 - np.arange(1, len(far) + 1) / len(far))
@@ -162,4 +162,5 @@ def _curve(axes: Any, errors: Array, label: str, color: str) -> None:
         where="post",
         color=color,
         label=label,
+        **look,
     )
