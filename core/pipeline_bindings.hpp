@@ -418,7 +418,7 @@ inline void bind(nb::module_& m) {
                                    std::move(segments), std::move(rows), std::move(watch)};
           },
           "lost"_a, "robot"_a, "sensors"_a, "segments"_a, "rows"_a, "watch"_a);
-  m.attr("FAULTS") = nb::make_tuple("none", "spike", "step", "wild", "stuck", "disagrees",
+  m.attr("FAULTS") = nb::make_tuple("none", "spike", "step", "wild", "stuck", "disagrees", "suspect",
                                    "absent");
   nb::exception<tl::RobotFileError>(m, "RobotFileError", PyExc_ValueError);
   m.def("read_robot", &tl::read_robot, "path"_a);

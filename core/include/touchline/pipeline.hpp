@@ -14,6 +14,7 @@
 #include "touchline/detail/events/describe.hpp"
 #include "touchline/detail/events/event_recorder.hpp"
 #include "touchline/detail/events/period_watch.hpp"
+#include "touchline/detail/gates/suspect_watch.hpp"
 #include "touchline/detail/localizer/localizer.hpp"
 #include "touchline/detail/observer/observer.hpp"
 #include "touchline/detail/observer/reset_watch.hpp"
@@ -39,6 +40,7 @@ class Pipeline {
         classifier_(observer_, robot_.blows, tuning_.classifier),
         recorder_(robot_, observer_, localizer_),
         rest_(observer_.row_layout(), tuning_.observer),
+        suspects_(robot_, observer_.layout()),
         resets_(observer_.row_layout()),
         period_(robot_.noise.period, tuning_.events),
         levels_(robot_.segment_names.size(), 0.0),
@@ -74,6 +76,13 @@ class Pipeline {
   template <class Visit>
   void visit_lasting(Visit&& visit) {
     recorder_.visit_lasting(visit);
+  }
+
+  // Events that have begun at `since` or later are doubted until `until` [s]: a channel is not what it
+  // was. What is doubted is no collision, and its link is not sure. No contact becomes a collision then.
+  void doubt(double since, double until) {
+    doubted_since_ = observer_.time() < doubted_until_ ? std::min(doubted_since_, since) : since;
+    doubted_until_ = std::max(doubted_until_, until);
   }
 
   // The posterior over surfaces of the only contact of the last sample; takes milliseconds and
@@ -129,8 +138,12 @@ class Pipeline {
     std::copy(detector_.levels().begin(), detector_.levels().end(), levels_.begin());
     classifier_.step(sample.time, row, levels_.data());
     recorder_.begin();
+    suspects_.begin();
     count_ = 0;
     if (touched()) localize(sample, row);
+    suspects_.finish(sample.time, [this](int channel, double until) {
+      localizer_.leave_out(channel, until);
+    });
     for (std::size_t segment = 0; segment < levels_.size(); ++segment) {
       if (!(levels_[segment] > 0.0)) localizer_.rest(static_cast<int>(segment), row, sample.time);
     }
@@ -162,12 +175,21 @@ class Pipeline {
       localizer_.follow(g, felt, row, normalized.data(), sample.time, sample.q);
       const Reports& reports = localizer_.reports();
       if (felt) {
+        suspects_.add(localizer_.suspect());
         classifier_.consider(g, reports);
         for (int k = 0; k < reports.count(); ++k) {
           Contact& contact = contacts_[count_++];
+          const LastingEvent* event = recorder_.of(reports[k].serial);
+          const double began = event != nullptr ? event->detected : sample.time;
+          const bool unsure = sample.time < doubted_until_;
+          const bool doubted = reports[k].doubted || (unsure && began >= doubted_since_);
+          const bool known = event != nullptr && event->level == ContactLevel::collision;
+          const bool later = began > classifier_.blow(g) + tuning_.classifier.decide_within;
           fill(contact, g, k, estimate);
-          contact.event = recorder_.add(reports[k].serial, contact, reports.share(k), sample.time,
-                                        sample.q, estimate.tau_ext(), normalized);
+          if (doubted || later || (unsure && !known)) contact.level = ContactLevel::contact;
+          if (doubted) touchline::doubt(contact);
+          contact.event = recorder_.add(reports[k].serial, contact, doubted, reports.share(k),
+                                        sample.time, sample.q, estimate.tau_ext(), normalized);
         }
       }
       for (Localizer::Memory* memory : localizer_.ended()) {
@@ -224,6 +246,7 @@ class Pipeline {
             {contacts_.data(), count_},
             view(recorder_.changes()),
             {},
+            view(suspects_.told()),
             {},
             view(resets_.resets())};
   }
@@ -241,6 +264,8 @@ class Pipeline {
   Classifier classifier_;
   EventRecorder recorder_;
   RestMeter rest_;
+  SuspectWatch suspects_;
+  double doubted_since_ = 0.0, doubted_until_ = -kAbsurd;  // [s]
   ResetWatch resets_;
   PeriodWatch period_;
   std::vector<double> levels_;  // of the segments, as the classifier takes them

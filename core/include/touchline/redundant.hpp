@@ -64,7 +64,7 @@ class RedundantPipeline {
     sound_.resize(gates_.layout().count(), Fault::none);
     ratios_.resize(kAhead * sound_.size());
     until_.resize(sound_.size(), -kAbsurd);
-    faults_ = sound_;
+    faults_ = before_ = sound_;
     left_.resize(sound_.size());
     restarts_.resize(n + levels_.size(), 0);
     for (StandIn& given : stand_ins) {
@@ -209,18 +209,54 @@ class RedundantPipeline {
     const bool faulty = &faults != &sound_ && !gates_.all_sound();
     if (faulty) result.health |= kFaulty | gates_.absent();
     const std::vector<Fault>* told = &faults;
-    if (contradicted_) {
+    const bool suspected = std::any_of(result.suspects.begin(), result.suspects.end(),
+                                       [](char suspect) { return suspect != 0; });
+    if (contradicted_ || suspected) {
       result.health |= kFaulty;
       faults_ = faults;
       for (std::size_t c = 0; c < faults_.size(); ++c) {
         if (faults_[c] == Fault::none && until_[c] > -kAbsurd) faults_[c] = Fault::disagrees;
       }
+      for (std::size_t i = 0; i < result.suspects.size(); ++i) {
+        Fault& fault = faults_[channel_of(i)];
+        if (result.suspects[i] != 0 && fault == Fault::none) fault = Fault::suspect;
+      }
       told = &faults_;
     }
+    if (told != &sound_ || changing_) follow_faults(*told, result.time);
     result.faults = {told->data(), told->size()};
     result.ratios = {ratios, told->size()};
     count_resets(result);
     return result;
+  }
+
+  // The channel of the whole robot that is channel `i` of the one that speaks.
+  std::size_t channel_of(std::size_t i) const {
+    const std::size_t first = gates_.layout().wrench();
+    if (now_ == nullptr || i < first) return i;
+    return first + 6 * now_->given.sensors[(i - first) / 6] + (i - first) % 6;
+  }
+
+  // A channel that comes to be wrong, or right again, or is at another level from now on: what begins
+  // about then may be no contact.
+  void follow_faults(const std::vector<Fault>& told, double time) {
+    bool news = gates_.take_moved();
+    changing_ = false;
+    for (std::size_t c = 0; c < told.size(); ++c) {
+      news = news || (told[c] != before_[c] && (is_wrong(told[c]) || is_wrong(before_[c])));
+      before_[c] = told[c];
+      changing_ = changing_ || told[c] != Fault::none;
+    }
+    if (!news) return;
+    doubted_since_ = time < doubted_until_ ? std::min(doubted_since_, time - kUntold) : time - kUntold;
+    doubted_until_ = time + kDoubtful;
+    whole_.doubt(time - kUntold, time + kDoubtful);
+    for (const std::unique_ptr<Second>& second : stand_ins_)
+      second->pipeline.doubt(time - kUntold, time + kDoubtful);
+  }
+  static bool is_wrong(Fault fault) {
+    return fault == Fault::step || fault == Fault::wild || fault == Fault::stuck ||
+           fault == Fault::disagrees;
   }
 
   // Of what is said, whoever says it: `Result::resets` is still that of who makes the estimate.
@@ -235,6 +271,9 @@ class RedundantPipeline {
     resets_.step(result.estimate.row().data(), [this](std::size_t i) { return restarts_[i]; });
     result.resets = resets();
   }
+
+  static constexpr double kUntold = 0.06;   // [s] for which a channel may be wrong before it is told
+  static constexpr double kDoubtful = 1.0;  // [s] in which more of it may come
 
   // An event under another number than the one its pipeline gave it; `before`: it goes on with an
   // event that had been detected then.
@@ -387,6 +426,7 @@ class RedundantPipeline {
     if (!waiting_.empty() && !(whole_.time() < handed_over_ + tuning().gates.continues)) {
       for (Event& event : waiting_) {
         event.cleared = handed_over_;
+        if (is_doubted(event)) doubt(event);
         tell(Happened::ended, event);
       }
       waiting_.clear();
@@ -424,7 +464,13 @@ class RedundantPipeline {
     handed_over_ = whole_.time();
     from.visit_lasting([&](Event event) {
       rename(event);
-      if (waiting_.size() < waiting_.capacity()) waiting_.push_back(event);
+      if (event.doubted || is_doubted(event)) {  // the next one does not go on with it
+        doubt(event);
+        event.cleared = handed_over_;
+        tell(Happened::ended, event);
+      } else if (waiting_.size() < waiting_.capacity()) {
+        waiting_.push_back(event);
+      }
     });
     next_ = next_event();
     renumbered_.clear();
@@ -467,6 +513,10 @@ class RedundantPipeline {
 
   void tell(Happened happened, const Event& event) {
     if (changes_.size() < changes_.capacity()) changes_.push_back({happened, event});
+  }
+  // Has an event begun when a channel was not what it was?
+  bool is_doubted(const Event& event) const {
+    return whole_.time() < doubted_until_ && event.detected >= doubted_since_;
   }
 
   // The number under which an event of the one that speaks is told.
@@ -599,7 +649,10 @@ class RedundantPipeline {
   ChannelGates gates_;
   ParityWatch parity_;
   std::vector<double> until_, left_;  // per channel: when it counts again [s]; what is left of it
-  std::vector<Fault> faults_;         // of gates and parity together
+  std::vector<Fault> faults_;         // of gates, parity and what is suspected together
+  std::vector<Fault> before_;         // as told of the sample before
+  bool changing_ = false;             // is any of these a fault?
+  double doubted_since_ = 0.0, doubted_until_ = -kAbsurd;  // [s] what began then is doubted until then
   bool contradicted_ = false;         // does any channel count no more?
   ResetWatch resets_;
   std::vector<std::uint32_t> restarts_;  // per joint, then per segment: as told by who speaks

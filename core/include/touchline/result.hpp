@@ -141,6 +141,7 @@ struct Event {
   Clamped clamped = Clamped::no;
   double rate = kUnknown;             // the largest, of the segment's force [N/s]
   int rank = -1, unknowns = -1;
+  bool doubted = false;               // may a faulty channel be the cause? No field: `status` tells
 };
 
 // What a sample did to an event.
@@ -166,6 +167,7 @@ struct Result {
   Span<Contact> contacts;   // at least one per segment that is touched
   Span<EventChange> events;
   Span<Fault> faults;       // per channel, as `ChannelLayout`; none where nothing was judged
+  Span<char> suspects;      // per channel: does it alone explain what is felt?
   Span<double> ratios;      // per channel: its last step over what is believed at once
   Span<Reset> resets;       // per joint, then per segment: `count` tells when its estimate jumped
 };

@@ -45,7 +45,7 @@ class Watch(StrEnum):
 
 
 class Fault(StrEnum):
-    """What is wrong with a channel; but for a spike it is left out, as if it were missing."""
+    """What is wrong with a channel; but for spikes and suspects it is left out, as if missing."""
 
     NONE = "none"
     SPIKE = "spike"  # far from the samples before: the last good reading stands for it
@@ -53,4 +53,5 @@ class Fault(StrEnum):
     WILD = "wild"  # such jumps that go on
     STUCK = "stuck"  # the same value again and again while the arm moves
     DISAGREES = "disagrees"  # no derivative of its position, or a load that others contradict
+    SUSPECT = "suspect"  # it alone explains what is felt; it counts on, but no contact is sure
     ABSENT = "absent"  # position or velocity: not there, the other one stands in for it

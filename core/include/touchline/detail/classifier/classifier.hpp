@@ -81,6 +81,8 @@ class Classifier {
   }
   // Contact k on segment g.
   bool clamped(int g, int k) const { return clamping_(g, k); }
+  // When the present touch of a segment last began fast, or grew as fast [s]; NaN: never.
+  double blow(int g) const { return touches_[g].blow; }
   // Of the segment's force [N/s]; NaN where it is not touched.
   double rate(int g) const { return touches_[g].rate; }
 
@@ -89,7 +91,7 @@ class Classifier {
 
   struct Touch {
     Kind kind = Kind::none;
-    double begin = 0.0, rate = kNaN;
+    double begin = 0.0, rate = kNaN, blow = kNaN;
   };
 
   // Of the force on segment g [N].
@@ -114,6 +116,7 @@ class Classifier {
     const bool strong = sizes_[g] + touch.rate / bandwidths_[g] > limits.collision;
     if (touch.rate > limits.onset && strong) {
       touch.kind = Kind::collision;
+      touch.blow = time_;
     } else if (touch.kind == Kind::undecided && time_ >= touch.begin + tuning_.decide_within) {
       touch.kind = Kind::contact;
     }

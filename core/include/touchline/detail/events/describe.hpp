@@ -36,4 +36,20 @@ inline void describe(const Answer& answer, int g, Contact& c) {
   c.degrees = explained ? answer.degrees : -1;
 }
 
+// Of two explanations, a contact and a faulty channel, none is preferred.
+constexpr double kDoubted = 0.5;
+
+// What is said of a contact or an event that may be none.
+template <class T>
+void halve(T& said) {
+  if (said.status == Status::located) said.status = Status::ambiguous;
+  said.body_probability *= kDoubted;
+  for (int i = 0; i < said.candidates.count; ++i) said.candidates.of[i].probability *= kDoubted;
+}
+inline void doubt(Contact& contact) { halve(contact); }
+inline void doubt(Event& event) {
+  if (!event.doubted) halve(event);
+  event.doubted = true;
+}
+
 }  // namespace touchline

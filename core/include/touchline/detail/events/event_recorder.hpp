@@ -9,6 +9,7 @@
 #include <cmath>
 #include <vector>
 
+#include "touchline/detail/events/describe.hpp"
 #include "touchline/detail/localizer/localizer.hpp"
 #include "touchline/result.hpp"
 
@@ -29,7 +30,7 @@ struct LastingEvent {
   std::vector<double> q;       // (n)
   std::vector<double> torque;  // (n) the largest of each joint [Nm]
   std::vector<double> sum;     // of normalized rows and force, over samples near the peak
-  int count = 0;
+  int count = 0, doubted = 0;  // samples of it, and those of which a faulty channel may be the cause
   bool apart = false;  // was there an answer with a rank? It is the last one:
   Status undetermined_status = Status::none;
   int rank = -1, unknowns = -1;
@@ -70,14 +71,14 @@ class EventRecorder {
   }
 
   // Takes what is said of a contact; returns the number of its event.
-  int add(int serial, const Contact& c, double share, double time, const double* q,
+  int add(int serial, const Contact& c, bool doubted, double share, double time, const double* q,
           const Span<double>& tau_ext, const Span<double>& normalized) {
     LastingEvent& e = lasting(serial, c.segment, time);
     double wrench[6];
     std::copy_n(c.wrench, 6, wrench);
     if (share < 1.0) wrench[0] = c.force.x, wrench[1] = c.force.y, wrench[2] = c.force.z;
     add_peaks(e, wrench, q, tau_ext);
-    add_rows(e, share, wrench, normalized);
+    if (add_rows(e, share, wrench, normalized) && doubted) ++e.doubted;
     if (c.unknowns > 0) {
       e.apart = true;
       e.undetermined_status = c.status;
@@ -87,6 +88,14 @@ class EventRecorder {
     }
     classify(e, c, time);
     return e.id;
+  }
+
+  // The event of a contact; null: it begins now.
+  const LastingEvent* of(int serial) const {
+    for (const LastingEvent& e : events_) {
+      if (e.lasts && e.serial == serial) return &e;
+    }
+    return nullptr;
   }
 
   // The event of a contact ends.
@@ -154,7 +163,7 @@ class EventRecorder {
     e.level = ContactLevel::contact;
     e.decided = e.rate = kUnknown;
     e.strength = e.force = 0.0;
-    e.count = 0;
+    e.count = e.doubted = 0;
     std::fill_n(e.wrench, 6, 0.0);
     for (std::vector<double>* values : {&e.q, &e.torque, &e.sum})
       std::fill(values->begin(), values->end(), 0.0);
@@ -188,8 +197,8 @@ class EventRecorder {
       e.torque[j] = std::max(e.torque[j], std::fabs(known(tau_ext[j])));
   }
 
-  // For the mean over the samples that come near the peak of those up to then.
-  void add_rows(LastingEvent& e, double share, const double* wrench,
+  // For the mean over the samples that come near the peak of those up to then; is it one?
+  bool add_rows(LastingEvent& e, double share, const double* wrench,
                 const Span<double>& normalized) const {
     double largest = 0.0;
     for (std::size_t i = 0; i < robot_.rows.size(); ++i) {
@@ -198,14 +207,15 @@ class EventRecorder {
     const double strength = share * largest;
     if (strong_share_ * strength > e.strength) {  // all that came before was weak
       std::fill(e.sum.begin(), e.sum.end(), 0.0);
-      e.count = 0;
+      e.count = e.doubted = 0;
     }
     e.strength = std::max(e.strength, strength);
-    if (strength < strong_share_ * e.strength) return;
+    if (strength < strong_share_ * e.strength) return false;
     const std::size_t rows = normalized.size();
     for (std::size_t i = 0; i < rows; ++i) e.sum[i] += normalized[i];
     for (std::size_t i = 0; i < 3; ++i) e.sum[rows + i] += known(wrench[i]);
     ++e.count;
+    return true;
   }
 
   static void classify(LastingEvent& e, const Contact& c, double time) {
@@ -247,6 +257,7 @@ class EventRecorder {
       out.unknowns = e.unknowns;
       if (out.status == Status::not_separable) out.candidates = e.candidates;
     }
+    if (2 * e.doubted > e.count) doubt(out);
     out.zone = out.link >= 0 ? robot_.links[out.link].zone : robot_.segment_zones[e.segment];
     out.clamped = e.clamped                                ? Clamped::yes
                   : out.status == Status::not_separable ? Clamped::unknown

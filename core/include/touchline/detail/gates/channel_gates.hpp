@@ -25,6 +25,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "touchline/detail/gates/fault.hpp"
@@ -66,6 +67,7 @@ class ChannelGates {
         acceleration_(at_.joints),
         blind_(at_.joints),
         same_(2 * at_.joints),
+        spiked_(at_.count(), -std::numeric_limits<double>::infinity()),
         far_(at_.joints),
         since_(at_.count()),
         calm_(at_.count()),
@@ -108,6 +110,9 @@ class ChannelGates {
   bool all_sound() const { return all_sound_; }
   // Of positions and velocities that were not there: what another one stands in for.
   Health absent() const { return absent_; }
+  // Has a channel jumped twice of late since the last call, or been taken at another level, which no
+  // other one bears out?
+  bool take_moved() { return std::exchange(moved_, false); }
   // Per channel; ratio: of its last step over what is believed at once.
   const std::vector<Fault>& faults() const { return fault_; }
   const std::vector<double>& ratios() const { return ratio_; }
@@ -115,6 +120,7 @@ class ChannelGates {
  private:
   static constexpr double kNever = std::numeric_limits<double>::quiet_NaN();
   static constexpr double kShortest = 1e-6;    // [s] of a period
+  static constexpr double kAgain = 0.5;        // [s] within which a second jump is no accident
   int samples(double seconds, int least) const {
     return std::max(least, static_cast<int>(std::lround(std::min(seconds / period_, 1e6))));
   }
@@ -253,6 +259,8 @@ class ChannelGates {
         if (borne_out(c, dt)) return;
         fault_[c] = Fault::spike;
         since_[c] = calm_[c] = 0;
+        moved_ = moved_ || time_ - spiked_[c] < kAgain;
+        spiked_[c] = time_;
         hold(c, dt);
         return;
       case Fault::spike: return go_on_holding(c, dt);
@@ -265,7 +273,8 @@ class ChannelGates {
         calm_[c] = ratio_[c] > 1.0 ? tuning_.sure : std::max(calm_[c] - 1, 0);
         if (calm_[c] == 1 || ++since_[c] >= return_) take(c);
         return;
-      case Fault::disagrees: return;  // see `compare_speeds`
+      case Fault::disagrees:  // see `compare_speeds`
+      case Fault::suspect: return;  // no gate says so
     }
   }
 
@@ -340,7 +349,10 @@ class ChannelGates {
     const bool stays = std::fabs(x - candidate_[c]) <= gate(c);
     calm_[c] = stays && lives(c, candidate_[c]) ? calm_[c] + 1 : 0;
     if (calm_[c] >= tuning_.sure && c >= at_.tau()) {  // a step that lasts
-      if (!witnessed(c)) return take(c);
+      if (!witnessed(c)) {
+        moved_ = true;
+        return take(c);
+      }
       fault_[c] = Fault::step;
       since_[c] = calm_[c] = 0;
       last_[c] = x;
@@ -638,12 +650,13 @@ class ChannelGates {
   std::vector<double> blind_;  // [s] without a position that is believed
   std::vector<double> same_;   // samples for which a position or velocity has been the same
   double follows_[3] = {}, tracked_at_ = kNever;
+  std::vector<double> spiked_;  // when it jumped last [s]
   std::vector<int> far_;
   std::vector<int> since_, calm_;  // samples, of what a fault waits for
   std::vector<Fault> fault_;
   double time_ = kNever, memory_ = 0.0, rate_ = 0.0, kept_ = 0.0;
   int seen_ = 0, warm_up_ = 0, held_most_ = 1, silent_ = 0, return_ = 0, dwell_ = 0, refusals_ = 0;
-  bool all_sound_ = true, any_far_ = false, absurd_ = false;
+  bool all_sound_ = true, any_far_ = false, absurd_ = false, moved_ = false;
   Health absent_ = 0;
 };
 

@@ -19,6 +19,9 @@ enum class Fault : std::uint8_t {
   // Position or velocity of a joint: one is not the derivative of the other. Axis of a sensor:
   // what it shows, another one that would have to feel it too does not.
   disagrees,
+  // It alone explains what is felt, but so would a contact, at one place in thousands: it counts on,
+  // and no contact is sure.
+  suspect,
   absent      // position or velocity of a joint: not there, the other one stands in for it
 };
 

@@ -12,6 +12,7 @@
 #include "touchline/detail/localizer/reports.hpp"
 #include "touchline/detail/localizer/segment_contacts.hpp"
 #include "touchline/detail/localizer/slides.hpp"
+#include "touchline/detail/place/lone_channel.hpp"
 #include "touchline/detail/place/single_contact.hpp"
 
 namespace touchline {
@@ -19,11 +20,12 @@ namespace touchline {
 class Arrivals {
  public:
   Arrivals(SingleContact& single, Measurement& measurement, const LocalizerSettings& settings,
-           JointFit& fit, KnownFit& known, Reports& reports, double period)
+           JointFit& fit, KnownFit& known, Reports& reports, LoneChannel& lone, double period)
       : single_(single),
         measurement_(measurement),
         settings_(settings),
         fit_(fit),
+        lone_(lone),
         known_(known),
         reports_(reports),
         slides_(single, measurement, settings, fit, known, reports),
@@ -42,6 +44,7 @@ class Arrivals {
   template <class Read>
   void follow(SegmentContacts& s, const SegmentSample& now, Read&& read) {
     now_ = now;
+    suspect_ = {};
     Reference& before = s.known.before;
     before.contacts.creep(std::max(0.0, now.time - before.time), now.bandwidth, settings_);
     before.time = now.time;
@@ -61,6 +64,12 @@ class Arrivals {
     }
     read();
     Answer& a = remainder(s);
+    if (!suspect_.any()) suspect_ = suspect_beside_free_forces(s, read);
+    if (suspect_.any()) {  // what has come is no contact, as far as is felt
+      for (int c = 0; c < s.known.contacts.count; ++c) reports_.add(before.contacts.known[c]);
+      s.unexplained.placed.reset();
+      return;
+    }
     if (!placed(a) && changed(s, read)) return;
     if (lets_go(s, a)) return;
     if (a.status == Status::not_separable) free(s, read);
@@ -70,6 +79,9 @@ class Arrivals {
       suspect(s, a);
     }
   }
+
+  // What may have arrived instead of a contact.
+  const Suspect& suspect() const { return suspect_; }
 
  private:
   // Has it been placed for a while, and has it lasted?
@@ -167,7 +179,17 @@ class Arrivals {
     new_lag_ = now_.brief() *
                s.unexplained.age.follow(load, now_.bandwidth, now_.time, settings_.oldest);
     freed_ = false;
+    suspect_ = lone_.find(now_.segment);
     return answer_ = single_.locate(now_.segment, new_lag_, measurement_);
+  }
+
+  // A channel that explains alone what the known contacts leave, their forces free.
+  template <class Read>
+  Suspect suspect_beside_free_forces(SegmentContacts& s, Read&& read) {
+    const JointEstimate& known = s.known.before.contacts;
+    read();
+    fit_.take_out(known, Change::of_forces(known.count, settings_.force_scale), measurement_);
+    return lone_.find(now_.segment, 3 * known.count);
   }
 
   // The same with their forces free, where there are equations enough: three for each, and five.
@@ -220,6 +242,7 @@ class Arrivals {
   Measurement& measurement_;
   const LocalizerSettings& settings_;
   JointFit& fit_;
+  LoneChannel& lone_;
   KnownFit& known_;
   Reports& reports_;
   Slides slides_;
@@ -228,6 +251,7 @@ class Arrivals {
   Answer answer_;
   bool freed_ = false;  // was it found with the forces of the known contacts free?
   double new_lag_ = 0.0;
+  Suspect suspect_;
 };
 
 }  // namespace touchline

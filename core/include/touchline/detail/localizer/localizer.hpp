@@ -26,7 +26,7 @@ class Localizer {
         measurement_(observer, std::move(tests), std::move(noise), settings_),
         single_(observer, measurement_.posture(), settings_, std::move(surfaces)),
         tracks_(single_, measurement_, settings_, measurement_.most_rows(),
-                observer.row_layout().segments, period_),
+                observer.row_layout().segments, period_, observer),
         links_(observer, single_.surfaces(), settings_, measurement_.torque_error(), period_),
         states_(observer.row_layout().segments),
         memories_(observer.row_layout().segments, std::vector<Memory>(Reports::kMost + 1)) {
@@ -139,6 +139,10 @@ class Localizer {
   const Reports& reports() const { return tracks_.reports(); }
   // Of segment g: in which state its contacts are, and which transitions there were.
   const TrackingState& state(int g) const { return states_[g].state; }
+  // A channel that alone would show what is felt, or what known contacts leave of it.
+  const Suspect& suspect() const { return tracks_.suspect(); }
+  // From now on until then [s] a channel tells nothing of contacts where another one does.
+  void leave_out(int channel, double until) { tracks_.leave_out(channel, until); }
 
   // An event: its number, its places, and the joint positions at the time of its position.
   struct Memory {

@@ -10,10 +10,11 @@
 
 namespace touchline {
 
-// What is said of one contact, under its number.
+// What is said of one contact, under its number. `doubted`: one faulty channel would show the same.
 struct Report {
   int serial = -1;
   Answer answer;
+  bool doubted = false;
 };
 
 class Reports {
@@ -27,11 +28,18 @@ class Reports {
   void add(int serial, const Answer& answer) {
     if (count_ == kMost) return;
     reports_[count_].serial = serial;
+    reports_[count_].doubted = false;
     reports_[count_++].answer = answer;
+  }
+  void add_doubted(int serial, const Answer& answer) {
+    if (count_ == kMost) return;
+    add(serial, answer);
+    reports_[count_ - 1].doubted = true;
   }
   void add(const KnownContact& k) {
     if (count_ == kMost) return;
     reports_[count_].serial = k.serial;
+    reports_[count_].doubted = false;
     report(k, surfaces_, reports_[count_++].answer);
   }
   Answer& answer(int i) { return reports_[i].answer; }

@@ -39,9 +39,10 @@ struct Touched {
   std::optional<Search> searched;
 };
 
-// Suspected: since when one contact has explained all [s].
+// Suspected: since when one contact has explained all [s], and when it was last not clear whether
+// a contact is felt, or one faulty channel [s].
 struct Suspected {
-  std::optional<double> explained;
+  std::optional<double> explained, one_channel;
 };
 
 // Two that began at the same instant, until they count as known.

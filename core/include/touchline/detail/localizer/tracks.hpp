@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "touchline/detail/localizer/arrivals.hpp"
@@ -15,6 +16,7 @@
 #include "touchline/detail/localizer/reports.hpp"
 #include "touchline/detail/localizer/segment_contacts.hpp"
 #include "touchline/detail/localizer/twins.hpp"
+#include "touchline/detail/place/lone_channel.hpp"
 #include "touchline/detail/place/past.hpp"
 #include "touchline/detail/place/single_contact.hpp"
 
@@ -23,24 +25,28 @@ namespace touchline {
 class Tracks {
  public:
   Tracks(SingleContact& single, Measurement& measurement, const LocalizerSettings& settings,
-         std::size_t rows, int segments, double period)
+         std::size_t rows, int segments, double period, const Observer& observer)
       : single_(single),
         measurement_(measurement),
         settings_(settings),
+        lone_(observer, measurement),
         fit_(measurement.posture(), single.surfaces(), settings, rows),
         known_(measurement, fit_, settings),
         reports_(single.surfaces()),
         pasts_(segments, Past(measurement.posture().nodes().size(), settings.past_worn)),
-        arrivals_(single, measurement, settings, fit_, known_, reports_, period),
+        arrivals_(single, measurement, settings, fit_, known_, reports_, lone_, period),
         merging_(single.surfaces(), settings, fit_, known_, reports_),
         twins_(single.surfaces(), measurement, settings, fit_, known_, reports_, rows, segments) {}
 
   // One sample of segment g: fills the reports. `read()` takes the measurement anew.
   template <class Read>
-  void follow(SegmentContacts& s, int g, double bandwidth, double time, Read&& read) {
+  void follow(SegmentContacts& s, int g, double bandwidth, double time, Read&& read_all) {
+    const auto read = [&] { return read_all() && lone_.take_out(g, time); };
     reports_.clear();
+    suspect_ = {};
     now_ = {g, bandwidth, time, 0.0};
-    if (!read()) {
+    if (s.known.contacts.count == 0 && !settings_.first_entry && read_all()) suspect_ = lone_.find(g);
+    if (!(suspect_.any() ? read_all() : read())) {
       const JointEstimate& known = s.known.contacts;
       report(known.count > 0 ? known.known[0].serial : s.touched.first, single_.clear());
       return;
@@ -63,9 +69,14 @@ class Tracks {
       case Tracking::several: return several(s, read);
       case Tracking::newcomer:
       case Tracking::sliding:
-      case Tracking::ending: return arrivals_.follow(s, now_, read);
+      case Tracking::ending: return arrive(s, read);
     }
   }
+
+  // A channel that would show alone what is felt in the last sample, or what the known contacts leave.
+  const Suspect& suspect() const { return suspect_; }
+  // From now on until then [s] a channel tells nothing.
+  void leave_out(int channel, double until) { lone_.leave_out(channel, until); }
 
   // Segment g is touched anew.
   int begin(int g) {
@@ -91,6 +102,12 @@ class Tracks {
   void report(const KnownContact& k) { reports_.add(k); }
   void end(int serial) { reports_.end(serial); }
 
+  template <class Read>
+  void arrive(SegmentContacts& s, Read&& read) {
+    arrivals_.follow(s, now_, read);
+    suspect_ = arrivals_.suspect();
+  }
+
   // The segment's contact, if it has only one.
   const Answer& locate(SegmentContacts& s) {
     const Past& past = pasts_[now_.segment];
@@ -101,6 +118,12 @@ class Tracks {
   // --- none is known yet: suspected, pair ---
   void suspected(SegmentContacts& s) {
     const Answer& a = locate(s);
+    if (may_be_one_channel(s, a)) {
+      reports_.add_doubted(s.touched.first, a);
+      if (s.state.is(Tracking::pair)) twins_.forget(s);
+      s.suspected.explained.reset();
+      return;
+    }
     if (a.status == Status::not_separable) return twins_.follow(s, a, now_);
     report(s.touched.first, a);
     if (!placed(a)) {
@@ -133,7 +156,20 @@ class Tracks {
     }
     arrivals_.begin(s, now_);
     read();
-    arrivals_.follow(s, now_, read);
+    arrive(s, read);
+  }
+
+  // Is all that is felt, or was it of late, what one faulty channel would show? Then it takes a contact
+  // that is found for a while to say that there is one after all, or one more: that is another event.
+  bool may_be_one_channel(SegmentContacts& s, const Answer& a) {
+    std::optional<double>& last = s.suspected.one_channel;
+    if (suspect_.any() || (last && !placed(a))) last = now_.time;
+    if (!last) return false;
+    if (now_.time - *last < now_.brief()) return true;
+    last.reset();
+    reports_.end(s.touched.first);
+    s.touched.first = reports_.next();
+    return false;
   }
 
   // Was the contact looked for a moment ago? Filtered noise does not change much in the meantime.
@@ -185,7 +221,7 @@ class Tracks {
     if (!known_.explain(known)) {
       arrivals_.begin(s, now_);
       read();
-      arrivals_.follow(s, now_, read);
+      arrive(s, read);
       return;
     }
     accept(s);
@@ -215,6 +251,8 @@ class Tracks {
   SingleContact& single_;
   Measurement& measurement_;
   const LocalizerSettings& settings_;
+  LoneChannel lone_;
+  Suspect suspect_;
   JointFit fit_;
   KnownFit known_;
   Reports reports_;

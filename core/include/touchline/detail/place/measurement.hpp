@@ -63,6 +63,7 @@ class Measurement {
   bool read(int g, const double* row, const double* normalized) {
     segment_ = g;
     row_ = row;
+    normalized_ = normalized;
     has_wrench_ = observer_.layout().segments[g].sensor >= 0 &&
                   row[layout_.segment_settled() + g] > 0.0 &&
                   std::isfinite(row[layout_.segment_wrench() + 6 * g]);
@@ -108,6 +109,10 @@ class Measurement {
   std::size_t most_rows() const { return 6 + used_.size(); }
   const Posture& posture() const { return posture_; }
   std::size_t tests() const { return offsets_.tests().size(); }
+  const DetectionRow& test(std::size_t i) const { return offsets_.tests()[i]; }
+  // What was read last: its segment, and the detector's normalized rows of all segments, or null.
+  int segment() const { return segment_; }
+  const double* normalized() const { return normalized_; }
 
   // Covariance (6, 6) of the segment's wrench.
   void wrench_covariance(double* out) const {
@@ -406,7 +411,8 @@ class Measurement {
   RowNoise noise_;
 
   int segment_ = 0, count_ = 0, size_ = 0;
-  const double *row_ = nullptr, *drift_ = nullptr, *quiet_ = nullptr, *excess_ = nullptr;
+  const double *row_ = nullptr, *normalized_ = nullptr;
+  const double *drift_ = nullptr, *quiet_ = nullptr, *excess_ = nullptr;
   bool has_wrench_ = false, lasts_ = false;
   double wrench_[6] = {}, raw_wrench_[6] = {};
   std::vector<const SegmentRow*> used_;

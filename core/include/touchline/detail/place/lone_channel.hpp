@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+// Is all that is felt of a segment what one faulty channel would show? Where a force-torque sensor
+// feels a segment, hardly any contact loads one of its axes, or one joint torque, and nothing else:
+// its line would have to meet the sensor's origin along an axis. So the two explanations stand beside
+// each other, and neither is sure. No allocation per sample.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "touchline/detail/gates/fault.hpp"
+#include "touchline/detail/model/dense.hpp"
+#include "touchline/detail/place/measurement.hpp"
+#include "touchline/detail/place/quadratic.hpp"
+
+namespace touchline {
+
+// A channel that alone explains what is felt, and what it would be wrong by [N or Nm].
+struct Suspect {
+  int channel = -1;  // as `ChannelLayout`; -1: there is none
+  double error = 0.0;
+  bool any() const { return channel >= 0; }
+};
+
+class LoneChannel {
+ public:
+  // Of `measurement`, which stays the caller's.
+  LoneChannel(const Observer& observer, Measurement& measurement)
+      : observer_(observer),
+        measurement_(measurement),
+        at_{static_cast<std::size_t>(observer.row_layout().joints), observer.sensors().size()},
+        inner_(observer.sensors().size(), -1),
+        out_until_(at_.count(), -kAbsurd),
+        rows_(measurement.most_rows()),
+        column_(measurement.most_rows()) {
+    for (const Segment& segment : observer.layout().segments) {
+      for (const int outer : segment.successors) inner_[outer] = segment.sensor;
+    }
+  }
+
+  // Of segment g, whose rows the measurement has read. So many of their dimensions explain anything.
+  Suspect find(int g, int free = 0) {
+    const int size = measurement_.size();
+    if (!measurement_.has_wrench() || size - free <= kLeast) return {};
+    measurement_.values(rows_.data(), 1);
+    measurement_.whiten(rows_.data(), 1);
+    all_ = 0.0;
+    for (int i = 0; i < size; ++i) all_ += rows_[i] * rows_[i];
+    most_ = 0.0;
+    best_ = {};
+    visit_channels(g, [this](int channel) { weigh(channel); });
+    const double left = all_ - most_;
+    const double limit = chi2_limit(std::max(1, size - 1 - free), kNoise);
+    if (!best_.any() || left > limit + kShape * kShape * all_) return {};
+    return borne_out() ? best_ : Suspect{};
+  }
+
+  // From now on until then [s] a channel tells nothing.
+  void leave_out(int channel, double until) {
+    out_until_[channel] = until;
+    any_out_ = true;
+  }
+
+  // Takes out of the rows of segment g what such channels say of them; false if nothing is left.
+  bool take_out(int g, double time) {
+    if (!any_out_) return true;
+    any_out_ = std::any_of(out_until_.begin(), out_until_.end(), [&](double t) { return time < t; });
+    if (!any_out_ || !measurement_.has_wrench()) return true;
+    bool good = true;
+    visit_channels(g, [&](int channel) {
+      if (!(time < out_until_[channel])) return;
+      for (int i = 0; i < measurement_.size(); ++i) column_[i] *= kAnything;
+      good = measurement_.spread(column_.data(), 1) && good;
+    });
+    return good;
+  }
+
+ private:
+  static constexpr int kLeast = 5;        // rows: of fewer, a contact leaves nothing over
+  static constexpr double kAnything = 1e3;  // [N, Nm] sigma of what tells nothing
+  static constexpr double kOther = 4.0;   // of the squared error: what feels more, feels something else
+  static constexpr double kNoise = 3.0;   // sigmas of what another channel may show,
+  static constexpr double kShape = 0.03;  // and this part of it: filters turn with the arm
+
+  // Calls `visit(channel)` for all that segment g feels, with what one unit of it does to the rows in
+  // `column_`.
+  template <class Visit>
+  void visit_channels(int g, Visit&& visit) {
+    const Segment& segment = observer_.layout().segments[g];
+    visit_axes(segment.sensor, 1.0, visit);
+    for (const int outer : segment.successors) visit_axes(outer, -1.0, visit);
+    for (int i = 0; i < measurement_.scalars(); ++i) {
+      if (measurement_.joint(i) < 0) continue;
+      std::fill_n(column_.data(), measurement_.size(), 0.0);
+      column_[6 + i] = 1.0;
+      visit(static_cast<int>(at_.tau()) + measurement_.joint(i));
+    }
+  }
+
+  // The axes of a sensor, which this segment feels with a sign. Of one whose log has other axes, a
+  // channel is no axis.
+  template <class Visit>
+  void visit_axes(int sensor, double sign, Visit&& visit) {
+    if (observer_.sensors()[sensor].turned) return;
+    const int node = observer_.sensors()[sensor].node;
+    for (int axis = 0; axis < 6; ++axis) {
+      double unit[6] = {};
+      unit[axis] = sign;
+      const Spatial w = wrench_to_parent(measurement_.posture().pose(node), load(unit));
+      if (sign > 0.0) {  // its own joints do not count on it
+        std::fill_n(column_.data(), measurement_.size(), 0.0);
+        store(w, column_.data());
+      } else {
+        measurement_.load(node, w, 0.0, column_.data(), 1);
+      }
+      visit(static_cast<int>(at_.wrench()) + 6 * sensor + axis);
+    }
+  }
+
+  void weigh(int channel) {
+    const int size = measurement_.size();
+    measurement_.whiten(column_.data(), 1);
+    double along = 0.0, square = 0.0;
+    for (int i = 0; i < size; ++i) {
+      along += column_[i] * rows_[i];
+      square += column_[i] * column_[i];
+    }
+    if (!(square > 0.0) || along * along <= most_ * square) return;
+    most_ = along * along / square;
+    best_ = {channel, along / square};
+  }
+
+  // Does the other segment at the sensor feel the opposite, as it would of an error and would not of
+  // a contact?
+  bool borne_out() const {
+    if (best_.channel < static_cast<int>(at_.wrench())) return true;
+    const int sensor = (best_.channel - static_cast<int>(at_.wrench())) / 6;
+    const int axis = (best_.channel - static_cast<int>(at_.wrench())) % 6;
+    const int own = observer_.layout().segment_of_sensor[sensor];
+    const bool here = own == measurement_.segment();
+    if (here && inner_[sensor] < 0) return true;
+    if (measurement_.normalized() == nullptr) return false;
+    const int other = here ? observer_.layout().segment_of_sensor[inner_[sensor]] : own;
+    const int at = here ? inner_[sensor] : sensor;
+    double unit[6] = {}, shown[6];
+    unit[axis] = here ? -best_.error : best_.error;
+    const Posture& posture = measurement_.posture();
+    const Spatial w = wrench_to_parent(posture.pose(observer_.sensors()[sensor].node), load(unit));
+    store(wrench_to_child(posture.pose(observer_.sensors()[at].node), w), shown);
+    double with = 0.0, without = 0.0, size = 0.0;
+    for (std::size_t i = 0; i < measurement_.tests(); ++i) {
+      const DetectionRow& row = measurement_.test(i);
+      if (row.segment != other || row.component < 0) continue;
+      const double y = measurement_.normalized()[i], x = shown[row.component] / row.contact;
+      without += y * y;
+      with += (y - x) * (y - x);
+      size += x * x;
+    }
+    return with < without || without > kOther * size;
+  }
+
+  const Observer& observer_;
+  Measurement& measurement_;
+  ChannelLayout at_;
+  std::vector<int> inner_;  // per sensor: the next six-axis one inboard; -1: there is none
+  std::vector<double> out_until_;  // per channel [s]
+  bool any_out_ = false;
+  std::vector<double> rows_, column_;  // to the scale of the noise
+  double all_ = 0.0, most_ = 0.0;      // squared lengths: of the rows, and along the best channel
+  Suspect best_;
+};
+
+}  // namespace touchline

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What one channel alone would show is named, and is no sure contact; touches are not suspected."""
+
+import numpy as np
+import pytest
+from test_parity import drifting, heard
+
+import touchline as tl
+from touchline.bench.reliability.recordings import record
+from touchline.result.kinds import Fault
+from touchline.simulation.contacts import Profile, ScriptedContact
+from touchline.simulation.noise import SensorNoise
+from touchline.simulation.scenario import scripted
+from touchline.simulation.scene import Run
+
+BEGIN = 0.6  # s
+
+
+@pytest.fixture(scope="module")
+def arm():
+    robot = tl.load_robot("sara")
+    return robot, tl.Pipeline(robot), record(robot, 1, pushed=False, seconds=1.0).samples
+
+
+@pytest.mark.parametrize("name", ["base.fx", "base.fz", "tau.joint4"])
+def test_a_channel_that_alone_explains_what_is_felt_is_named(arm, name):
+    robot, pipeline, samples = arm
+    wrong = drifting(robot, samples, name)
+    _, told, events = heard(pipeline, wrong)
+    assert told[0].channel == name and told[0].fault == Fault.SUSPECT
+    assert wrong.time[told[0].sample] - BEGIN < 0.2
+    assert events != []
+    for event in events:
+        assert event.level == "contact" and event.status != "located"
+        assert (event.body_probability or 0.0) <= 0.5
+        assert sum(c.probability for c in event.candidates) <= 0.5 + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("link", "force"),
+    [
+        ("link1", [25.0, 0.0, 0.0]),
+        ("link3", [0.0, -20.0, 12.0]),
+        ("link6", [9.0, 0.0, -20.0]),
+        ("tool", [0.0, 0.0, -20.0]),  # along an axis of the wrist sensor: the base feels it, too
+    ],
+)
+def test_a_push_is_not_suspected(arm, link, force):
+    robot, pipeline, _ = arm
+    profile = Profile(BEGIN, 0.3, 0.02, 0.02)
+    push = ScriptedContact(link, np.array([0.0, 0.0, 0.05]), np.array(force), profile)
+    settings = Run(seed=3, noise=SensorNoise(), model_error=0.02, physics=2000.0)
+    _, told, events = heard(pipeline, scripted(robot, [push], 1.0, 0.5, settings).samples)
+    assert told == []
+    assert events != [] and events[0].level == "collision"
+
+
+def test_a_push_beside_a_suspect_is_an_event_of_its_own(arm):
+    """The phantom is one event, the push another: a collision, on the link that is pushed."""
+    robot, pipeline, _ = arm
+    profile = Profile(BEGIN + 0.2, 0.15, 0.02, 0.02)
+    push = ScriptedContact(
+        "link6", np.array([0.0, 0.0, 0.05]), np.array([9.0, 0.0, -20.0]), profile
+    )
+    settings = Run(seed=3, noise=SensorNoise(), model_error=0.02, physics=2000.0)
+    samples = scripted(robot, [push], 1.0, 0.5, settings).samples
+    samples.tau[samples.time > BEGIN - 0.1, 3] += 3.0
+    _, told, events = heard(pipeline, samples)
+    assert {change.channel for change in told} == {"tau.joint4"}
+    began = [event for event in events if event.level == "collision"]
+    assert len(began) == 1 and abs(began[0].detected - BEGIN - 0.2) < 0.03
+    assert [event for event in events if event.detected < BEGIN + 0.1] != []
