@@ -64,14 +64,16 @@ class Arrivals {
     }
     read();
     Answer& a = remainder(s);
-    if (!suspect_.any()) suspect_ = suspect_beside_free_forces(s, read);
+    if (!suspect_.any()) {
+      if (!placed(a) && changed(s, read)) return;
+      if (lets_go(s, a)) return;
+      suspect_ = suspect_beside_free_forces(s, read);
+    }
     if (suspect_.any()) {  // what has come is no contact, as far as is felt
       for (int c = 0; c < s.known.contacts.count; ++c) reports_.add(before.contacts.known[c]);
       s.unexplained.placed.reset();
       return;
     }
-    if (!placed(a) && changed(s, read)) return;
-    if (lets_go(s, a)) return;
     if (a.status == Status::not_separable) free(s, read);
     if (is_found(s, a)) {
       admit(s, a, read);

@@ -47,6 +47,7 @@ class LoneChannel {
     measurement_.whiten(rows_.data(), 1);
     all_ = 0.0;
     for (int i = 0; i < size; ++i) all_ += rows_[i] * rows_[i];
+    if (free > 0 && all_ < chi2_limit(size - free, kArrival)) return {};  // they explain it alone
     most_ = 0.0;
     best_ = {};
     visit_channels(g, [this](int channel) { weigh(channel); });
@@ -80,6 +81,7 @@ class LoneChannel {
   static constexpr int kLeast = 5;        // rows: of fewer, a contact leaves nothing over
   static constexpr double kAnything = 1e3;  // [N, Nm] sigma of what tells nothing
   static constexpr double kOther = 4.0;   // of the squared error: what feels more, feels something else
+  static constexpr double kArrival = 5.0;  // sigmas beyond which known contacts do not explain
   static constexpr double kNoise = 3.0;   // sigmas of what another channel may show,
   static constexpr double kShape = 0.03;  // and this part of it: filters turn with the arm
 
