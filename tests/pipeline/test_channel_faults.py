@@ -175,7 +175,11 @@ def test_a_new_level_of_one_axis_that_lives_is_taken_three_samples_late():
     s.wrench[AT:, 0, 2] += 100.0  # the innermost one
     pipeline = tl.Pipeline(robot_named("sara"))
     run(pipeline, s)
-    assert [(c.sample, str(c.fault)) for c in pipeline.faults] == [(AT, "spike"), (AT + 3, "none")]
+    told = [(c.sample, str(c.fault)) for c in pipeline.faults]
+    assert told[:2] == [(AT, "spike"), (AT + 3, "none")]
+    # Nothing else feels it: it is suspected, and no collision.
+    assert [fault for _, fault in told[2:]] == ["suspect"] and told[2][0] < AT + 50
+    assert [e.level for e in pipeline.events] == ["contact"]
 
 
 def test_a_new_level_that_the_sensor_inboard_does_not_feel_is_left_out():
