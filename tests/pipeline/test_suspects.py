@@ -6,12 +6,12 @@ import pytest
 from test_parity import drifting, heard
 
 import touchline as tl
-from touchline.bench.reliability.recordings import record
 from touchline.result.kinds import Fault
 from touchline.simulation.contacts import Profile, ScriptedContact
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scenario import scripted
 from touchline.simulation.scene import Run
+from touchline.trials.recordings import record
 
 BEGIN = 0.6  # s
 

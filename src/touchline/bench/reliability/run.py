@@ -176,8 +176,9 @@ not the touched one, and is not what the healthy recording says either.
 ```
 
 What a layout cannot tell, `touchline check ROBOT` lists as its parity space. Scale, delay, bias and
-drift of one channel are told where they make it jump or stand still. So are those of one axis of a
-sensor that has another one inboard, which does not feel it. A force at the innermost sensor alone
-is not told: it may be a push on the link that carries it. Nor is a joint torque: a hand may pinch
-the joint.
+drift of one channel are told where they make it jump or stand still. They are also told where that
+channel alone explains what a force-torque sensor's segment feels (`suspect`): a contact does so at
+one place in thousands. Then it is named, and nothing that it explains is a sure contact or a
+collision. It is left out of what is estimated where a sensor inboard contradicts it. With joint
+torques alone nothing of this is told: a push on the first link loads one joint, too.
 """
