@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which channels alone explain what is felt, and have done so for long enough to be told. No
 // allocation per sample.
+// Theory: docs/theory.md, section 3.5.
 #pragma once
 
 #include <algorithm>

@@ -3,6 +3,7 @@
 // feels a segment, hardly any contact loads one of its axes, or one joint torque, and nothing else:
 // its line would have to meet the sensor's origin along an axis. So the two explanations stand beside
 // each other, and neither is sure. No allocation per sample.
+// Theory: docs/theory.md, section 3.5.
 #pragma once
 
 #include <algorithm>
