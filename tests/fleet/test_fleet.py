@@ -43,7 +43,7 @@ def made(robot, tmp_path_factory):
     """Six recordings, of which two are whole, and a list of them."""
     folder = tmp_path_factory.mktemp("logs")
     samples = free_motion(robot, seconds=2.0, rate=200.0)
-    samples = pushed(robot, samples, "link0", slice(200, 300), [30.0, 0.0, 0.0])
+    samples = pushed(robot, samples, "link0", slice(200, 300), [24.0, 18.0, 0.0])
     (folder / "a").mkdir()
     write_table(folder / "a" / "whole.parquet", samples, robot.description)
     write_table(folder / "b.csv.gz", samples, robot.description)

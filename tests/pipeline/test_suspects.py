@@ -70,3 +70,22 @@ def test_a_push_beside_a_suspect_is_an_event_of_its_own(arm):
     began = [event for event in events if event.level == "collision"]
     assert len(began) == 1 and abs(began[0].detected - BEGIN - 0.2) < 0.03
     assert [event for event in events if event.detected < BEGIN + 0.1] != []
+
+
+def test_a_fault_elsewhere_is_no_reason_for_doubt(arm):
+    """A torque that outer links do not load jumps for good: their pushes are as sure as ever."""
+    robot, pipeline, _ = arm
+    profile = Profile(BEGIN, 0.3, 0.02, 0.02)
+    push = ScriptedContact(
+        "handle", np.array([0.0, 0.0, 0.03]), np.array([6.0, -16.0, 9.0]), profile
+    )
+    settings = Run(seed=3, noise=SensorNoise(), model_error=0.02, physics=2000.0)
+    samples = scripted(robot, [push], 1.0, 0.5, settings).samples
+    _, _, (healthy, *_) = heard(pipeline, samples)
+    first = int(np.searchsorted(samples.time, BEGIN - 0.1))
+    samples.tau[first:, 1] = samples.tau[first, 1]  # stuck
+    _, told, events = heard(pipeline, samples)
+    assert {(c.channel, c.fault) for c in told} == {("tau.joint2", Fault.STUCK)}
+    event = next(e for e in events if e.segment == healthy.segment)
+    assert (event.status, event.link, event.level) == ("located", "handle", healthy.level)
+    assert event.body_probability == pytest.approx(healthy.body_probability, abs=0.05)

@@ -14,6 +14,7 @@
 #include "touchline/detail/events/describe.hpp"
 #include "touchline/detail/events/event_recorder.hpp"
 #include "touchline/detail/events/period_watch.hpp"
+#include "touchline/detail/events/suspicion.hpp"
 #include "touchline/detail/gates/suspect_watch.hpp"
 #include "touchline/detail/localizer/localizer.hpp"
 #include "touchline/detail/observer/observer.hpp"
@@ -41,6 +42,7 @@ class Pipeline {
         recorder_(robot_, observer_, localizer_),
         rest_(observer_.row_layout(), tuning_.observer),
         suspects_(robot_, observer_.layout()),
+        suspicions_(robot_.segment_names.size()),
         resets_(observer_.row_layout()),
         period_(robot_.noise.period, tuning_.events),
         levels_(robot_.segment_names.size(), 0.0),
@@ -78,11 +80,11 @@ class Pipeline {
     recorder_.visit_lasting(visit);
   }
 
-  // Events that have begun at `since` or later are doubted until `until` [s]: a channel is not what it
-  // was. What is doubted is no collision, and its link is not sure. No contact becomes a collision then.
-  void doubt(double since, double until) {
-    doubted_since_ = observer_.time() < doubted_until_ ? std::min(doubted_since_, since) : since;
-    doubted_until_ = std::max(doubted_until_, until);
+  // Events of segment g that have begun at `since` or later are doubted until `until` [s]: a channel
+  // that it feels is not what it was. What is doubted is no collision, and its link is not sure. No
+  // contact becomes a collision then.
+  void doubt(std::size_t g, double since, double until) {
+    suspicions_[g].extend(observer_.time(), since, until);
   }
 
   // The posterior over surfaces of the only contact of the last sample; takes milliseconds and
@@ -181,8 +183,8 @@ class Pipeline {
           Contact& contact = contacts_[count_++];
           const LastingEvent* event = recorder_.of(reports[k].serial);
           const double began = event != nullptr ? event->detected : sample.time;
-          const bool unsure = sample.time < doubted_until_;
-          const bool doubted = reports[k].doubted || (unsure && began >= doubted_since_);
+          const bool unsure = suspicions_[segment].lasts(sample.time);
+          const bool doubted = reports[k].doubted || suspicions_[segment].meets(sample.time, began);
           const bool known = event != nullptr && event->level == ContactLevel::collision;
           const bool later = began > classifier_.blow(g) + tuning_.classifier.decide_within;
           fill(contact, g, k, estimate);
@@ -265,7 +267,7 @@ class Pipeline {
   EventRecorder recorder_;
   RestMeter rest_;
   SuspectWatch suspects_;
-  double doubted_since_ = 0.0, doubted_until_ = -kAbsurd;  // [s]
+  std::vector<Suspicion> suspicions_;  // of the segments
   ResetWatch resets_;
   PeriodWatch period_;
   std::vector<double> levels_;  // of the segments, as the classifier takes them

@@ -22,6 +22,7 @@
 #include <utility>
 #include <vector>
 
+#include "touchline/detail/events/suspicion.hpp"
 #include "touchline/detail/gates/channel_gates.hpp"
 #include "touchline/detail/gates/parity_watch.hpp"
 #include "touchline/pipeline.hpp"
@@ -53,6 +54,7 @@ class RedundantPipeline {
     absent_.resize(k, 0);
     row_.resize(whole_.row_layout().width());
     levels_.resize(own.segment_names.size());
+    suspicions_.resize(levels_.size());
     quiet_.resize(levels_.size());
     normalized_.resize(own.rows.size());
     drift_.resize(own.rows.size());
@@ -238,22 +240,50 @@ class RedundantPipeline {
   }
 
   // A channel that comes to be wrong, or right again, or is at another level from now on: what begins
-  // about then may be no contact.
+  // about then where it is felt may be no contact.
   void follow_faults(const std::vector<Fault>& told, double time) {
-    bool news = gates_.take_moved();
     changing_ = false;
     for (std::size_t c = 0; c < told.size(); ++c) {
-      news = news || (told[c] != before_[c] && (is_wrong(told[c]) || is_wrong(before_[c])));
+      const bool news = told[c] != before_[c] && (is_wrong(told[c]) || is_wrong(before_[c]));
+      if (gates_.take_moved(c) || news) doubt_where_felt(c, time);
       before_[c] = told[c];
       changing_ = changing_ || told[c] != Fault::none;
     }
-    if (!news) return;
-    doubted_since_ = time < doubted_until_ ? std::min(doubted_since_, time - kUntold) : time - kUntold;
-    doubted_until_ = time + kDoubtful;
-    whole_.doubt(time - kUntold, time + kDoubtful);
-    for (const std::unique_ptr<Second>& second : stand_ins_)
-      second->pipeline.doubt(time - kUntold, time + kDoubtful);
   }
+
+  void doubt_where_felt(std::size_t channel, double time) {
+    for (std::size_t g = 0; g < suspicions_.size(); ++g) {
+      if (!feels(g, channel)) continue;
+      const double since = time - kUntold, until = time + kDoubtful;
+      suspicions_[g].extend(time, since, until);
+      whole_.doubt(g, since, until);
+      for (const std::unique_ptr<Second>& second : stand_ins_) {
+        const std::vector<int>& told = second->given.segments;  // of its own ones, as told
+        for (std::size_t i = 0; i < told.size(); ++i) {
+          if (second->told_as[g] == told[i]) second->pipeline.doubt(i, since, until);
+        }
+      }
+    }
+  }
+
+  // Is a channel part of what segment g feels? Motion is part of all.
+  bool feels(std::size_t g, std::size_t channel) const {
+    const ChannelLayout& at = gates_.layout();
+    if (channel < at.tau()) return true;
+    if (channel < at.wrench()) {
+      const int joint = static_cast<int>(channel - at.tau());
+      const std::vector<DetectionRow>& rows = whole_.robot().rows;
+      return std::any_of(rows.begin(), rows.end(), [&](const DetectionRow& row) {
+        return row.joint == joint && row.segment == static_cast<int>(g);
+      });
+    }
+    const int sensor = static_cast<int>((channel - at.wrench()) / 6);
+    const Segment& segment = whole_.observer().layout().segments[g];
+    const std::vector<int>& outer = segment.successors;
+    return segment.sensor == sensor || std::find(outer.begin(), outer.end(), sensor) != outer.end() ||
+           whole_.observer().layout().segment_of_sensor[sensor] < 0;  // it makes torques of joints
+  }
+
   static bool is_wrong(Fault fault) {
     return fault == Fault::step || fault == Fault::wild || fault == Fault::stuck ||
            fault == Fault::disagrees;
@@ -516,7 +546,12 @@ class RedundantPipeline {
   }
   // Has an event begun when a channel was not what it was?
   bool is_doubted(const Event& event) const {
-    return whole_.time() < doubted_until_ && event.detected >= doubted_since_;
+    for (std::size_t g = 0; g < suspicions_.size(); ++g) {
+      const bool here = static_cast<int>(g) == event.segment ||
+                        (parts_ != nullptr && parts_->told_as[g] == parts_->told_as[event.segment]);
+      if (here && suspicions_[g].meets(whole_.time(), event.detected)) return true;
+    }
+    return false;
   }
 
   // The number under which an event of the one that speaks is told.
@@ -652,7 +687,7 @@ class RedundantPipeline {
   std::vector<Fault> faults_;         // of gates, parity and what is suspected together
   std::vector<Fault> before_;         // as told of the sample before
   bool changing_ = false;             // is any of these a fault?
-  double doubted_since_ = 0.0, doubted_until_ = -kAbsurd;  // [s] what began then is doubted until then
+  std::vector<Suspicion> suspicions_;  // per segment
   bool contradicted_ = false;         // does any channel count no more?
   ResetWatch resets_;
   std::vector<std::uint32_t> restarts_;  // per joint, then per segment: as told by who speaks

@@ -68,6 +68,7 @@ class ChannelGates {
         blind_(at_.joints),
         same_(2 * at_.joints),
         spiked_(at_.count(), -std::numeric_limits<double>::infinity()),
+        moved_(at_.count()),
         far_(at_.joints),
         since_(at_.count()),
         calm_(at_.count()),
@@ -110,9 +111,9 @@ class ChannelGates {
   bool all_sound() const { return all_sound_; }
   // Of positions and velocities that were not there: what another one stands in for.
   Health absent() const { return absent_; }
-  // Has a channel jumped twice of late since the last call, or been taken at another level, which no
+  // Has channel c jumped twice of late since the last call, or been taken at another level, which no
   // other one bears out?
-  bool take_moved() { return std::exchange(moved_, false); }
+  bool take_moved(std::size_t c) { return std::exchange(moved_[c], 0) != 0; }
   // Per channel; ratio: of its last step over what is believed at once.
   const std::vector<Fault>& faults() const { return fault_; }
   const std::vector<double>& ratios() const { return ratio_; }
@@ -259,7 +260,7 @@ class ChannelGates {
         if (borne_out(c, dt)) return;
         fault_[c] = Fault::spike;
         since_[c] = calm_[c] = 0;
-        moved_ = moved_ || time_ - spiked_[c] < kAgain;
+        if (comparable(c) && time_ - spiked_[c] < kAgain) moved_[c] = 1;
         spiked_[c] = time_;
         hold(c, dt);
         return;
@@ -350,7 +351,7 @@ class ChannelGates {
     calm_[c] = stays && lives(c, candidate_[c]) ? calm_[c] + 1 : 0;
     if (calm_[c] >= tuning_.sure && c >= at_.tau()) {  // a step that lasts
       if (!witnessed(c)) {
-        moved_ = true;
+        moved_[c] = comparable(c);
         return take(c);
       }
       fault_[c] = Fault::step;
@@ -422,6 +423,12 @@ class ChannelGates {
       if (fault_[i] != Fault::none || !(step_[i] == step_[i])) return false;
     }
     return true;
+  }
+
+  // Would a contact that moves it move others, too? Of joint torques alone a push may load one: its
+  // line meets the axes of the others.
+  bool comparable(std::size_t c) const {
+    return c < at_.tau() || c >= at_.wrench() || witness_[c] >= 0;
   }
 
   // Has a position gone on after a whole turn?
@@ -651,12 +658,13 @@ class ChannelGates {
   std::vector<double> same_;   // samples for which a position or velocity has been the same
   double follows_[3] = {}, tracked_at_ = kNever;
   std::vector<double> spiked_;  // when it jumped last [s]
+  std::vector<char> moved_;     // see `take_moved`
   std::vector<int> far_;
   std::vector<int> since_, calm_;  // samples, of what a fault waits for
   std::vector<Fault> fault_;
   double time_ = kNever, memory_ = 0.0, rate_ = 0.0, kept_ = 0.0;
   int seen_ = 0, warm_up_ = 0, held_most_ = 1, silent_ = 0, return_ = 0, dwell_ = 0, refusals_ = 0;
-  bool all_sound_ = true, any_far_ = false, absurd_ = false, moved_ = false;
+  bool all_sound_ = true, any_far_ = false, absurd_ = false;
   Health absent_ = 0;
 };
 

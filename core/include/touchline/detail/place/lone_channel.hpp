@@ -54,7 +54,7 @@ class LoneChannel {
     visit_channels(g, [this](int channel) { weigh(channel); });
     const double left = all_ - most_;
     const double limit = chi2_limit(std::max(1, size - 1 - free), kNoise);
-    if (!best_.any() || left > limit + kShape * kShape * all_) return {};
+    if (!best_.any() || left > limit + kShape * kShape * all_ || left > kLeft * all_) return {};
     return borne_out() ? best_ : Suspect{};
   }
 
@@ -85,6 +85,8 @@ class LoneChannel {
   static constexpr double kArrival = 5.0;  // sigmas beyond which known contacts do not explain
   static constexpr double kNoise = 3.0;   // sigmas of what another channel may show,
   static constexpr double kShape = 0.03;  // and this part of it: filters turn with the arm
+  // Of the squared size: what one channel leaves of a contact that noise, or a gap, nearly hides.
+  static constexpr double kLeft = 0.1;
 
   // Calls `visit(channel)` for all that segment g feels, with what one unit of it does to the rows in
   // `column_`.
