@@ -35,6 +35,7 @@ OFF = 0.35  # of a row's size: beyond it something coarse may be wrong with its 
 WEIGHTS_OFF = 0.05  # the same, of weights
 BETTER = 0.8  # a change that leaves more than this part of what is off explains nothing
 CLEARLY = 0.2  # nor does one that mends less; a wrong sign of one row is 1
+RIGHTED = 0.2  # of what is off: no more is left once the joints are in their right order
 LARGE = 5.0  # a factor beyond it, or below its inverse, is a unit, whatever else is wrong
 UNIT_NEAR = 0.4  # relative, of the common factor of all torques, which loads may change
 MOVED = 0.05  # rad or m; a joint that moved less tells nothing of the sense of its position
@@ -107,6 +108,9 @@ def _torques(robot: Robot, seen: Seen, mending: Mending) -> Step | None:
     dead = {name for kind, name in seen.table.dead() if kind == "tau"}
     measured = judged_joints(robot, windows, dead)
     telling = telling_joints(robot, seen)
+    joints = _joints(robot, seen, mending, telling)
+    if joints is not None:
+        return joints
     units = _units(robot, windows, telling, measured, mending)
     if units is not None:
         return units
@@ -286,6 +290,26 @@ def _positions(robot: Robot, seen: Seen, mending: Mending, measured: list[int]) 
             "model once they are turned; use factor -1 in log: q and qd"
         )
         yield Step((words,), changed, left)
+
+
+def _joints(robot: Robot, seen: Seen, mending: Mending, telling: list[int]) -> Step | None:
+    """Positions and velocities in the opposite order, with the torques or without."""
+    if max(misfit(robot, seen.windows, telling), default=0.0) < OFF:
+        return None
+    steps = []
+    for what, keys, torques in (
+        ("positions, velocities and torques", "q, qd and tau", True),
+        ("positions and velocities", "q and qd", False),
+    ):
+        changed = mending.reversed(torques)
+        left = total_misfit(robot, windows_of(robot, seen, changed), telling)
+        words = f"{what} of all joints seem to be in reversed order: mend log: {keys}"
+        steps.append(Step((words,), changed, left))
+    best = min(steps, key=lambda step: step.left)
+    windows = windows_of(robot, seen, mending)
+    torques = replace(windows, torque=windows.torque[:, ::-1])
+    others = total_misfit(robot, torques, telling), RIGHTED * total_misfit(robot, windows, telling)
+    return best if best.left < min(others) else None
 
 
 def _weights_do(

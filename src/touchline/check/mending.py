@@ -18,6 +18,7 @@ class Mending:
 
     Attributes:
         time: factor of the stamps.
+        joints: (n,) column of the log that holds each joint's position and velocity.
         position: (n,) factors.
         velocity: (n,) factors; NaN: taken from the positions instead.
         order: (n,) column of the log that holds each joint's torque.
@@ -27,6 +28,7 @@ class Mending:
     """
 
     time: float
+    joints: Index
     position: Array
     velocity: Array
     order: Index
@@ -38,15 +40,15 @@ class Mending:
     def none(robot: Robot) -> "Mending":
         """All signals as they are."""
         n, k = len(robot.joint_names), len(robot.sensor_names)
-        ones = np.ones(n)
-        return Mending(1.0, ones, ones, np.arange(n), ones, np.tile(np.eye(6), (k, 1, 1)))
+        ones, own = np.ones(n), np.arange(n)
+        return Mending(1.0, own, ones, ones, own, ones, np.tile(np.eye(6), (k, 1, 1)))
 
     def apply(self, parts: Iterable[Samples]) -> Iterator[Samples]:
         """The mended samples, part by part."""
         turned = [k for k, M in enumerate(self.wrench) if not np.array_equal(M, np.eye(6))]
         for part in parts:
-            time, q = part.time * self.time, part.q * self.position
-            qd = part.qd * self.velocity
+            time, q = part.time * self.time, part.q[:, self.joints] * self.position
+            qd = part.qd[:, self.joints] * self.velocity
             for j in np.flatnonzero(np.isnan(self.velocity)):
                 qd[:, j] = _slope(time, q[:, j])
             wrench = part.wrench.copy() if turned else part.wrench
@@ -58,6 +60,18 @@ class Mending:
                 scale = np.array([joint.sign * joint.gain for joint in joints])
                 tau = tau + gravity_loads(self.weights, q).torque / scale
             yield replace(part, time=time, q=q, qd=qd, tau=tau, wrench=wrench)
+
+    def reversed(self, torques: bool) -> "Mending":
+        """With positions and velocities of the joints in the opposite order; torques, too?"""
+        changed = replace(
+            self,
+            joints=self.joints[::-1],
+            position=self.position[::-1],
+            velocity=self.velocity[::-1],
+        )
+        if not torques:
+            return changed
+        return replace(changed, order=self.order[::-1], torque=self.torque[::-1])
 
     def scaled(self, what: str, joints: list[int] | slice, factor: float) -> "Mending":
         """With the factor of some joints' `position`, `velocity` or `torque` changed."""
