@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
+from accessible import SCHEMES, WIDTHS, look, need_axe, serious
 from prose import REPOSITORY, code, long_sentences
 from prose_of_code import CPP, PYTHON, passages
 
@@ -257,19 +258,36 @@ def test_every_column_that_files_have_is_explained(tmp_path):
     assert set(json.loads((out / "one" / "analysis.json").read_text())) <= told["results.md"]
 
 
-def test_the_site_is_built_without_a_warning_and_loads_nothing_from_elsewhere(tmp_path):
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The site, and what building it said."""
     if importlib.util.find_spec("material") is None:
         assert not os.environ.get("CI"), "scripts/setup.sh installs the group docs"
         pytest.skip("pip install --group docs")
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-d", str(tmp_path)]
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-d", str(folder)]
     done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+    return folder, done
+
+
+def test_the_site_is_built_without_a_warning_and_loads_nothing_from_elsewhere(site):
+    folder, done = site
     assert not re.search("not included in the .nav.", done.stderr), done.stderr
-    page = (tmp_path / "reference" / "python.html").read_text()
+    page = (folder / "reference" / "python.html").read_text()
     assert "body_probability" in page and "load_robot" in page
-    for file in tmp_path.rglob("*.html"):
+    for file in folder.rglob("*.html"):
         loaded = re.findall(r'<(?:script|img|iframe)[^>]* src="(http[^"]*)"', file.read_text())
         assert loaded == []
+
+
+@pytest.mark.parametrize("page", ["tutorial.html", "theory.html", "detection.html"])
+def test_axe_finds_nothing_serious_on_the_site(browser, site, page):
+    need_axe()
+    for width, scheme in zip(WIDTHS, SCHEMES[::-1], strict=True):
+        look(browser, width, scheme)
+        browser.open((site[0] / page).as_uri())
+        assert serious(browser) == []
 
 
 def test_a_package_gets_the_address_it_is_published_from(tmp_path):
