@@ -3,7 +3,7 @@
 PYTHON := .venv/bin/python
 CORE := $(shell find core -name '*.hpp' -o -name '*.cpp' -o -name 'CMakeLists.txt')
 
-.PHONY: demo test test-live check accept format docs wheels acceptance clean
+.PHONY: demo test test-live sanitize check accept format docs wheels acceptance clean
 
 demo: .venv/demo
 	.venv/bin/touchline demo $(ARGS)
@@ -14,6 +14,11 @@ test: .venv/ready
 # With real ROS 2, the public RTDE client and franky, which are large: 300 MB.
 test-live: .venv/live
 	REQUIRE_ROS=1 $(PYTHON) -m pytest -n 2 --dist worksteal tests/live $(ARGS)
+
+# The core's programs under the address, undefined-behaviour and thread sanitizers.
+SANITIZED := $(patsubst %,tests/core/test_%.py,cpp_example replay_example robot_file live_ring)
+sanitize: .venv/ready
+	$(PYTHON) -m pytest -n 2 $(SANITIZED) $(ARGS)
 
 check: .venv/ready
 	.venv/bin/ruff check .
