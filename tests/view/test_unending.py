@@ -1,6 +1,7 @@
 """The live page goes on whatever its visitors do, by mouse or by messages of their own."""
 
 import asyncio
+import os
 import threading
 
 import msgspec
@@ -20,7 +21,7 @@ from touchline.view.live import LivePage
 from touchline.view.methods import METHODS
 from touchline.view.server import PageServer
 
-ACTIONS = 1500
+ACTIONS = int(os.environ.get("ACTIONS", "1500"))  # of three visitors, on three pages
 
 
 @pytest.fixture(scope="module")
