@@ -46,7 +46,7 @@ class Arrivals {
     now_ = now;
     suspect_ = {};
     Reference& before = s.known.before;
-    before.contacts.creep(std::max(0.0, now.time - before.time), now.bandwidth, settings_);
+    before.contacts.creep(std::max(0.0, now.time - before.time), now.bandwidth, settings_, 1.0);
     before.time = now.time;
     before.contacts.age(now.bandwidth, now.time, settings_);
     if (subsided(s)) return;
@@ -99,9 +99,12 @@ class Arrivals {
            s.known.contacts.count < SegmentContacts::kMost;
   }
 
-  // It is reported beside the known ones, but not known yet.
+  // It is reported beside the known ones, but not known yet. What no slide explains for a sample or
+  // two is noise of one that slides.
   void suspect(SegmentContacts& s, Answer& a) {
-    const bool lasting = now_.time - s.unexplained.since >= settings_.suspected * now_.brief();
+    const Unexplained& u = s.unexplained;
+    const double since = u.slide.seen ? std::max(u.since, *u.slide.seen) : u.since;
+    const bool lasting = now_.time - since >= settings_.suspected * now_.brief();
     for (int c = 0; c < s.known.contacts.count; ++c) {
       reports_.add(s.known.before.contacts.known[c]);
       if (lasting && !placed(a)) reports_.doubt_last();
@@ -166,7 +169,7 @@ class Arrivals {
 
   void end(SegmentContacts& s) {
     Known& known = s.known;
-    known.crept = known.restless = now_.time;
+    known.crept = now_.time;
     known.updated = std::max(known.updated, now_.time);
     s.forget_references();
     if (s.unexplained.newcomer) reports_.end(*s.unexplained.newcomer);
@@ -231,8 +234,10 @@ class Arrivals {
     read();
     Change change;
     if (freed_) change = Change::of_forces(old, settings_.force_scale);
-    all.add(found_contact(newcomer, a, single_.surfaces(), s.unexplained.age, now_.brief()),
-            settings_);
+    KnownContact added =
+        found_contact(newcomer, a, single_.surfaces(), s.unexplained.age, now_.brief());
+    added.unrest.expect(all.unrest());
+    all.add(added, settings_);
     fit_.weigh(all, measurement_);
     fit_.begin(measurement_, all);
     fit_.accept(all, change, 1.0);

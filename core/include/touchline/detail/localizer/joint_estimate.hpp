@@ -70,24 +70,55 @@ struct JointEstimate {
   }
 
   // What forces that are held and places that are kept do in a time [s]. A force of which the filter
-  // does not show all yet will go on to change: along its own direction, and about as foreseen.
-  void creep(double passed, double bandwidth, const LocalizerTuning& t) {
+  // does not show all yet will go on to change: along its own direction, and about as foreseen. Unrest grows by `lasts` times what it does from
+  // look to look.
+  void creep(double passed, double bandwidth, const LocalizerTuning& t, double lasts) {
     const int n = size();
     for (int c = 0; c < count; ++c) {
       KnownContact& k = known[c];
-      const double coming = k.coming(bandwidth), unrest = 2.0 * bandwidth * coming * coming;
+      const double coming = k.coming(bandwidth), growth = 2.0 * bandwidth * coming * coming;
+      const double walk = t.tremor + lasts * k.unrest.rate();
       const Vec3 u = (1.0 / std::max(norm(k.force), 1e-9)) * k.force;
-      const double way = bandwidth * k.lag < 1.0 ? 1.0 : -1.0;  // what has grown is young
-      k.force = k.force + way * coming * (1.0 - std::exp(-bandwidth * passed)) * u;
+      k.force = k.force + k.foreseen(passed, bandwidth);
       double* P = covariance + kEach * c * (n + 1);
       for (int i = 0; i < kEach; ++i)
-        P[i * (n + 1)] += passed * (i < 3 ? t.tremor + t.doubt_across * unrest : t.place_creep);
+        P[i * (n + 1)] += passed * (i < 3 ? walk + t.doubt_across * growth : t.place_creep);
       for (int i = 0; i < 3; ++i) {
         for (int j = 0; j < 3; ++j)
-          P[i * n + j] += passed * (t.doubt - t.doubt_across) * unrest *
+          P[i * n + j] += passed * (t.doubt - t.doubt_across) * growth *
                           component(u, i) * component(u, j);
       }
     }
+  }
+
+  // Sees how the forces change, as they are known at a time [s].
+  void watch(double time, double bandwidth, const LocalizerTuning& t) {
+    for (int c = 0; c < count; ++c) {
+      KnownContact& k = known[c];
+      if (count > 1) {
+        k.unrest.conclude(time, bandwidth, t);
+        continue;
+      }
+      const double sigma = force_sigma(c), coming = k.coming(bandwidth);
+      const double doubt = 2.0 * (t.doubt + 2.0 * t.doubt_across) * coming * coming;
+      k.unrest.follow(k.force, sigma * sigma, k.foreseen(1.0 / bandwidth, bandwidth), doubt, time,
+                      bandwidth, t);
+    }
+  }
+
+  // The largest part of a force that the filter does not show yet.
+  double coming(double bandwidth) const {
+    double most = 0.0;
+    for (int c = 0; c < count; ++c)
+      most = std::max(most, known[c].coming(bandwidth) / std::max(norm(known[c].force), 1e-9));
+    return most;
+  }
+
+  // The most restless of the hands: what another may be like.
+  double unrest() const {
+    double most = 0.0;
+    for (int c = 0; c < count; ++c) most = std::max(most, known[c].unrest.rate());
+    return most;
   }
 
   // The places' own covariances, from the joint one; none is sharper than surfaces are, or than the

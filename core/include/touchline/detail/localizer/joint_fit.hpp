@@ -148,6 +148,7 @@ class JointFit {
       for (int j = 0; j < n; ++j) x[i] += P[i * n + j] * independence * b_[j];
     }
     if (independence < 1.0) renew(change, P, x);
+    if (independence > 0.0 && independence < 1.0) tell_corrections(estimate, P, x);
     std::copy(P, P + n * n, estimate.covariance);
     for (int c = 0; c < estimate.count; ++c) {
       const double* own = x + kEach * c;
@@ -226,6 +227,18 @@ class JointFit {
       }
     }
     for (int i = 0; i < width; ++i) m.whiten(d + i, width);
+  }
+
+  // What a sample with the covariance P after it has corrected the forces by.
+  static void tell_corrections(JointEstimate& estimate, const double* P, const double* x) {
+    const int n = estimate.size();
+    for (int c = 0; c < estimate.count; ++c) {
+      double expected = 0.0;
+      for (int i = kEach * c; i < kEach * c + 3; ++i)
+        expected += std::max(0.0, estimate.covariance[i * (n + 1)] - P[i * (n + 1)]);
+      const double* by = x + kEach * c;
+      estimate.known[c].unrest.correct({by[0], by[1], by[2]}, expected);
+    }
   }
 
   // What was known before the sample, as information, in `prior_`.

@@ -37,6 +37,81 @@ class Age {
   double time_ = 0.0;
 };
 
+// How restless a hand's force is, as seen: people do not keep a force. No allocation.
+class Unrest {
+ public:
+  // What the variance of each axis of the force grows by [N2/s].
+  double rate() const { return rate_; }
+  // A hand of which nothing has been seen may be like another one.
+  void expect(double rate) { rate_ = rate; }
+
+  // The force of a sole contact, which each sample tells anew [N], at `time` [s]: `variance` of all its
+  // axes [N2], what it is foreseen to change by within 1 / K [N], and what that may err by [N2].
+  void follow(const Vec3& force, double variance, const Vec3& foreseen, double doubt, double time,
+              double bandwidth, const LocalizerTuning& t) {
+    const double passed = time - time_;
+    if (time_ >= 0.0 && passed * bandwidth < 1.0 - 1e-6) return;
+    if (time_ >= 0.0 && passed * bandwidth < kLost) {
+      const Vec3 way = force - foreseen_;
+      take(dot(way, way), variance + variance_, passed, t.unrest_memory);
+      if (looks_ >= kFew)
+        rate_ = moved_ > t.unrest_clear * expected_ ? (moved_ - expected_) / 3.0 : 0.0;
+    } else {
+      forget();
+    }
+    time_ = time;
+    foreseen_ = force + foreseen;
+    variance_ = variance + doubt;
+  }
+
+  // What a sample has corrected a force by that is followed beside others [N], and what the square of
+  // that was expected to be [N2].
+  void correct(const Vec3& by, double expected) {
+    corrected_ = corrected_ + by;
+    block_ += expected;
+  }
+
+  // Concludes from the corrections every 2 / K, over which they are as if independent. Where they are
+  // larger than expected the hand is more restless; an axis that nothing tells of says nothing.
+  void conclude(double time, double bandwidth, const LocalizerTuning& t) {
+    const double passed = time - time_;
+    if (time_ >= 0.0 && passed * bandwidth < 2.0 - 1e-6) return;
+    if (time_ >= 0.0 && passed * bandwidth < kLost) {
+      take(dot(corrected_, corrected_), block_, passed, t.unrest_memory);
+      const double ratio = t.unrest_lasts * moved_ / std::max(expected_, 1e-12);
+      if (ratio > t.unrest_more) rate_ *= std::min(ratio, t.unrest_step);
+      if (ratio < 1.0) rate_ *= std::max(ratio, 1.0 / t.unrest_step);
+    } else {
+      forget();
+    }
+    time_ = time;
+    corrected_ = {};
+    block_ = 0.0;
+  }
+
+ private:
+  static constexpr double kLost = 4.0;  // times 1 / K: after a longer break it begins anew
+  static constexpr int kFew = 2;        // looks
+
+  void take(double square, double expected, double passed, double memory) {
+    seen_ = std::min(seen_ + passed, memory);
+    const double news = std::min(1.0, passed / seen_);
+    moved_ += (square / passed - moved_) * news;
+    expected_ += (expected / passed - expected_) * news;
+    ++looks_;
+  }
+
+  void forget() {
+    moved_ = expected_ = seen_ = 0.0;
+    looks_ = 0;
+  }
+
+  Vec3 foreseen_, corrected_;
+  double rate_ = 0.0, time_ = -1.0, variance_ = 0.0, block_ = 0.0;
+  double moved_ = 0.0, expected_ = 0.0, seen_ = 0.0;  // of both the rate [N2/s], over how long [s]
+  int looks_ = 0;
+};
+
 // Symmetric, of the two tangent coordinates of a place [m2].
 struct Spread {
   double a = 0.0, b = 0.0, c = 0.0;  // 00, 01, 11
@@ -55,6 +130,7 @@ struct KnownContact {
   Spread lasting;      // of it, by errors that all samples have in common: it gets no smaller
   double lag = 0.0;    // how old that is which the force speaks of [s]
   Age age;
+  Unrest unrest;
   // How much of a force that has changed the filter does not show yet [N]. After a step at x = K t
   // what is still to come is exp(-x), and the age falls short of 1 / K by x times that.
   double coming(double bandwidth) const {
@@ -62,6 +138,12 @@ struct KnownContact {
     if (!(y > 1e-9)) return 0.0;
     const double least = std::max(0.0, -std::log(y));
     return norm(force) * y / std::max(1.0, least + std::log(least + 1.2));
+  }
+  // What it is foreseen to change by in a time [s]: along its own direction.
+  Vec3 foreseen(double passed, double bandwidth) const {
+    const double way = bandwidth * lag < 1.0 ? 1.0 : -1.0;  // what has grown is young
+    const double change = way * coming(bandwidth) * (1.0 - std::exp(-bandwidth * passed));
+    return (change / std::max(norm(force), 1e-9)) * force;
   }
   std::optional<double> gone;  // since when there is no force [s]
   // What was said when it was found: its other explanations keep their places on their links.

@@ -63,7 +63,6 @@ struct Known {
   // sample tells nothing new for 1 / K.
   double updated = 0.0;
   double crept = 0.0;     // up to when the contacts may have crept: their process noise [s]
-  double restless = 0.0;  // when a force changed last [s]
   Reference now, before;
   std::optional<double> met;  // since when two contacts are one place [s]
 };
@@ -137,14 +136,14 @@ struct SegmentContacts {
 
   // What may have become of the contacts up to an instant.
   void creep(const SegmentSample& now, const LocalizerTuning& t) {
-    known.contacts.creep(std::max(0.0, now.time - known.crept), now.bandwidth, t);
+    known.contacts.creep(std::max(0.0, now.time - known.crept), now.bandwidth, t, t.unrest_lasts);
     known.crept = now.time;
   }
 
   // All that the sample of this instant tells has been taken over.
   void know(const SegmentSample& now) {
     known.updated = now.time + now.brief();
-    known.crept = known.restless = now.time;
+    known.crept = now.time;
     forget_references();
   }
 

@@ -82,6 +82,8 @@ class Slides {
       slide.rests = time;
       rest(slide.rested = before, slider);
     } else if (time - *slide.rests >= rest_time(s, slider) * brief) {
+      read();  // when it came to rest the filter still showed where it was before
+      rest(slide.rested = before, slider);
       s.known.contacts = slide.rested;
       return Outcome::rests;
     }
@@ -116,7 +118,9 @@ class Slides {
   // Contact c is where it was found now.
   void rest(JointEstimate& contacts, int c) {
     KnownContact& k = contacts.known[c];
+    const Unrest unrest = k.unrest;
     k = found_contact(k.serial, answer_, single_.surfaces(), k.age, k.lag);
+    k.unrest = unrest;
     contacts.forget(c, settings_);
     fit_.weigh(contacts, measurement_);
     fit_.begin(measurement_, contacts);

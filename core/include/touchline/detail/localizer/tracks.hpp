@@ -206,10 +206,10 @@ class Tracks {
     Known& known = s.known;
     const double passed = std::max(0.0, std::min(now_.time - known.updated, now_.brief()));
     if (passed > 0.0) known.updated = now_.time;
-    if (!known_.held()) known.restless = now_.time;
     fit_.accept(known.contacts, known_.change(), 0.5 * now_.bandwidth * passed);
-    const bool calm = now_.time - known.restless > 2.0 * now_.brief();
-    s.refer(now_.time, (calm ? settings_.lasting : settings_.refit) * now_.brief());
+    known.contacts.watch(now_.time, now_.bandwidth, settings_);
+    const bool risen = known.contacts.coming(now_.bandwidth) < settings_.risen_note;
+    s.refer(now_.time, (risen ? settings_.lasting : settings_.refit) * now_.brief());
   }
 
   // --- several are known ---

@@ -19,9 +19,13 @@ struct LocalizerTuning {
   // Times 1 / K between searches; in between the same places are looked at. Half: time. Double: a
   // face that comes into question is met later.
   double look = 0.35;
-  // Times 1 / K: how old a note of what is known gets while no force changes. Half: the rise of a
-  // newcomer is in it. Double: what crept since is missing.
+  // Times 1 / K: how old a note of what is known gets once forces have risen. Half: the rise of a
+  // newcomer, or the first millimetres of a slide taken for a change of force, are in it. Double:
+  // what crept since is missing.
   double lasting = 2.0;
+  // They have, when the filter lacks less than this part. Half: a slide in the first tenth of a second
+  // breaks off. Double: a newcomer in it is placed with a force that was not whole.
+  double risen_note = 1e-4;
   // Places that differ by less are the same [m]: no mesh is better. Half or double: noise-free
   // only.
   double same_place = 2e-3;
@@ -51,6 +55,21 @@ struct LocalizerTuning {
   // Of forces that are held [N2/s]: a hand trembles by 0.02 N in a second. Half: regions of several
   // contacts get too small where forces walk. Double: too wide.
   double tremor = 3e-4;
+  // How restless a hand is follows from its last moments [s]: three waves of one that trembles at 10
+  // Hz. Half: it wavers. Double: a step counts as unrest for longer.
+  double unrest_memory = 0.3;
+  // A sole force must have moved by so many times what noise lets expect, squared: two looks do
+  // once in 3000 by chance. Half: steady hands are followed with less care. Double: a second
+  // contact beside a hand that trembles by 0.1 N is placed too surely.
+  double unrest_clear = 4.0;
+  // And of several, the corrections of a force, squared: then its unrest grows, at most so many
+  // times in 2 / K. Half: it grows by chance, or slowly. Double: late, or by leaps.
+  double unrest_more = 2.0;
+  double unrest_step = 4.0;
+  // Places are learnt over many looks, and a tremor of 1 to 10 Hz goes one way for several. The
+  // variance of a restless force then grows by so many times the sum over looks. Half: regions of
+  // trembling contacts are too small. Double: a second one passes for the first's unrest.
+  double unrest_lasts = 3.0;
   // Doubt of how much a force that rises still changes, and of its direction, in parts of the
   // variance foreseen. Half: too sure in the rise. Double: too wide there.
   double doubt = 0.05;
@@ -132,6 +151,7 @@ struct LocalizerTuning {
     v("refit", "1/K", t.refit);
     v("look", "1/K", t.look);
     v("lasting", "1/K", t.lasting);
+    v("risen_note", "1", t.risen_note);
     v("same_place", "m", t.same_place);
     v("agree_sigmas", "sigmas", t.agree_sigmas);
     v("suspected", "1/K", t.suspected);
@@ -140,6 +160,11 @@ struct LocalizerTuning {
     v("gate_arrival", "sigmas", t.gate_arrival);
     v("anywhere", "m2", t.anywhere);
     v("tremor", "N2/s", t.tremor);
+    v("unrest_memory", "s", t.unrest_memory);
+    v("unrest_clear", "1", t.unrest_clear);
+    v("unrest_more", "1", t.unrest_more);
+    v("unrest_step", "1", t.unrest_step);
+    v("unrest_lasts", "1", t.unrest_lasts);
     v("doubt", "1", t.doubt);
     v("doubt_across", "1", t.doubt_across);
     v("sharpest", "m2", t.sharpest);
