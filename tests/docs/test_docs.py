@@ -288,6 +288,8 @@ def test_axe_finds_nothing_serious_on_the_site(browser, site, page):
         look(browser, width, scheme)
         browser.open((site[0] / page).as_uri())
         assert serious(browser) == []
+        colours = {"light": "default", "dark": "slate"}[scheme]
+        assert browser.run("document.body.dataset.mdColorScheme") == colours
 
 
 def test_a_package_gets_the_address_it_is_published_from(tmp_path):
