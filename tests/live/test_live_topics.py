@@ -2,6 +2,7 @@
 """The merging of unsynchronised messages and what is published, in native threads, without ROS."""
 
 import json
+import time
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from touchline.model.robot import load_robot
 from touchline.native import core
 
 JOINTS, WRIST = 1, 2  # topics
+WAIT = 0.5e-3  # s; half of what a joint state waits for its wrenches
 LOG = (
     "log:\n  joint_names: {joint1: a1}\n  tau: {column: 'x.{joint}', factor: 0.001}\n"
     "  sensors: {wrist: {fx: {column: w, factor: -1.0}}}\n"
@@ -94,10 +96,12 @@ def test_a_wrench_that_comes_late_does_not_replace_a_newer_one(merged):
 def test_joint_states_wait_for_wrenches_of_their_own_stamp(merged):
     fresh = []
     for i in range(40):
-        at = 1.0 + 0.01 * i
+        at, begun = 1.0 + 0.01 * i, time.monotonic()
         merged.state(at)  # first the joint state, then at once its wrench
         merged.wrench(at)
-        fresh.append(merged.next().ages[0] == 0.0)
+        in_time = time.monotonic() - begun < WAIT  # a busy machine may hold the test up
+        own = merged.next().ages[0] == 0.0
+        fresh.append(own or not in_time)
         merged.noted(2)
     assert all(fresh[5:])  # it has to be seen first that they come so
 
