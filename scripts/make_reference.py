@@ -18,6 +18,7 @@ from touchline.cli.bench import BENCHMARKS
 from touchline.cli.explained import default_text, explanation, types_of
 from touchline.cli.main import COMMANDS
 from touchline.health import HEALTH_MEANING, Health
+from touchline.model.learned_rest import LARGEST
 from touchline.model.meanings import MEANINGS, accepted_keys
 from touchline.report.outputs import CONTACT_SCHEMA
 from touchline.result.contact import Candidate, Contact
@@ -61,6 +62,13 @@ LOG_COLUMNS = [
     ("arrival", "number", "s", "none", "When the sample came, by the recorder's clock."),
     ("sequence", "whole number", "", "none", "Number of the sample at its source."),
     ("SENSOR.age", "number", "s", "none", "How much older its wrench was than the sample."),
+]
+REST = [  # of `learned_rest`; one row is one node of a joint's table
+    ("joint", "text", "", "Name of an observed joint."),
+    ("q", "number", "rad or m", "Its position at the node."),
+    ("qd", "number", "rad/s or m/s", "Its velocity there."),
+    ("torque", "number", "Nm or N", "What the torque has beside the model."),
+    ("doubt", "number", "Nm or N", "1 sigma of that."),
 ]
 POSTURES = [
     ("time", "number", "s", "Time stamp of the sample."),
@@ -231,7 +239,14 @@ def robot_yaml() -> str:
         + table("key|type|unit|default|meaning", rows)
         + "\nA *column* is a name, or `{column: NAME, factor: F}` where values times F are in SI "
         "units. A *column pattern* is the same with placeholders; a list has one column for each "
-        "joint or axis.\n"
+        "joint or axis.\n\n"
+        "## NAME_rest.csv\n\n"
+        "`learned_rest` names a CSV file with these columns, in this order. `touchline calibrate "
+        "--learn` writes it.\n\n"
+        + table("column|type|unit|meaning", [[f"`{name}`", *more] for name, *more in REST])
+        + f"\nThe nodes of a joint are a grid of positions and velocities, {LARGEST} at most, and "
+        "at least two by two. Between nodes the torque is bilinear. On the edges of the grid it "
+        "must be 0, and beyond them it is 0. A joint without rows has no table.\n"
     )
 
 

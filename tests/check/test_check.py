@@ -15,6 +15,7 @@ from touchline.check.run import check
 from touchline.cli.main import main
 from touchline.logs import write_table
 from touchline.model.robot import Robot
+from touchline.observer.dynamics import gravity_loads
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 
@@ -163,12 +164,17 @@ def test_a_mistake_is_named_alone(tmp_path, robot, recording, mistake):
     assert len(findings_of(tmp_path, robot, changed(recording, **changes))) == 1
 
 
-def test_a_sensor_logged_in_world_axes(tmp_path, robot, recording):
-    turned = recording.wrench.copy()
-    for i, q in enumerate(recording.q):
+def in_world_axes(robot, samples):
+    """The recording as a driver logs it that gives the wrist's wrench in world axes."""
+    turned = samples.wrench.copy()
+    for i, q in enumerate(samples.q):
         R = robot.sensor_poses(q)[WRIST, :3, :3]
         turned[i, WRIST] = np.concatenate([R @ turned[i, WRIST, :3], R @ turned[i, WRIST, 3:]])
-    findings = findings_of(tmp_path, robot, replace(recording, wrench=turned))
+    return replace(samples, wrench=turned)
+
+
+def test_a_sensor_logged_in_world_axes(tmp_path, robot, recording):
+    findings = findings_of(tmp_path, robot, in_world_axes(robot, recording))
     assert len(findings) == 1
     assert "sensor wrist" in findings[0] and "frame: world" in findings[0]
 
@@ -206,6 +212,14 @@ def offset(values):
     values[:, 2] += 6.0
 
 
+def late(tau):
+    tau[3:] = tau[:-3].copy()
+
+
+def biased(values):
+    values[:, WRIST, 0] += 7.0
+
+
 FIXABLE = {
     "torque sign": ({"tau": scale((2,), -1.0)}, {"joints": {"joint3": {"sign": -1.0}}}),
     "all torques in mNm": (
@@ -216,6 +230,11 @@ FIXABLE = {
     "polarity": (
         {"wrench": upside_down},
         {"force_torque_sensors": {"wrist": {"polarity": "inboard"}}},
+    ),
+    "delay": ({"tau": late}, {"joints": {f"joint{i}": {"delay": 0.03} for i in range(1, 8)}}),
+    "sensor bias": (
+        {"wrench": biased},
+        {"force_torque_sensors": {"wrist": {"bias": [7.0, 0.0, 0.0, 0.0, 0.0, 0.0]}}},
     ),
 }
 
@@ -232,8 +251,29 @@ def test_what_has_a_key_is_mended(tmp_path, robot, recording, mistake):
         for entry in entries[key]:
             for name, value in names.get(entry.name, {}).items():
                 found = getattr(entry, name)
-                assert found == (value if isinstance(value, str) else pytest.approx(value, 0.02))
+                near = value if isinstance(value, str) else pytest.approx(value, rel=0.02, abs=1e-3)
+                assert found == (pytest.approx(value, abs=0.1) if name == "bias" else near)
     assert check(fixed, log).findings == []
+
+
+def mended(tmp_path, robot, samples):
+    """The description that `--fix` writes; nothing is wrong with the recording then."""
+    log, fixed = tmp_path / "log.parquet", tmp_path / "fixed.yaml"
+    write_table(log, samples, robot.description)
+    assert main(["check", "sara-full", str(log), "--fix", str(fixed)]) == 1
+    assert check(fixed, log).findings == []
+    return tl.load_robot(fixed).description
+
+
+def test_the_frame_of_a_log_is_mended(tmp_path, robot, recording):
+    sensors = mended(tmp_path, robot, in_world_axes(robot, recording)).sensors
+    assert [sensor.frame for sensor in sensors] == ["sensor", "world", "sensor"]
+
+
+def test_torques_without_gravity_are_mended(tmp_path, robot, recording):
+    light = recording.tau - gravity_loads(robot, recording.q).torque
+    joints = mended(tmp_path, robot, replace(recording, tau=light)).joints
+    assert {joint.compensated for joint in joints} == {"gravity"}
 
 
 def test_a_tool_that_is_modelled_but_not_mounted(tmp_path, robot, recording):

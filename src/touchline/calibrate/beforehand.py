@@ -3,11 +3,15 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from touchline.calibrate.recordings import Recordings
 from touchline.check.coarse import next_step
 from touchline.check.mending import Mending
 from touchline.check.seen import look
 from touchline.errors import InputError
+from touchline.identify.choice import POSES
+from touchline.identify.evidence import Evidence
 from touchline.model.robot import Robot
 
 
@@ -30,5 +34,24 @@ def refuse_wrong_signals(robot: Robot, recordings: Recordings, logs: list[Path])
                 *problems,
                 "nothing written: mend this first (touchline check ROBOT LOG, --fix), or name the "
                 "recordings of one robot alone; --trust takes the signals as they are",
+            ]
+        )
+
+
+def refuse_one_pose(evidence: Evidence) -> None:
+    """Refuses recordings of a single pose, in which an offset and a mass read the same.
+
+    Raises:
+        InputError: what to record instead.
+    """
+    moved = float(np.ptp(evidence.q, axis=0).max(initial=0.0))
+    if moved < POSES:
+        raise InputError(
+            [
+                f"the recordings show one pose: no joint moves by more than {moved:.2g} rad, "
+                f"{POSES:g} rad are needed. An offset of a sensor then reads the same as a mass",
+                "nothing written: record a minute in which all joints move, or let the arm rest in "
+                "some ten poses for three seconds each (touchline calibrate --plan ROBOT proposes "
+                "both); --no-identify measures noise and thresholds of this pose alone",
             ]
         )

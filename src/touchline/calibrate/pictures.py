@@ -77,7 +77,7 @@ def _friction(found: Identification) -> Any:
         axes.axis("off")
     for axes, j in zip(panels, joints, strict=False):
         own = [c for c in columns if c.row == j]
-        explained = sum(found.solution.value(c.kind, j) * column_of(part, c) for c in own)
+        explained = sum(found.solution.value(c.kind, j) * column_of(part, c, j) for c in own)
         # What the joint shows beside all other parameters has the sign of a reading.
         axes.plot(speed[:, j], explained - left[:, j], ".", ms=1.5, color=BEFORE, rasterized=True)
         most = float(np.abs(speed[:, j]).max())

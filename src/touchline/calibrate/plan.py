@@ -23,7 +23,7 @@ from touchline.model.surface import mechanism_surfaces
 from touchline.observer.dynamics import inverse_dynamics
 from touchline.observer.samples import Samples
 
-SECONDS = 40.0
+SECONDS = 60.0
 RATE = 100.0  # samples a second
 HARMONICS, CYCLES = 5, 3  # of the series, and how often it runs
 MARGIN = 0.1  # of a joint's range that stays free at either end

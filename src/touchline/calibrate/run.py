@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from touchline.calibrate.beforehand import refuse_wrong_signals
+from touchline.calibrate.beforehand import refuse_one_pose, refuse_wrong_signals
 from touchline.calibrate.blame import find_blame, often_off
 from touchline.calibrate.held_out import HeldOut, judge, split
 from touchline.calibrate.noise import measure_noise, noise_keys
@@ -30,6 +30,7 @@ from touchline.folder import check_file
 from touchline.identify.delay import Delay, find_delays, with_delays
 from touchline.identify.described import description_changes, identified_robot
 from touchline.identify.evidence import filtered, gather
+from touchline.identify.frame import FrameError, find_frames, joined, with_frames
 from touchline.identify.identification import Identification, identify, rms
 from touchline.identify.rest import Rest, grids_of, with_rest
 from touchline.identify.rest import learn as learn_rest
@@ -46,6 +47,7 @@ SHORT = (
     "written instead: what one residual of a hundred exceeds, and the tail of normal values beyond "
     "it; how often that is exceeded only a longer recording tells"
 )
+TURNS = 2  # times that frames are looked for: the first finds them but for the square of the angle
 ROUNDS = 4  # of leaving out what seems to be touched
 
 
@@ -86,6 +88,7 @@ class Calibration:
         thresholds: None where the data are too short for them.
         lacking: why there are none, and what was taken instead.
         delays: that were found beside it.
+        frames: of sensors that were found to be off.
         rest: what was learned of what is left; None if that was not asked for.
     """
 
@@ -101,6 +104,7 @@ class Calibration:
     thresholds: Thresholds | None
     lacking: str = ""
     delays: tuple[Delay, ...] = ()
+    frames: tuple[FrameError, ...] = ()
     rest: Rest | None = None
 
     @property
@@ -156,13 +160,23 @@ def calibrate(
     found: Identification | None = None
     left_out: list[tuple[int, float, float]] = []
     delays: list[Delay] = []
+    frames: list[FrameError] = []
     rest: Rest | None = None
     if identification:
         described = model
         evidence = gather(model, recordings.all("equations"))
+        refuse_one_pose(evidence)
         delays = find_delays(evidence)
         if delays:
             model = with_delays(model, delays)
+            recordings = Recordings(model, logs)
+            evidence = gather(model, recordings.all("equations"))
+        for _ in range(TURNS):
+            off = find_frames(evidence)
+            if not off:
+                break
+            frames = joined(frames, off)
+            model = with_frames(model, off)
             recordings = Recordings(model, logs)
             evidence = gather(model, recordings.all("equations"))
         found = identify(evidence, trust)
@@ -224,6 +238,7 @@ def calibrate(
         thresholds,
         lacking,
         tuple(delays),
+        tuple(frames),
         rest,
     )
 

@@ -3,10 +3,13 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from touchline.calibrate.run import Calibration, Thresholds
 from touchline.detector.limits import threshold
 from touchline.detector.residual_noise import residual_noise
 from touchline.detector.thresholds import make_thresholds, row_name
+from touchline.identify.frame import FrameError
 from touchline.identify.summary import identification_lines, rest_lines
 from touchline.model.robot import Robot
 from touchline.model.values import METHODS
@@ -29,7 +32,8 @@ def summary_text(result: Calibration) -> str:
             + " than the positions"
             for x in result.delays
         ]
-        parts.append(identification_lines(result.identification, late))
+        off = [line for frame in result.frames for line in _frame_lines(frame)]
+        parts.append(identification_lines(result.identification, late + off))
     if result.rest is not None:
         parts.append(rest_lines(result.rest, result.robot.joint_names))
     parts.append(_noise_lines(result))
@@ -40,6 +44,19 @@ def summary_text(result: Calibration) -> str:
         parts += [_row_lines(result), _threshold_lines(result), _held_out_lines(result)]
     parts.append([f"written: {result.out}"])
     return "\n\n".join("\n".join(lines) for lines in parts if lines)
+
+
+def _frame_lines(frame: FrameError) -> list[str]:
+    """How far a sensor's frame is off, in its own axes."""
+    lines = []
+    for what, values, errors, unit in (
+        ("turned by", np.degrees(frame.turn), np.degrees(frame.turn_error), "degrees"),
+        ("shifted by", 1e3 * frame.shift, 1e3 * frame.shift_error, "mm"),
+    ):
+        if errors.any():
+            told = ", ".join(f"{x:.2f}" for x in values)
+            lines.append(f"  {frame.name}: {what} [{told}] +- {errors.max():.2g} {unit}: pose")
+    return lines
 
 
 def _left_out_lines(result: Calibration) -> list[str]:

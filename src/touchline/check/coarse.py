@@ -113,7 +113,11 @@ def _torques(robot: Robot, seen: Seen, mending: Mending) -> Step | None:
         return joints
     units = _units(robot, windows, telling, measured, mending)
     if units is not None:
-        return units
+        # What a swinging joint needs beside its weight can look like a part of all that it needs.
+        left = total_misfit(robot, windows_of(robot, seen, units.mending), telling)
+        light = list(_weightless(robot, windows, telling, mending))
+        if not light or left <= light[0].left:
+            return units
     rows = misfit(robot, windows, telling)
     outside = {p[0] for p in seen.table.outside_limits(robot)}
     if max(rows, default=0.0) < OFF and not outside:

@@ -39,7 +39,7 @@ def calibrate(
     Stretches in which something seems to touch the robot are left out and listed. Where most of a
     recording seems touched it is refused, with the row that stands out.
 
-    With --plan ROBOT it proposes a motion of 40 s instead, within the limits of joints, speeds,
+    With --plan ROBOT it proposes a motion of a minute instead, within the limits of joints, speeds,
     torques and of the arm's own links, and foretells what it will identify. It writes the motion
     into the folder --out: as a table, as a JointTrajectory (YAML, JSON) and as Python lists; for an
     arm with force-torque sensors also poses to rest in.

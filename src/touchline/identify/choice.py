@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How much of a robot the data can tell: chosen by cross-validation over blocks of time."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,6 +30,8 @@ CORRELATED = 0.2  # equations closer than the filter's memory repeat each other
 HUBER = 3.0  # usual sigmas beyond which an equation loses weight
 LEAST_SCATTER = 0.002  # of the row's largest reading: no model foretells more closely than this
 POSES = 0.1  # rad; joints that all moved less show one pose, which tells no inertia
+MANY = 5.0  # times a bias is less sure beside masses: then it may be one
+OFFSET, OFFSET_SHARE = 0.1, 0.003  # N or Nm, or of the row's largest reading: less matters little
 BETTER = 1.0  # standard errors by which a larger model must win
 
 
@@ -93,6 +95,10 @@ class Chooser:
         """Every column that any row may have, and inertias that may leave the model's somewhat."""
         return Problem(self.rich, self._bodies(sigma))
 
+    def loaded(self) -> Problem:
+        """The richest problem, with payloads that the model lacks."""
+        return Problem(self.rich, self._guessed() + self._bodies(0.1))
+
     def choose(self) -> Problem:
         """Columns of every row, then bodies, then the columns once more beside these."""
         parts = [self._equations(self.richest(), fold.test) for fold in self.folds]
@@ -104,6 +110,54 @@ class Chooser:
         if bodies:
             columns = self._beside(bodies)
         return Problem(columns, bodies)
+
+    def fit_beside(self, more: tuple[Column, ...]) -> Solution:
+        """Further columns beside a payload and somewhat free inertias, with standard errors."""
+        problem = self.loaded()
+        return self.with_errors(self.fit(replace(problem, columns=(*problem.columns, *more))))
+
+    def ambiguous(self) -> dict[int, float]:
+        """Rows whose bias a mass could be as well, with 1 sigma of the bias then."""
+        equations = self._equations(self.loaded(), self.use)
+        J, prior = equations.jacobian_at_start(), equations.whole_prior()
+        H = J.T @ equations.normal @ J + np.diag(prior)
+        linear = len(equations.problem.columns)
+        beside = np.sqrt(np.diag(np.linalg.pinv(H))[:linear])
+        alone = np.sqrt(np.diag(np.linalg.pinv(H[:linear, :linear])))
+        largest = np.abs(self.evidence.reading).max(axis=0, initial=0.0)
+        return {
+            c.row: float(sigma)
+            for c, sigma, own in zip(equations.problem.columns, beside, alone, strict=True)
+            if c.kind == "bias" and sigma > max(MANY * own, OFFSET, OFFSET_SHARE * largest[c.row])
+        }
+
+    def choose_beside(self, options: Sequence[tuple[Column, ...]]) -> Solution:
+        """Which further columns foretell most beside a payload and inertias as free as it takes.
+
+        Args:
+            options: the simpler ones first, the last one with all columns of the others.
+
+        Returns:
+            The solution, with standard errors.
+        """
+        loads = self._guessed()
+        rich = Problem((*self.rich, *options[-1]), self._bodies(0.1))
+        parts = [self._equations(rich, fold.test) for fold in self.folds]
+        problems, costs = [], []
+        for option in options:
+            tried = [Problem((*self.rich, *option), loads + self._bodies(x)) for x in SIGMAS]
+            told = [self._foretold(parts, problem) for problem in tried]
+            best = int(np.argmin([cost.mean() for cost in told]))
+            problems.append(tried[best])
+            costs.append(told[best])
+        return self.with_errors(self.fit(problems[self._simplest(costs)]))
+
+    def _guessed(self) -> tuple[BodyChange, ...]:
+        """First guesses at payloads that the model lacks."""
+        whole = self._equations(self.richest(), self.use)
+        nodes = [node for node in seen_leaves(self.evidence) if node in self.nodes]
+        guesses = [guess_payload(whole, node) for node in nodes]
+        return tuple(guess for guess in guesses if guess is not None)
 
     def _beside(self, bodies: tuple[BodyChange, ...]) -> tuple[Column, ...]:
         """Columns of the rows beside bodies, which are fitted with all columns first."""
@@ -227,7 +281,7 @@ class Chooser:
         problem = Problem(tuple(columns))
         only = replace(self.evidence, used=np.arange(len(self.evidence.used)) == r)
         values = Equations.of(only, problem, start, self.weight, train).solve().values
-        added = sum(v * column_of(only, c) for v, c in zip(values, columns, strict=True))
+        added = sum(v * column_of(only, c, r) for v, c in zip(values, columns, strict=True))
         return (start[:, r] + added)[test]
 
     def _richest(self, start: Array) -> tuple[Column, ...]:

@@ -9,17 +9,18 @@ beside it (Frisch and Waugh, Econometrica 1(4), 1933), so that a wrong model is 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from touchline.arrays import Array, Mask
 from touchline.identify.choice import Chooser
 from touchline.identify.evidence import Evidence
-from touchline.identify.fit import Equations, column_of
-from touchline.identify.regressor import body_vector
+from touchline.identify.fit import Equations, Problem, applied, column_of, gradient_of
 from touchline.model.robot import Robot
 
 SURE = 4.0  # standard errors
 LEAST = 3e-4  # s; a shorter delay is left alone
 LONGEST = 0.2  # s; a longer one is a matter of the log's clocks
+GAP = 2.5  # times the usual step between instants; no curve goes across
 AGREE = 0.5  # of the delay: how far those of two halves of the data may be apart
 
 
@@ -41,13 +42,17 @@ def find_delays(evidence: Evidence, use: Mask | None = None) -> list[Delay]:
     """Delays that the data are sure of, and that two halves of them agree on."""
     use = np.ones(len(evidence), dtype=bool) if use is None else use
     chooser = Chooser(evidence, use)
+    problem = chooser.loaded()
     order = np.cumsum(use) <= 0.5 * use.sum()
-    found = []
+    parts = [_Beside(chooser, problem, part) for part in (use, use & order, use & ~order)]
+    # What is expected with all that was fitted: a payload's weight changes as the model's does.
+    rates, found = _rates(evidence, evidence.reading + parts[0].left), []
     for name, rows in _groups(evidence):
-        whole = _delay(chooser, rows, use)
+        of_group = np.zeros_like(rates)
+        of_group[:, rows] = -rates[:, rows]
+        whole, *halves = (part.value(of_group) for part in parts)
         if whole is None or not LEAST < abs(whole[0]) < LONGEST or abs(whole[0]) < SURE * whole[1]:
             continue
-        halves = [_delay(chooser, rows, use & part) for part in (order, ~order)]
         values = [half[0] for half in halves if half is not None]
         if len(values) == 2 and abs(values[0] - values[1]) < AGREE * abs(whole[0]):
             found.append(Delay(name, *whole))
@@ -81,47 +86,68 @@ def _groups(evidence: Evidence) -> list[tuple[str, list[int]]]:
     return [(name, rows) for name, rows in groups if rows]
 
 
-def _delay(chooser: Chooser, rows: list[int], use: Mask) -> tuple[float, float] | None:
-    """Delay and standard error [s]; None where nothing moves."""
-    evidence = chooser.evidence
-    rate = np.zeros_like(evidence.reading)
-    rate[:, rows] = -_rates(evidence)[:, rows]
-    problem, weight = chooser.richest(), chooser.weight
-    of_rate = Equations.of(evidence, problem, rate, weight, use)
-    of_start = Equations.of(evidence, problem, chooser.start, weight, use)
-    J = of_start.jacobian_at_start()
-    A = J.T @ of_start.normal @ J + np.diag(of_start.whole_prior())
-    solve = np.linalg.pinv(A)
-    own = rate + _applied(chooser, J @ (-solve @ (J.T @ of_rate.gradient)))
-    left = chooser.start + _applied(chooser, J @ (-solve @ (J.T @ of_start.gradient)))
-    size = float((weight * own * rate)[use].sum())
-    if size <= 0.0:
-        return None
-    value = -float((weight * own * left)[use].sum()) / size
-    scores = (weight * own * (left + value * own)).sum(axis=1)[use]
-    blocks = np.unique(chooser.blocks[use], return_inverse=True)[1]
-    error = float(np.sqrt((np.bincount(blocks, scores) ** 2).sum())) / size
-    return value, error
+class _Beside:
+    """Columns beside all else that may be wrong, at some instants.
+
+    Args:
+        chooser: whose instants they are.
+        problem: what else may be wrong.
+        use: (N,) the instants.
+
+    Attributes:
+        left: (N, R) residuals once that is fitted.
+    """
+
+    def __init__(self, chooser: Chooser, problem: Problem, use: Mask) -> None:
+        self.chooser, self.use, self._problem = chooser, use, problem
+        evidence = chooser.evidence
+        equations = Equations.of(evidence, problem, chooser.start, chooser.weight, use)
+        found = equations.solve()
+        self.left = chooser.start + applied(evidence, found)
+        self._J = equations.jacobian(found.steps)
+        normal = self._J.T @ equations.normal @ self._J
+        self._solve = np.linalg.pinv(normal + np.diag(equations.whole_prior()))
+
+    def value(self, column: Array) -> tuple[float, float] | None:
+        """The factor of a column (N, R) and its standard error; None where it is 0."""
+        weight, use = self.chooser.weight, self.use
+        gradient = gradient_of(self.chooser.evidence, self._problem, column, weight, use)
+        own = self._without(column, gradient)
+        size = float((weight * own * column)[use].sum())
+        if size <= 0.0:
+            return None
+        value = -float((weight * own * self.left)[use].sum()) / size
+        scores = (weight * own * (self.left + value * own)).sum(axis=1)[use]
+        blocks = np.unique(self.chooser.blocks[use], return_inverse=True)[1]
+        error = float(np.sqrt((np.bincount(blocks, scores) ** 2).sum())) / size
+        return value, error
+
+    def _without(self, column: Array, gradient: Array) -> Array:
+        """A column (N, R) without what the model could make of it."""
+        values = self._J @ (-self._solve @ (self._J.T @ gradient))
+        return column + _applied(self.chooser, self._problem, values)
 
 
-def _rates(evidence: Evidence) -> Array:
-    """How fast the rows' expected readings change (N, R), by central differences."""
-    bodies = np.array([body_vector(node.inertia) for node in evidence.robot.nodes])
-    expected = np.einsum("nrbk,bk->nr", evidence.model, bodies)
+def _rates(evidence: Evidence, expected: Array) -> Array:
+    """How fast expected readings (N, R) change.
+
+    By cubic splines: central differences over 40 ms take 3 % off what changes at 3 Hz.
+    """
     rates = np.zeros_like(expected)
-    for number in np.unique(evidence.recording):
-        own = np.flatnonzero(evidence.recording == number)
-        if len(own) > 2:
-            rates[own] = np.gradient(expected[own], evidence.time[own], axis=0)
+    steps = np.diff(evidence.time)
+    apart = (np.diff(evidence.recording) != 0) | (steps > GAP * np.median(steps))
+    for own in np.split(np.arange(len(evidence)), np.flatnonzero(apart) + 1):
+        if len(own) > 3:
+            rates[own] = CubicSpline(evidence.time[own], expected[own])(evidence.time[own], 1)
     return rates
 
 
-def _applied(chooser: Chooser, values: Array) -> Array:
+def _applied(chooser: Chooser, problem: Problem, values: Array) -> Array:
     """What columns and changes of bodies add to the residual (N, R)."""
-    evidence, problem = chooser.evidence, chooser.richest()
+    evidence = chooser.evidence
     added = np.zeros(evidence.reading.shape)
     for column, value in zip(problem.columns, values, strict=False):
-        added[:, column.row] += value * column_of(evidence, column)
+        added[:, column.row] += value * column_of(evidence, column, column.row)
     bodies = values[len(problem.columns) :].reshape(-1, 10)
     for body, change in zip(problem.bodies, bodies, strict=True):
         added += evidence.model[:, :, body.node] @ change

@@ -97,6 +97,8 @@ def description_changes(robot: Robot, new: Robot) -> dict[str, Any]:
         )
         if a.delay != b.delay:
             changed["delay"] = b.delay
+        if (a.xyz, a.rpy) != (b.xyz, b.rpy):
+            changed["pose"] = {"xyz": list(b.xyz), "rpy": list(b.rpy)}
         if changed:
             sensors[b.name] = changed
     if sensors:

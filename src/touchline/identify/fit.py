@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from touchline.arrays import Array, Index, Mask
 from touchline.identify.evidence import Evidence
@@ -16,6 +17,7 @@ from touchline.model.robot import Robot
 from touchline.model.transforms import move_inertia
 
 BIAS, BIAS_SHARE = 1.0, 0.1  # 1 sigma of a bias: N or Nm, or this part of the largest reading
+FRAME = {"turn": 0.1, "shift": 0.02}  # rad, m: 1 sigma of how far a sensor's frame is off
 STEPS = 30  # of Gauss and Newton at most
 ENOUGH = 1e-6  # a step this small changes nothing that can be measured
 
@@ -25,15 +27,25 @@ class Column:
     """One free number that enters the equations linearly.
 
     Attributes:
-        kind: "bias", "viscous", "coulomb", "rotor" or "gain".
-        row: of the joint or of the sensor's axis.
+        kind: "bias", "viscous", "coulomb", "rotor", "gain", "turn" or "shift".
+        row: of the joint or of the sensor's axis; of `turn` and `shift` the sensor's first.
         width: of the Coulomb friction [rad/s].
+        axis: of the sensor's frame that it turns about, or is shifted along.
+        rows: all that it enters.
         positive: may the value not be below zero?
     """
 
     kind: str
     row: int
     width: float = 0.0
+    axis: int = 0
+
+    @property
+    def rows(self) -> range:
+        """The rows that it enters."""
+        if self.kind in FRAME:
+            return range(self.row, self.row + 6)
+        return range(self.row, self.row + 1)
 
     @property
     def positive(self) -> bool:
@@ -178,7 +190,7 @@ class Equations:
             g = J.T @ (self.gradient + self.normal @ x) + prior * now
             free = ~np.concatenate([held, np.zeros(steps.size, dtype=bool)])
             change = np.zeros(len(now))
-            change[free] = -np.linalg.lstsq(H[np.ix_(free, free)], g[free], rcond=None)[0]
+            change[free] = -_solved(H[np.ix_(free, free)], g[free])
             size = np.abs(change[linear:]).max(initial=0.0)
             change *= min(1.0, 0.5 / max(size, 1e-12))
             now = now + change
@@ -198,6 +210,8 @@ class Equations:
             if column.kind == "bias":
                 largest = float(np.abs(self.evidence.reading[:, column.row]).max(initial=0.0))
                 prior[i] += max(BIAS, BIAS_SHARE * largest) ** -2.0
+            elif column.kind in FRAME:
+                prior[i] += FRAME[column.kind] ** -2.0
         return prior
 
     def whole_prior(self) -> Array:
@@ -207,8 +221,11 @@ class Equations:
 
     def jacobian_at_start(self) -> Array:
         """Derivatives of the parameters with respect to the free numbers, at no change."""
-        physical = [body.physical() for body in self.problem.bodies]
-        return self._jacobian(physical, np.zeros((len(physical), PARAMETERS)))
+        return self.jacobian(np.zeros((len(self.problem.bodies), PARAMETERS)))
+
+    def jacobian(self, steps: Array) -> Array:
+        """The same where the bodies have taken steps (bodies, 10)."""
+        return self._jacobian([body.physical() for body in self.problem.bodies], steps)
 
     def _jacobian(self, physical: list[PhysicalBody], steps: Array) -> Array:
         linear = len(self.problem.columns)
@@ -260,14 +277,32 @@ class Equations:
         )
 
 
+def _solved(H: Array, g: Array) -> Array:
+    """H^-1 g of a matrix that is positive definite, or nearly so."""
+    size = np.sqrt(np.maximum(np.diag(H), 1e-300))
+    try:
+        found = cho_solve(cho_factor(H / np.outer(size, size)), g / size) / size
+    except LinAlgError:
+        found = np.linalg.lstsq(H, g, rcond=None)[0]
+    return np.asarray(found, dtype=float)
+
+
+def gradient_of(e: Evidence, problem: Problem, column: Array, weight: Array, use: Mask) -> Array:
+    """The gradient of half the weighed sum of squares of a column (N, R), as of `Equations`."""
+    gradient = np.zeros(len(problem.columns) + PARAMETERS * len(problem.bodies))
+    for r, index, A in _rows_of(e, problem, use):
+        gradient[index] += A.T @ (weight[use, r] * column[use, r])
+    return gradient
+
+
 def _rows_of(e: Evidence, problem: Problem, use: Mask) -> Iterator[tuple[int, Index, Array]]:
     """Rows with something free in them: number, indices of the parameters, equations (N, ...)."""
     linear = len(problem.columns)
     size = linear + PARAMETERS * len(problem.bodies)
     nodes = [body.node for body in problem.bodies]
     for r in np.flatnonzero(e.used).tolist():
-        own = [i for i, c in enumerate(problem.columns) if c.row == r]
-        parts = [column_of(e, problem.columns[i])[use, None] for i in own]
+        own = [i for i, c in enumerate(problem.columns) if r in c.rows]
+        parts = [column_of(e, problem.columns[i], r)[use, None] for i in own]
         index = own
         if nodes:
             part = e.model[:, r][use][:, nodes]
@@ -277,9 +312,8 @@ def _rows_of(e: Evidence, problem: Problem, use: Mask) -> Iterator[tuple[int, In
             yield r, np.array(index), np.concatenate(parts, axis=1)
 
 
-def column_of(e: Evidence, column: Column) -> Array:
-    """A column's filtered signal (N,)."""
-    r = column.row
+def column_of(e: Evidence, column: Column, r: int) -> Array:
+    """A column's filtered signal (N,) in a row that it enters."""
     if column.kind == "bias":
         return np.ones(len(e))
     if column.kind == "gain":
@@ -288,17 +322,39 @@ def column_of(e: Evidence, column: Column) -> Array:
         return e.speed[:, r]
     if column.kind == "rotor":
         return e.rotor[:, r]
+    if column.kind in FRAME:
+        return _frame_column(e, column, r - column.row)
     return e.dry[:, r, e.width_index(r, column.width)]
+
+
+def _frame_column(e: Evidence, column: Column, component: int) -> Array:
+    """What the described frame would read more, were the true one turned or shifted by a unit.
+
+    With a frame turned by phi and shifted by p, both small and in its own axes, a reading (f, m) is
+    (f + phi x f, m + phi x m + p x f) where it is described. A residual is the model less that.
+    """
+    moment, i = divmod(component, 3)
+    if column.kind == "shift" and not moment:
+        return np.zeros(len(e))
+    first = column.row + (3 if moment and column.kind == "turn" else 0)
+    j, k = (i + 1) % 3, (i + 2) % 3  # (a x v)_i = a_j v_k - a_k v_j
+    if column.axis == j:
+        return -e.reading[:, first + k]
+    if column.axis == k:
+        return e.reading[:, first + j]
+    return np.zeros(len(e))
 
 
 def applied(e: Evidence, found: Solution) -> Array:
     """What a solution adds to the residual (N, R)."""
     added = np.zeros(e.reading.shape)
     for column, value in zip(found.problem.columns, found.values, strict=True):
-        added[:, column.row] += value * column_of(e, column)
-    changes = found.changes()
-    for body, change in zip(found.problem.bodies, changes, strict=True):
-        added += e.model[:, :, body.node] @ change
+        for r in column.rows:
+            added[:, r] += value * column_of(e, column, r)
+    if found.problem.bodies:
+        changes = np.zeros(e.model.shape[2:])
+        np.add.at(changes, [body.node for body in found.problem.bodies], found.changes())
+        added += e.model.reshape(*added.shape, -1) @ changes.ravel()
     return np.where(e.used, added, 0.0)
 
 

@@ -33,6 +33,7 @@ class Identification:
         parted: how the data were parted.
         train, test: (N,) the other data, and those held out.
         trained: the solution from `train` alone.
+        ambiguous: rows whose bias a mass could be as well, with 1 sigma [N or Nm] of the bias then.
     """
 
     evidence: Evidence
@@ -44,6 +45,7 @@ class Identification:
     train: Mask
     test: Mask
     trained: Solution
+    ambiguous: dict[int, float]
 
     @property
     def problem(self) -> Problem:
@@ -109,7 +111,18 @@ def identify(evidence: Evidence, trust: bool = False) -> Identification:
         trained = chooser.fit(problem)
     whole = Chooser(evidence, ~touched)
     solution = whole.with_errors(whole.fit(problem))
-    return Identification(evidence, solution, touched, before, after, parted, train, test, trained)
+    return Identification(
+        evidence,
+        solution,
+        touched,
+        before,
+        after,
+        parted,
+        train,
+        test,
+        trained,
+        whole.ambiguous(),
+    )
 
 
 def identify_all(evidence: Evidence) -> Solution:

@@ -18,6 +18,8 @@ from touchline.identify.regressor import PARAMETERS
 
 LEAST_RADIUS = 0.005  # m; bodies are taken as at least so wide about their centre
 _LOWER = np.tril_indices(4, -1)
+_ROWS = np.concatenate([np.arange(4), _LOWER[0]])  # where each of the ten numbers stands in T
+_COLUMNS = np.concatenate([np.arange(4), _LOWER[1]])
 
 
 class PhysicalBody:
@@ -47,17 +49,12 @@ class PhysicalBody:
 
     def jacobian(self, step: Array) -> Array:
         """Derivatives (10, 10) of the parameters with respect to the step."""
-        T = _triangle(step)
-        columns = []
-        for i in range(PARAMETERS):
-            dT = np.zeros((4, 4))
-            if i < 4:
-                dT[i, i] = T[i, i]
-            else:
-                dT[_LOWER[0][i - 4], _LOWER[1][i - 4]] = 1.0
-            half = self._root @ dT @ T.T @ self._root.T
-            columns.append(vector_of_pseudo(half + half.T))
-        return np.column_stack(columns)
+        L = self._root @ _triangle(step)
+        size = np.ones(PARAMETERS)
+        size[:4] = np.exp(np.clip(step[:4], -3.0, 3.0))
+        halves = self._root[:, _ROWS].T[:, :, None] * L[:, _COLUMNS].T[:, None, :]
+        changes = size[:, None, None] * (halves + np.swapaxes(halves, 1, 2))
+        return _VECTOR @ changes.reshape(PARAMETERS, -1).T
 
 
 def _triangle(step: Array) -> Array:
@@ -79,5 +76,16 @@ def pseudo_inertia(vector: Array) -> Array:
 
 def vector_of_pseudo(P: Array) -> Array:
     """The ten parameters of a pseudo-inertia (4, 4)."""
-    inertia = np.trace(P[:3, :3]) * np.eye(3) - P[:3, :3]
-    return np.concatenate([[P[3, 3]], P[:3, 3], inertia[np.triu_indices(3)]])
+    return _VECTOR @ P.ravel()
+
+
+def _vector_of_entries() -> Array:
+    """The ten parameters as a linear function (10, 16) of the entries of a pseudo-inertia."""
+    columns = []
+    for entry in np.eye(16).reshape(16, 4, 4):
+        inertia = np.trace(entry[:3, :3]) * np.eye(3) - entry[:3, :3]
+        columns.append(np.concatenate([[entry[3, 3]], entry[:3, 3], inertia[np.triu_indices(3)]]))
+    return np.column_stack(columns)
+
+
+_VECTOR = _vector_of_entries()

@@ -27,6 +27,7 @@ def identification_lines(found: Identification, beside: list[str] | None = None)
     lines += _column_lines(found) + _body_lines(found)
     if len(lines) == 1:
         lines.append("  nothing that foretells data held out better than the description does")
+    lines += _ambiguous_lines(found)
     if found.seconds < SHORT:
         lines.append(
             f"  from {found.seconds:.1f} s: offsets may be worth it, inertias and friction of "
@@ -64,14 +65,30 @@ def _column_lines(found: Identification) -> list[str]:
             if column.row != row:
                 continue
             unit = UNITS[column.kind]
-            if column.kind == "bias" and row >= found.evidence.joints:
-                unit = "N" if names[row].endswith(("fx", "fy", "fz")) else "Nm"
+            if column.kind == "bias":
+                unit = _unit(found, row)
             what = f"{WORDS[column.kind]} {value:+.3g} +- {error:.2g} {unit}".rstrip()
             if column.kind == "coulomb":
                 what += f" (within {column.width:g} rad/s)"
             told.append(what)
         lines.append(f"  {names[row]}: {', '.join(told)}")
     return lines
+
+
+def _ambiguous_lines(found: Identification) -> list[str]:
+    """Biases that could be masses."""
+    names = found.evidence.rows.names
+    return [
+        f"  {names[row]}: mass or bias? this motion does not tell them apart; the bias is known to "
+        f"+- {sigma:.2g} {_unit(found, row)} alone, the sum of both is what is written"
+        for row, sigma in found.ambiguous.items()
+    ]
+
+
+def _unit(found: Identification, row: int) -> str:
+    """Of a bias."""
+    is_joint = row < found.evidence.joints
+    return "N" if not is_joint and found.evidence.rows.names[row][-2] == "f" else "Nm"
 
 
 def _body_lines(found: Identification) -> list[str]:

@@ -24,6 +24,15 @@ def rotation_rpy(rpy: Sequence[float]) -> Array:
     )
 
 
+def rpy_of(R: Array) -> list[float]:
+    """Roll, pitch and yaw [rad] of a rotation; roll is 0 where only its sum with yaw counts."""
+    flat = float(np.hypot(R[0, 0], R[1, 0]))
+    pitch = float(np.arctan2(-R[2, 0], flat))
+    if flat < 1e-9:
+        return [0.0, pitch, float(np.arctan2(-R[0, 1], R[1, 1]))]
+    return [float(np.arctan2(R[2, 1], R[2, 2])), pitch, float(np.arctan2(R[1, 0], R[0, 0]))]
+
+
 def rotation_quaternion(wxyz: Sequence[float] | Array) -> Array:
     """Return the rotation (3, 3) of a quaternion w, x, y, z of any length but zero."""
     w, x, y, z = np.asarray(wxyz, float) / np.linalg.norm(wxyz)

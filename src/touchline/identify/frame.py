@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sensors that stand or point a little otherwise than described.
+
+A sensor's frame is off where its axes are turned against those of what it carries. Biases, a
+payload and inertias are free beside it, for a body whose centre is off looks like a shifted sensor.
+A frame is written only if that foretells parts of time which the fit has not seen.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from touchline.arrays import Array
+from touchline.identify.choice import Chooser
+from touchline.identify.evidence import Evidence
+from touchline.identify.fit import Column, Solution
+from touchline.model.description import AXES
+from touchline.model.robot import Robot
+from touchline.model.transforms import rotation_about, rotation_rpy, rpy_of
+
+SURE = 5.0  # standard errors
+LEAST = {"turn": np.radians(0.1), "shift": 5e-4}  # rad, m; smaller ones are left alone
+DIGITS = 6  # of a written figure: 1e-6 rad or m
+
+
+@dataclass(frozen=True)
+class FrameError:
+    """How far a sensor's frame is off, in its described axes.
+
+    Attributes:
+        name: of the sensor.
+        turn, turn_error: (3,) rotation vector with one standard error [rad]; zeros: not told.
+        shift, shift_error: (3,) [m].
+    """
+
+    name: str
+    turn: Array
+    turn_error: Array
+    shift: Array
+    shift_error: Array
+
+
+def find_frames(evidence: Evidence) -> list[FrameError]:
+    """Frames that are off as far as the data are sure of it."""
+    sensors = _judged(evidence)
+    if not sensors:
+        return []
+    chooser = Chooser(evidence, np.ones(len(evidence), dtype=bool))
+    turns = [Column("turn", evidence.joints + 6 * s, axis=a) for s in sensors for a in range(3)]
+    shifts = [Column("shift", c.row, axis=c.axis) for c in turns]
+    if not _sure_columns(chooser.fit_beside((*turns, *shifts))):
+        return []
+    found = chooser.choose_beside([(), tuple(turns), (*turns, *shifts)])
+    while True:
+        sure = _sure_columns(found)
+        free = [c for c in found.problem.columns if c.kind in LEAST]
+        if len(sure) == len(free):
+            break
+        columns = tuple(c for c in found.problem.columns if c.kind not in LEAST or c in sure)
+        found = chooser.with_errors(chooser.fit(replace(found.problem, columns=columns)))
+    return [_error_of(evidence, found, s) for s in sensors if _of(found, "turn", s, evidence)[2]]
+
+
+def with_frames(robot: Robot, frames: Sequence[FrameError]) -> Robot:
+    """The robot whose sensors stand where they were found to."""
+    off = {frame.name: frame for frame in frames}
+    sensors = []
+    for sensor in robot.description.sensors:
+        if sensor.name in off:
+            own, R = off[sensor.name], rotation_rpy(sensor.rpy)
+            angle = float(np.linalg.norm(own.turn))
+            turned = R @ rotation_about(own.turn / angle, angle) if angle else R
+            xyz = np.array(sensor.xyz) + R @ own.shift
+            sensor = replace(sensor, xyz=_rounded(xyz.tolist()), rpy=_rounded(rpy_of(turned)))
+        sensors.append(sensor)
+    return Robot(replace(robot.description, sensors=tuple(sensors)), robot.mechanism)
+
+
+def joined(before: Sequence[FrameError], later: Sequence[FrameError]) -> list[FrameError]:
+    """What was found in two rounds; the errors are those of the later one."""
+    found = {frame.name: frame for frame in before}
+    for own in later:
+        old = found.get(own.name)
+        if old is not None:
+            own = replace(own, turn=old.turn + own.turn, shift=old.shift + own.shift)
+        found[own.name] = own
+    return list(found.values())
+
+
+def _judged(evidence: Evidence) -> list[int]:
+    """Sensors of all axes whose log is in their own frame, with the weight in it."""
+    n = evidence.joints
+    return [
+        s
+        for s, sensor in enumerate(evidence.robot.description.sensors)
+        if len(sensor.axes) == len(AXES)
+        and sensor.frame == "sensor"
+        and sensor.compensated == "none"
+        and evidence.used[n + 6 * s : n + 6 * s + 6].all()
+    ]
+
+
+def _of(found: Solution, kind: str, s: int, evidence: Evidence) -> tuple[Array, Array, bool]:
+    """Values and errors (3,) of a sensor, and whether they were free."""
+    row = evidence.joints + 6 * s
+    values, errors, free = np.zeros(3), np.zeros(3), False
+    for column, value, error in zip(found.problem.columns, found.values, found.errors, strict=True):
+        if (column.kind, column.row) == (kind, row):
+            values[column.axis], errors[column.axis], free = value, error, True
+    return values, errors, free
+
+
+def _sure_columns(found: Solution) -> list[Column]:
+    return [c for c in found.problem.columns if c.kind in LEAST and _sure(found, c)]
+
+
+def _sure(found: Solution, column: Column) -> bool:
+    """Is any axis of the sensor's frame off by more than chance and more than matters?"""
+    own = [
+        (value, error)
+        for c, value, error in zip(found.problem.columns, found.values, found.errors, strict=True)
+        if (c.kind, c.row) == (column.kind, column.row)
+    ]
+    return any(abs(v) > max(SURE * e, LEAST[column.kind]) for v, e in own)
+
+
+def _error_of(evidence: Evidence, found: Solution, s: int) -> FrameError:
+    name = evidence.robot.sensor_names[s]
+    turn, turn_error, _ = _of(found, "turn", s, evidence)
+    shift, shift_error, _ = _of(found, "shift", s, evidence)
+    return FrameError(name, turn, turn_error, shift, shift_error)
+
+
+def _rounded(values: Sequence[float]) -> tuple[float, ...]:
+    return tuple(round(float(x), DIGITS) + 0.0 for x in values)
