@@ -239,10 +239,18 @@ def robot_yaml() -> str:
         + table("key|type|unit|default|meaning", rows)
         + "\nA *column* is a name, or `{column: NAME, factor: F}` where values times F are in SI "
         "units. A *column pattern* is the same with placeholders; a list has one column for each "
-        "joint or axis.\n\n"
-        "## NAME_rest.csv\n\n"
-        "`learned_rest` names a CSV file with these columns, in this order. `touchline calibrate "
-        "--learn` writes it.\n\n"
+        "joint or axis.\n"
+    )
+
+
+def learned_rest() -> str:
+    """Columns of the tables that `calibrate --learn` writes."""
+    return (
+        "# NAME_rest.csv\n\n"
+        + NOTE
+        + "`touchline calibrate --learn` writes what it learned of joint torques into a CSV file "
+        "beside [robot.yaml](robot_yaml.md), which names it under `learned_rest`. The columns "
+        "stand in this order.\n\n"
         + table("column|type|unit|meaning", [[f"`{name}`", *more] for name, *more in REST])
         + f"\nThe nodes of a joint are a grid of positions and velocities, {LARGEST} at most, and "
         "at least two by two. Between nodes the torque is bilinear. On the edges of the grid it "
@@ -499,6 +507,7 @@ def _measured() -> str:
 PAGES = {
     "tuning.md": tuning,
     "robot_yaml.md": robot_yaml,
+    "learned_rest.md": learned_rest,
     "logs.md": logs,
     "results.md": results,
     "command_line.md": command_line,

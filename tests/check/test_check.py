@@ -11,7 +11,9 @@ import pytest
 from free_motion import free_motion
 
 import touchline as tl
+from touchline.check.joints import swapped_torques
 from touchline.check.run import check
+from touchline.check.windows import WindowMaker
 from touchline.cli.main import main
 from touchline.logs import write_table
 from touchline.model.robot import Robot
@@ -189,6 +191,13 @@ def test_a_load_that_the_model_lacks(tmp_path, robot, recording):
     mass = re.match(r"(\S+) \+- \S+ kg are missing at tool", found)
     assert mass is not None and abs(float(mass[1]) - 0.6) < 0.03
     assert "loads: [{link: tool, mass: 0.6" in found
+
+
+def test_where_no_torque_is_measured_none_are_swapped(robot, recording):
+    maker = WindowMaker(robot, 0.01)
+    maker.add(recording)
+    windows = maker.windows()
+    assert len(windows) > 4 and swapped_torques(windows, []) == []
 
 
 def test_a_fixed_description_has_no_more_findings(tmp_path, robot):

@@ -50,8 +50,8 @@ def refuse_one_pose(evidence: Evidence) -> None:
             [
                 f"the recordings show one pose: no joint moves by more than {moved:.2g} rad, "
                 f"{POSES:g} rad are needed. An offset of a sensor then reads the same as a mass",
-                "nothing written: record a minute in which all joints move, or let the arm rest in "
-                "some ten poses for three seconds each (touchline calibrate --plan ROBOT proposes "
-                "both); --no-identify measures noise and thresholds of this pose alone",
+                "nothing written. Record a minute in which all joints move, or let the arm rest in "
+                "some ten poses for three seconds each: touchline calibrate --plan ROBOT proposes "
+                "both. Noise and thresholds of this pose alone are measured with --no-identify",
             ]
         )

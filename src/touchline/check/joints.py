@@ -280,7 +280,7 @@ def _judge_delays(robot: Robot, fits: dict[int, TorqueFit], findings: Findings) 
 
 def swapped_torques(windows: Windows, measured: list[int]) -> list[tuple[int, int]]:
     """Pairs of joints whose readings each fit the other's expected torque far better."""
-    if len(windows) < 4:
+    if len(windows) < 4 or len(measured) < 2:
         return []
     cost = np.array([[_misfit(windows, i, k) for k in measured] for i in measured])
     best = cost.argmin(axis=1)

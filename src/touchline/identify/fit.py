@@ -330,8 +330,9 @@ def column_of(e: Evidence, column: Column, r: int) -> Array:
 def _frame_column(e: Evidence, column: Column, component: int) -> Array:
     """What the described frame would read more, were the true one turned or shifted by a unit.
 
-    With a frame turned by phi and shifted by p, both small and in its own axes, a reading (f, m) is
-    (f + phi x f, m + phi x m + p x f) where it is described. A residual is the model less that.
+    The true frame is turned by phi and shifted by p, both small and in its own axes. A reading
+    (f, m) then is (f + phi x f, m + phi x m + p x f) where it is described. A residual is the
+    model less that.
     """
     moment, i = divmod(component, 3)
     if column.kind == "shift" and not moment:
