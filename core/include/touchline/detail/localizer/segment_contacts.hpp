@@ -42,7 +42,7 @@ struct Touched {
 // Suspected: since when one contact has explained all [s], and when it was last not clear whether
 // a contact is felt, or one faulty channel [s].
 struct Suspected {
-  std::optional<double> explained, one_channel;
+  std::optional<double> explained, one_channel, one_channel_since;
 };
 
 // Two that began at the same instant, until they count as known.
