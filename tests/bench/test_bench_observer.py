@@ -51,7 +51,7 @@ def test_a_missing_peer_is_one_line_that_says_how_to_install_it(monkeypatch):
         "pinocchio is not installed: pip install pin",
         "idyntree is not installed: pip install idyntree",
     ]
-    assert len(result.timings) == 3 and result.errors == [] and result.agreements == []
+    assert len(result.timings) == 4 and result.errors == [] and result.agreements == []
     assert result.notes[0] in str(result)
 
 

@@ -193,6 +193,17 @@ def test_a_load_that_the_model_lacks(tmp_path, robot, recording):
     assert "loads: [{link: tool, mass: 0.6" in found
 
 
+def test_a_heavy_load_on_a_light_flange_is_no_unit(tmp_path, robot, recording):
+    """Its weight is 9.8 times that of the flange, and its moments are those of a long lever."""
+    path = tmp_path / "robot.yaml"
+    text = robot.description.path.read_text()
+    path.write_text(text + "loads:\n  - {link: tool, mass: 7.9, com: [0, 0.2, 0.25]}\n")
+    loaded = free_motion(tl.load_robot(path), rate=100.0)
+    findings = findings_of(tmp_path, robot, loaded)
+    of_sensors = [line for line in findings if line.startswith("sensor")]
+    assert of_sensors and not any("kgf" in line for line in of_sensors), findings
+
+
 def test_where_no_torque_is_measured_none_are_swapped(robot, recording):
     maker = WindowMaker(robot, 0.01)
     maker.add(recording)

@@ -41,11 +41,13 @@ def refuse_wrong_signals(robot: Robot, recordings: Recordings, logs: list[Path])
 def refuse_one_pose(evidence: Evidence) -> None:
     """Refuses recordings of a single pose, in which an offset and a mass read the same.
 
+    What has no joints stands in the one pose that it has: nothing else can be recorded.
+
     Raises:
         InputError: what to record instead.
     """
     moved = float(np.ptp(evidence.q, axis=0).max(initial=0.0))
-    if moved < POSES:
+    if evidence.q.shape[1] > 0 and moved < POSES:
         raise InputError(
             [
                 f"the recordings show one pose: no joint moves by more than {moved:.2g} rad, "

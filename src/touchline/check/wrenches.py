@@ -18,6 +18,9 @@ from touchline.model.robot import Robot
 LEAST_WEIGHT = 0.5  # N; a lighter load says nothing
 MASS_OFF, MASS_OFF_KG = 0.05, 0.05
 CLEARER = 0.4  # another explanation must leave so much less
+# Moments that change by so many times what a unit of the forces lets expect, and by so much [Nm],
+# are those of a load that is mounted farther out than the model's.
+FARTHER, FARTHER_NM = 5.0, 0.1
 AXIS_NAMES = "xyz"
 
 
@@ -118,8 +121,8 @@ class _SensorCheck:
         words = []
         if best.kind != "described":
             words.append(f"sensor {self.sensor.name}: {best.words}")
-        force, force_words = self._factor("forces", best.forces, FORCE_FACTORS)
-        moment, moment_words = self._factor("moments", best.moments, MOMENT_FACTORS)
+        force, force_words = self._factor("forces", best, FORCE_FACTORS)
+        moment, moment_words = self._factor("moments", best, MOMENT_FACTORS)
         for line in (*words, *force_words, *moment_words):
             self.findings.find(line)
         if best.change:
@@ -231,19 +234,35 @@ class _SensorCheck:
             self._judge_bias(force, moment)
 
     def _factor(
-        self, what: str, expected: Array, factors: dict[float, str]
+        self, what: str, best: Explanation, factors: dict[float, str]
     ) -> tuple[float, list[str]]:
         """The factor of a known unit (1 where it is none), and what is said of it."""
-        fit = self._fit(expected, slice(0, 3) if what == "forces" else slice(3, 6))
+        moments = best.moments
+        if what == "forces":
+            fit = self._fit(best.forces, slice(0, 3))
+        else:
+            fit = self._fit(moments, slice(3, 6))
         if fit is None or not fit.telling or 0.5 < fit.factor < 2.0:
             return 1.0, []
         found = factor_words(fit.factor, factors)
         start = f"sensor {self.sensor.name}: {what} are {fit.factor:.3g} times those expected"
-        if found is not None:
+        if found is not None and not (what == "forces" and self._carries_more(moments, fit.factor)):
             return found[0] * float(np.sign(fit.factor)), [f"{start}: in {found[1]}"]
         if abs(fit.factor) < 0.2:
             return 1.0, [f"{start}: the weight seems taken out already; compensated: gravity"]
         return 1.0, [f"{start}: check the unit, and what is mounted on it"]
+
+    def _carries_more(self, moments: Array, factor: float) -> bool:
+        """Do moments change by far more than those expected (W, 3) [Nm] do in another unit?"""
+        has = self.has[3:]
+        read = self.reading[:, 3:][:, has]
+        known = np.isfinite(read).all(axis=1) & np.isfinite(moments[:, has]).all(axis=1)
+        if not has.any() or not known.any():
+            return False
+        size, expected = (
+            float(np.sqrt(x[known].var(axis=0).sum())) for x in (read, moments[:, has])
+        )
+        return size > max(FARTHER_NM, FARTHER * max(1.0, abs(factor)) * expected)
 
     def _judge_bias(self, force: Fit, moment: Fit | None) -> None:
         name = self.sensor.name
