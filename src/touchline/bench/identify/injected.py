@@ -128,7 +128,8 @@ def _delay(
 
 def _to_link(robot: Robot, node: int) -> Array:
     """From a node's frame to that of its first link: where a sensor is moves the first alone."""
-    return np.linalg.inv(robot.places[robot.nodes[node].links[0]].T_node_link)
+    T_node_link = robot.places[robot.nodes[node].links[0]].T_node_link
+    return np.asarray(np.linalg.inv(T_node_link), dtype=np.float64)
 
 
 def _wrench_errors(case: WrongArm, found: Robot, rng: np.random.Generator) -> dict[str, float]:
