@@ -3,7 +3,9 @@
 
 import ctypes
 import os
+import pickle
 import signal
+import socket
 import time
 
 import numpy as np
@@ -11,8 +13,9 @@ import pytest
 from live_support import Watched, assert_same, watch
 
 from touchline.errors import InputError
-from touchline.live.aside import ReadAside
+from touchline.live.aside import OPENED, SAMPLE, ReadAside, _frame, _numbers
 from touchline.live.connection import Connection
+from touchline.live.sample import Sample
 
 
 def aside(robot, address, period=1e-3):
@@ -23,6 +26,22 @@ def test_a_recording_read_aside_gives_the_same_bits(sara, recorded):
     path, live = recorded[".parquet"]
     seen = watch(sara, ReadAside(f"replay://{path}?speed=0", sara, ("recording",)), duration=None)
     assert_same(seen, live)
+
+
+def test_samples_that_come_with_the_answer_are_kept(sara, monkeypatch):
+    """A reader that is quicker than we are: its first samples come in the same bytes."""
+    ours, theirs = socket.socketpair()
+    source = aside(sara, "sim://")
+    monkeypatch.setattr(source, "_start", lambda: setattr(source, "_socket", ours))
+    joints, sensors = len(sara.joint_names), len(sara.sensor_names)
+    signals = np.zeros(joints), np.zeros(joints), np.zeros(joints), np.zeros((sensors, 6))
+    samples = [Sample(k * 1e-3, *signals, 0.0, k, np.zeros(sensors)) for k in range(3)]
+    frames = [_frame(OPENED, pickle.dumps(["note"]))]
+    frames += [_frame(SAMPLE, _numbers(sample)) for sample in samples]
+    theirs.sendall(b"".join(frames))
+    assert source.open() == ["note"]
+    assert [sample.sequence for sample in source.read(0.0)] == [0, 1, 2]
+    theirs.close()
 
 
 def test_a_stall_of_python_costs_no_sample_and_no_time(sara):

@@ -72,7 +72,7 @@ class ReadAside:
         self._tell(OPEN)
         end = time.monotonic() + START
         while time.monotonic() < end:
-            for kind, payload in self._frames(0.1):
+            for kind, payload in self._frames(0.1, most=1):  # what follows are samples
                 if kind == OPENED:
                     if self._felt is not None:
                         self._hand_over()
@@ -102,17 +102,29 @@ class ReadAside:
         except OSError:
             raise LinkLost("the process that reads it has ended") from None
 
-    def _frames(self, timeout: float) -> list[tuple[int, bytes]]:
-        """Whole frames that have come: kind and payload."""
+    def _frames(self, timeout: float, most: int | None = None) -> list[tuple[int, bytes]]:
+        """Whole frames that have come, at most so many: kind and payload."""
         assert self._socket is not None
-        found = split_frames(self)
+        found = self._split(most)
         if found or not select.select([self._socket], [], [], timeout)[0]:
             return found
         data = self._socket.recv(READ)
         if not data:
             raise LinkLost("the process that reads it has ended")
         self._begun += data
-        return split_frames(self)
+        return self._split(most)
+
+    def _split(self, most: int | None) -> list[tuple[int, bytes]]:
+        """Takes whole frames, at most so many, from the front of what has come."""
+        found, at, data = [], 0, self._begun
+        while len(data) - at >= HEAD.size and (most is None or len(found) < most):
+            size, kind = HEAD.unpack_from(data, at)
+            if len(data) - at - HEAD.size + 1 < size:
+                break
+            found.append((kind, data[at + HEAD.size : at + HEAD.size - 1 + size]))
+            at += HEAD.size - 1 + size
+        self._begun = data[at:]
+        return found
 
     def _take(self, kind: int, payload: bytes) -> Sample | None:
         """What a frame brings; a sample, if it is one."""
@@ -203,19 +215,6 @@ class ReadAside:
 
     def __del__(self) -> None:
         self._kill()
-
-
-def split_frames(source: ReadAside) -> list[tuple[int, bytes]]:
-    """Takes whole frames from the front of what has come."""
-    found, at, data = [], 0, source._begun
-    while len(data) - at >= HEAD.size:
-        size, kind = HEAD.unpack_from(data, at)
-        if len(data) - at - HEAD.size + 1 < size:
-            break
-        found.append((kind, data[at + HEAD.size : at + HEAD.size - 1 + size]))
-        at += HEAD.size - 1 + size
-    source._begun = data[at:]
-    return found
 
 
 class _Reading:
