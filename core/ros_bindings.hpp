@@ -143,7 +143,8 @@ class TopicReader {
     }
     return found;
   }
-  // Joint states that did not name all joints, before the first that did; the names seen in them.
+  // Joint states that did not name all joints, before the first that did; the names seen in them. No
+  // interpreter may be held.
   std::pair<std::size_t, std::vector<std::string>> incomplete() {
     const std::lock_guard<std::mutex> turn(turn_);
     return {merge_.incomplete(), merge_.seen()};
@@ -503,7 +504,7 @@ inline void bind_ros(nb::module_& m) {
       .def("wait", &TopicReader::wait, "seconds"_a, nb::call_guard<nb::gil_scoped_release>())
       .def("samples", &TopicReader::samples)
       .def("notes", &TopicReader::notes)
-      .def("incomplete", &TopicReader::incomplete)
+      .def("incomplete", &TopicReader::incomplete, nb::call_guard<nb::gil_scoped_release>())
       .def_prop_ro("overrun", &TopicReader::overrun)
       .def("stop", &TopicReader::stop, nb::call_guard<nb::gil_scoped_release>());
   nb::class_<TopicWriter>(m, "TopicWriter")
