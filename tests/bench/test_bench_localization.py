@@ -310,7 +310,7 @@ def test_colours_are_those_of_the_nearest_touches():
 
 
 def test_hands_tremble_as_stated_and_stay_in_their_friction_cones():
-    time = np.arange(20000, dtype=np.float64) * np.float64(1e-3)
+    time = np.arange(20000) * 1e-3
     change = tremor(time, np.random.default_rng(0))
     assert np.sqrt((change**2).sum(axis=1).mean()) == pytest.approx(2.0, rel=0.1)
     power = (np.abs(np.fft.rfft(change, axis=0)) ** 2).sum(axis=1)

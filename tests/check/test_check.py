@@ -181,10 +181,18 @@ def test_a_sensor_logged_in_world_axes(tmp_path, robot, recording):
     assert "sensor wrist" in findings[0] and "frame: world" in findings[0]
 
 
-def test_a_load_that_the_model_lacks(tmp_path, robot, recording):
+def described_with(tmp_path, robot, load):
+    """Its description with a load on the tool."""
     path = tmp_path / "robot.yaml"
-    text = robot.description.path.read_text()
-    path.write_text(text + "loads:\n  - {link: tool, mass: 0.6, com: [0, 0, 0.05]}\n")
+    path.write_text(robot.description.path.read_text() + f"loads:\n  - {load}\n")
+    return path
+
+
+TOOL = "{link: tool, mass: 0.6, com: [0, 0, 0.05]}"
+
+
+def test_a_load_that_the_model_lacks(tmp_path, robot, recording):
+    path = described_with(tmp_path, robot, TOOL)
     loaded = free_motion(tl.load_robot(path), rate=100.0)
     findings = findings_of(tmp_path, robot, loaded)
     (found,) = findings
@@ -195,9 +203,7 @@ def test_a_load_that_the_model_lacks(tmp_path, robot, recording):
 
 def test_a_heavy_load_on_a_light_flange_is_no_unit(tmp_path, robot, recording):
     """Its weight is 9.8 times that of the flange, and its moments are those of a long lever."""
-    path = tmp_path / "robot.yaml"
-    text = robot.description.path.read_text()
-    path.write_text(text + "loads:\n  - {link: tool, mass: 7.9, com: [0, 0.2, 0.25]}\n")
+    path = described_with(tmp_path, robot, "{link: tool, mass: 7.9, com: [0, 0.2, 0.25]}")
     loaded = free_motion(tl.load_robot(path), rate=100.0)
     findings = findings_of(tmp_path, robot, loaded)
     of_sensors = [line for line in findings if line.startswith("sensor")]
@@ -297,9 +303,7 @@ def test_torques_without_gravity_are_mended(tmp_path, robot, recording):
 
 
 def test_a_tool_that_is_modelled_but_not_mounted(tmp_path, robot, recording):
-    path = tmp_path / "robot.yaml"
-    text = robot.description.path.read_text()
-    path.write_text(text + "loads:\n  - {link: tool, mass: 0.6, com: [0, 0, 0.05]}\n")
+    path = described_with(tmp_path, robot, TOOL)
     findings = findings_of(tmp_path, robot, recording, str(path))
     (found,) = findings
     mass = re.match(r"(\S+) \+- \S+ kg too many at tool", found)

@@ -39,10 +39,14 @@ struct Touched {
   std::optional<Search> searched;
 };
 
-// Suspected: since when one contact has explained all [s], and when it was last not clear whether
-// a contact is felt, or one faulty channel [s].
+// Suspected: since when one contact has explained all [s], and since when and until when it was not
+// clear whether a contact is felt, or one faulty channel [s].
 struct Suspected {
-  std::optional<double> explained, one_channel, one_channel_since;
+  struct Doubt {
+    double since, last;
+  };
+  std::optional<double> explained;
+  std::optional<Doubt> one_channel;
 };
 
 // Two that began at the same instant, until they count as known.

@@ -163,16 +163,15 @@ class Tracks {
   // that is found for a while to say that there is one after all, or one more: that is another event,
   // unless the doubt was as short as noise is.
   bool may_be_one_channel(SegmentContacts& s, const Answer& a) {
-    std::optional<double>& last = s.suspected.one_channel;
-    std::optional<double>& since = s.suspected.one_channel_since;
-    if (suspect_.any() || (last && !placed(a))) {
-      if (!last) since = now_.time;
-      last = now_.time;
+    std::optional<Suspected::Doubt>& doubt = s.suspected.one_channel;
+    if (suspect_.any() || (doubt && !placed(a))) {
+      if (!doubt) doubt = Suspected::Doubt{now_.time, now_.time};
+      doubt->last = now_.time;
     }
-    if (!last) return false;
-    if (now_.time - *last < now_.brief()) return true;
-    const bool lasted = *last - *since >= now_.brief();
-    last.reset();
+    if (!doubt) return false;
+    if (now_.time - doubt->last < now_.brief()) return true;
+    const bool lasted = doubt->last - doubt->since >= now_.brief();
+    doubt.reset();
     if (!lasted) return false;
     reports_.end(s.touched.first);
     s.touched.first = reports_.next();
