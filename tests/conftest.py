@@ -10,6 +10,9 @@ from pathlib import Path
 
 import pytest
 
+# Tests run beside each other: threads of one test's linear algebra wait for those of the others.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parent / "estimation"))
 

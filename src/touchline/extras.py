@@ -9,6 +9,7 @@ EXTRAS = {
     "scipy": "sim",
     "pyarrow": "logs",
     "rosbags": "logs",
+    "threadpoolctl": "logs",
     "lz4": "logs",
     "backports": "logs",
     "trimesh": "meshes",

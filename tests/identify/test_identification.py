@@ -9,6 +9,7 @@ from free_motion import free_motion
 from robots import random_robot
 
 import touchline as tl
+from touchline.identify.choice import Chooser
 from touchline.identify.described import description_changes, identified_robot
 from touchline.identify.evidence import gather
 from touchline.identify.identification import identify
@@ -69,6 +70,18 @@ def test_friction_and_offsets_are_found_again():
             assert joint.friction.coulomb_width == width
     for value, error in zip(found.solution.values, found.solution.errors, strict=True):
         assert error < 0.2 * max(abs(value), 0.5)
+
+
+def test_rounding_does_not_choose_a_width_where_friction_is_held_at_zero():
+    robot = arm()
+    s = recorded(robot)
+    s.tau[:] -= np.tanh(s.qd / 0.05)  # as if joints were driven by their own motion
+    chosen = set()
+    for k in range(4):
+        other = replace(s, tau=s.tau * (1.0 + k * 1e-14))
+        evidence = gather(robot, [[other]])
+        chosen.add(Chooser(evidence, np.ones(len(evidence), dtype=bool)).richest().columns)
+    assert len(chosen) == 1
 
 
 def test_a_rotor_is_found_where_the_torque_is_that_of_the_motor():

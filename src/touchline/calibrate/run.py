@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from touchline.calibrate.beforehand import refuse_one_pose, refuse_wrong_signals
 from touchline.calibrate.blame import find_blame, often_off
@@ -163,34 +164,35 @@ def calibrate(
     frames: list[FrameError] = []
     rest: Rest | None = None
     if identification:
-        described = model
-        evidence = gather(model, recordings.all("equations"))
-        refuse_one_pose(evidence)
-        delays = find_delays(evidence)
-        if delays:
-            model = with_delays(model, delays)
-            recordings = Recordings(model, logs)
+        with threadpool_limits(1, "blas"):  # of small matrices: threads would wait for each other
+            described = model
             evidence = gather(model, recordings.all("equations"))
-        for _ in range(TURNS):
-            off = find_frames(evidence)
-            if not off:
-                break
-            frames = joined(frames, off)
-            model = with_frames(model, off)
-            recordings = Recordings(model, logs)
-            evidence = gather(model, recordings.all("equations"))
-        found = identify(evidence, trust)
-        left_out = found.touches()
-        if learn:
-            grids = grids_of(evidence)
-            hats = filtered(evidence.robot, recordings.all("what is left"), grids.hats)
-            rest = learn_rest(found, grids, hats)
-        recordings.leave_out(left_out)
-        model = identified_robot(found)
-        changes = description_changes(described, model)
-        if rest is not None and (rest.tables or had_rest):
-            model = with_rest(model, rest.tables)
-            changes["learned_rest"] = f"{out.stem}_rest.csv"
+            refuse_one_pose(evidence)
+            delays = find_delays(evidence)
+            if delays:
+                model = with_delays(model, delays)
+                recordings = Recordings(model, logs)
+                evidence = gather(model, recordings.all("equations"))
+            for _ in range(TURNS):
+                off = find_frames(evidence)
+                if not off:
+                    break
+                frames = joined(frames, off)
+                model = with_frames(model, off)
+                recordings = Recordings(model, logs)
+                evidence = gather(model, recordings.all("equations"))
+            found = identify(evidence, trust)
+            left_out = found.touches()
+            if learn:
+                grids = grids_of(evidence)
+                hats = filtered(evidence.robot, recordings.all("what is left"), grids.hats)
+                rest = learn_rest(found, grids, hats)
+            recordings.leave_out(left_out)
+            model = identified_robot(found)
+            changes = description_changes(described, model)
+            if rest is not None and (rest.tables or had_rest):
+                model = with_rest(model, rest.tables)
+                changes["learned_rest"] = f"{out.stem}_rest.csv"
     model = with_methods(model, *chosen, min_duration=hold, calibration=None, false_alarms=rate)
     noise = measure_noise(model, recordings.all("noise"))
     changes["noise"] = {key: _plain(value) for key, value in noise_keys(model, noise).items()}

@@ -33,6 +33,7 @@ POSES = 0.1  # rad; joints that all moved less show one pose, which tells no ine
 MANY = 5.0  # times a bias is less sure beside masses: then it may be one
 OFFSET, OFFSET_SHARE = 0.1, 0.003  # N or Nm, or of the row's largest reading: less matters little
 BETTER = 1.0  # standard errors by which a larger model must win
+SAME = 1.0 + 1e-9  # costs closer than that differ by rounding, as where friction is held at zero
 
 
 @dataclass(frozen=True)
@@ -306,7 +307,7 @@ class Chooser:
         for option in options:
             left = self._row_left(start, r, [*beside, option], self.use, self.use)
             costs.append(float((self.weight[self.use, r] * left**2).sum()))
-        return options[int(np.argmin(costs))]
+        return next(o for o, c in zip(options, costs, strict=True) if c <= SAME * min(costs))
 
 
 def _options(rich: list[Column]) -> list[list[Column]]:
