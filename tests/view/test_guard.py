@@ -230,6 +230,15 @@ def test_a_browser_with_the_token_gets_in_and_one_without_does_not(open_server, 
     until(open_server.page.get_clients, pause=browser.rest, what="the page's connection")
 
 
+def test_this_machine_needs_a_token_too_where_that_is_asked_for(capsys):
+    with PageServer("test", port=0, token=True) as closed:
+        assert "WARNING" not in capsys.readouterr().err
+        for upgrade in (False, True):
+            assert request(closed, upgrade=upgrade)[0] == 403
+        assert closed.url.startswith("http://127.0.0.1:") and closed.token in closed.url
+        assert request(closed, f"/?token={closed.token}")[0] == 200
+
+
 @pytest.mark.parametrize("packing", ["gzip", "identity"])
 def test_the_page_has_a_title_of_its_own(server, packing):
     url = f"http://127.0.0.1:{server.page.get_port()}/"

@@ -21,6 +21,7 @@ def demo(
     robot: Annotated[str, arg(metavar="ROBOT")] = "sara",
     host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1",
     port: int = 8080,
+    token: bool = False,
     browser: bool = True,
     interface: bool = False,
 ) -> int:
@@ -45,6 +46,7 @@ def demo(
         host: Address at which the page is served. With any but 127.0.0.1 other machines can see
             and push the arm; they need the token that is then printed.
         port: The first port that is tried; the next ones follow.
+        token: Visitors need a token on this machine, too: its other users reach the page.
         browser: Open the page in the browser.
         interface: The arm has buttons, a slider and a writing pad; the mouse is a finger.
     """
@@ -55,12 +57,11 @@ def demo(
         return _print(HEADLESS_DURATION if duration is None else duration, out, seed, robot)
     if duration is not None:
         check_positive(duration=duration)
-    return _show(host, port, seed, robot, browser, duration, interface)
+    return _show((host, port, token), seed, robot, browser, duration, interface)
 
 
 def _show(
-    host: str,
-    port: int,
+    address: tuple[str, int, bool],
     seed: int,
     robot: str,
     browser: bool,
@@ -70,7 +71,7 @@ def _show(
     from touchline.view.interface import InterfacePage
     from touchline.view.server import PageServer, open_page
 
-    with PageServer("Touchline", host, port) as server:
+    with PageServer("Touchline", *address) as server:
         from touchline.view.live import LivePage
 
         print("preparing the arm ...", flush=True)

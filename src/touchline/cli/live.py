@@ -21,6 +21,7 @@ def live(
     allow_control: bool = False,
     host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1",
     port: int = 8080,
+    token: bool = False,
     browser: bool = True,
 ) -> int:
     """Feels with a running robot: prints contacts and faults of the link as they come.
@@ -45,6 +46,7 @@ def live(
         host: Address at which the page is served. With any but 127.0.0.1 other machines can see
             it; they need the token that is then printed.
         port: The first port that is tried; the next ones follow.
+        token: Visitors need a token on this machine, too: its other users reach the page.
         browser: Open the page in the browser.
     """
     if duration is not None:
@@ -63,7 +65,7 @@ def live(
             print(f"  {line}")
         page = None
         if view:
-            page = _page(kept, session, allow_control, (host, port), browser)
+            page = _page(kept, session, allow_control, (host, port, token), browser)
         print("live; Ctrl-C ends it", flush=True)
         _follow(session, duration, page)
     if record is not None:
@@ -72,7 +74,11 @@ def live(
 
 
 def _page(
-    kept: ExitStack, session: Any, allow_control: bool, address: tuple[str, int], browser: bool
+    kept: ExitStack,
+    session: Any,
+    allow_control: bool,
+    address: tuple[str, int, bool],
+    browser: bool,
 ) -> Any:
     from touchline.live.page import RobotPage
     from touchline.view.server import PageServer, open_page

@@ -14,6 +14,7 @@ def view(
     out: Annotated[Path | None, arg(metavar="DIR")] = None,
     host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1",
     port: int = 8080,
+    token: bool = False,
     browser: bool = True,
 ) -> int:
     """Replays a recording with its contacts in the browser: time line, play, events, curves.
@@ -32,6 +33,7 @@ def view(
         host: Address at which the page is served. With any but 127.0.0.1 other machines can see
             it; they need the token that is then printed.
         port: The first port that is tried; the next ones follow.
+        token: Visitors need a token on this machine, too: its other users reach the page.
         browser: Open the page in the browser.
     """
     import tempfile
@@ -42,16 +44,16 @@ def view(
     if is_results(recording):
         if out is not None:
             raise InputError(f"--out {out}: {recording} holds results already")
-        return _show(Replay(recording, robot), recording, (host, port), browser)
+        return _show(Replay(recording, robot), recording, (host, port, token), browser)
     if recording.is_dir() and not any(recording.iterdir()):
         raise InputError(f"{recording}: is empty; neither a recording nor results")
     if robot is None:
         raise InputError(f"{recording}: a recording needs --robot; results know their own")
     if out is not None:
-        return _show(_analyzed(recording, robot, out), recording, (host, port), browser)
+        return _show(_analyzed(recording, robot, out), recording, (host, port, token), browser)
     with tempfile.TemporaryDirectory(prefix="touchline-view-") as folder:
         replay = _analyzed(recording, robot, Path(folder) / "results")
-        return _show(replay, recording, (host, port), browser)
+        return _show(replay, recording, (host, port, token), browser)
 
 
 def _analyzed(log: Path, robot: str, out: Path):
@@ -62,7 +64,7 @@ def _analyzed(log: Path, robot: str, out: Path):
     return Replay(out)
 
 
-def _show(replay, name: Path, address: tuple[str, int], browser: bool) -> int:
+def _show(replay, name: Path, address: tuple[str, int, bool], browser: bool) -> int:
     from touchline.view.replay_page import ReplayPage
     from touchline.view.server import PageServer, open_page
 

@@ -85,6 +85,7 @@ class PageServer:
         host: address to listen at; another than a loopback address needs a token, and prints a
             warning.
         port: the first that is tried; 0: any.
+        token: whether a loopback address needs one, too: other users of this machine reach it.
 
     Attributes:
         page: the viser server, to add things to.
@@ -94,9 +95,9 @@ class PageServer:
         InputError: nothing can be listened at there.
     """
 
-    def __init__(self, label: str, host: str = HOST, port: int = PORT) -> None:
+    def __init__(self, label: str, host: str = HOST, port: int = PORT, token: bool = False) -> None:
         local = is_local(host)
-        self.token = "" if local else secrets.token_urlsafe(24)
+        self.token = secrets.token_urlsafe(24) if token or not local else ""
         names = LOCAL_NAMES if local else LOCAL_NAMES | _own_names(host)
         self.guard = Guard(names, self.token)
         if not local:
