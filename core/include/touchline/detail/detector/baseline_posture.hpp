@@ -37,15 +37,21 @@ class BaselinePosture {
   std::vector<double> mean_;  // per segment: joint positions
 };
 
-// Variance of what the model's errors have added to a row since its baseline, `way2` [rad2] away.
-// The constant part is what an arm leaves on its way through ordinary motion. Weight changes with the
-// pose, about in proportion to the way as far as `drift_farthest`. In a joint's own torque there is
-// friction, too, all of which comes with motion.
-inline double drifted(const DetectionRow& row, const Activity& activity, double way2,
-                      const DetectorTuning& t) {
-  double share = std::min(way2, t.drift_farthest * t.drift_farthest) / (t.drift_way * t.drift_way);
-  if (row.component < 0)
-    share = std::max(share, std::min(1.0, activity.speed2 / (t.drift_speed * t.drift_speed)));
+// Which share of the constant part of the model's errors comes back `way2` [rad2] away from where the
+// baseline was averaged. That part is what an arm leaves on its way through ordinary motion. Weight
+// changes with the pose, about in proportion to the way as far as `drift_farthest`. In a joint's own
+// torque there is friction, too, all of which comes with motion.
+struct DriftShares {
+  DriftShares(const Activity& activity, double way2, const DetectorTuning& t)
+      : of_wrench(std::min(way2, t.drift_farthest * t.drift_farthest) / (t.drift_way * t.drift_way)),
+        of_torque(std::max(of_wrench,
+                           std::min(1.0, activity.speed2 / (t.drift_speed * t.drift_speed)))) {}
+  double of_wrench, of_torque;
+};
+
+// Variance of what the model's errors have added to a row since its baseline.
+inline double drifted(const DetectionRow& row, const Activity& activity, const DriftShares& shares) {
+  const double share = row.component < 0 ? shares.of_torque : shares.of_wrench;
   const double constant = row.drift.constant;
   return row.drift.variance(activity) + (share - 1.0) * constant * constant;
 }

@@ -41,13 +41,25 @@ class Detector {
         told_(observer, rows_, settings_.noise),
         activity_(observer.row_layout().joints, tuning_.activity_time),
         baseline_posture_(settings_.sum_limits.size(), observer.row_layout().joints),
+        bandwidths_(of_rows([this](const DetectionRow& row) { return bandwidth_of(row); })),
         states_(rows_.size()),
         spreads_(rows_.size()),
-        borne_out_(rows_.size()),
+        borne_out_(bandwidths_),
+        residuals_(rows_.size()),
+        trends_(rows_.size()),
+        known_(rows_.size()),
+        counts_(rows_.size()),
         samples_(rows_.size()),
         segments_(settings_.sum_limits.size()),
         first_(segments_.size() + 1, 0),
+        meters_(bandwidths_, of_rows(least_noise), tuning_),
+        trend_meters_(of_rows([this](const DetectionRow& row) {
+                        return bandwidth_of(row) * per_trend_;
+                      }),
+                      of_rows(least_noise), tuning_),
+        collision_shares_(of_rows([](const DetectionRow& row) { return row.contact / row.collision; })),
         normalized_(rows_.size(), 0.0),
+        shares_(rows_.size(), 0.0),
         limits_(rows_.size(), 1.0),
         drift_(rows_.size(), 0.0),
         excess_(rows_.size(), 1.0),
@@ -69,14 +81,9 @@ class Detector {
       tests_.emplace_back(observer, own, settings_, tuning_);
       joint_tests_ = joint_tests_ || tests_.back().used();
     }
-    for (const DetectionRow& row : rows_) {
-      const double least = row.contact / std::max(row.seen, 1.0);
-      meters_.emplace_back(bandwidth(row), least, tuning_);
-      trend_meters_.emplace_back(bandwidth(row) * per_trend_, least, tuning_);
-    }
     slowest_.assign(segments_.size(), kAbsurd);
     for (const DetectionRow& row : rows_)
-      slowest_[row.segment] = std::min(slowest_[row.segment], bandwidth(row));
+      slowest_[row.segment] = std::min(slowest_[row.segment], bandwidth_of(row));
   }
 
   Detector(const Detector&) = delete;
@@ -92,13 +99,13 @@ class Detector {
     timed_ = true;
     time_ = now;
     if (dt > 0.0) follow_motion(q, qd, dt);
+    for (std::size_t g = 0; g < segments_.size(); ++g) read_segment(g);
+    borne_out_.add(residuals_, known_, dt);
     for (std::size_t g = 0; g < segments_.size(); ++g) {
       Segment& s = segments_[g];
       s.peak = s.slow = s.sum = s.collision = s.borne = s.borne_sum = s.borne_collision = 0.0;
-      s.off = false;
-      read_segment(g);
       if (known(g)) s.age += dt;
-      for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) test_row(i, dt);
+      for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) test_row(i);
       judge(g, dt);
       decide(g, dt);
     }
@@ -106,6 +113,10 @@ class Detector {
     for (std::size_t i = 0; i < rows_.size(); ++i) {
       follow_offset(i, dt);
       offset_ = offset_ || stands_off(i);
+    }
+    if (dt > 0.0) {
+      meters_.add(residuals_, known_, counts_, dt, tuning_);
+      trend_meters_.add(trends_, known_, counts_, dt, tuning_);
     }
     if (dt > 0.0 && sound_) follow_drift(q, dt);
   }
@@ -133,7 +144,7 @@ class Detector {
   // What a row's load must exceed now, one sigma of its noise as seen, and what stood there when
   // observation began or rests there since a contact [N or Nm].
   double limit(int row) const { return limits_[row] * rows_[row].contact; }
-  double noise(int row) const { return meters_[row].sigma(); }
+  double noise(int row) const { return meters_.sigma(row); }
   double offset(int row) const { return states_[row].anchor; }
   // How far the arm has shown that it is not as told, per row; does anything stand there now that
   // exceeds a threshold; is the noise of any row clearly larger than told?
@@ -157,9 +168,9 @@ class Detector {
       *value += moved;
     s.trend = baseline;
     spreads_[row] = other.spreads_[of];
-    meters_[row] = other.meters_[of];
+    meters_.go_on_from(other.meters_, of, row);
     first_looks_[row] = other.first_looks_[of];
-    trend_meters_[row] = other.trend_meters_[of];
+    trend_meters_.go_on_from(other.trend_meters_, of, row);
     Segment& segment = segments_[rows_[row].segment];
     segment.age = std::max(segment.age, s.age);
     segment.off = other.segments_[other.rows_[of].segment].off;
@@ -231,17 +242,17 @@ class Detector {
     noisy_ = false;
     for (std::size_t i = 0; i < rows_.size(); ++i) {
       const std::size_t at = i * (rows_.size() + 1);
-      const double K = bandwidth(rows_[i]), kept = std::min(1.0, 0.5 * K * settings_.noise.period);
+      const double K = bandwidths_[i], kept = std::min(1.0, 0.5 * K * settings_.noise.period);
       const double readings = kept * told_.reading()[at], velocities = K * K * told_.momentum()[at];
-      meters_[i].tell(readings, velocities, tuning_);
+      meters_.tell(i, readings, velocities, tuning_);
       first_looks_[i].tell(readings, velocities, K, settings_.noise.period);
-      trend_meters_[i].tell((readings + kept * velocities) / (1.0 + tuning_.trend), 0.0, tuning_);
-      excess_[i] = meters_[i].excess(tuning_);
-      if (!meters_[i].contradicts(tuning_) || excess_[i] == 1.0) continue;  // it does not matter
+      trend_meters_.tell(i, (readings + kept * velocities) / (1.0 + tuning_.trend), 0.0, tuning_);
+      excess_[i] = meters_.excess(i, tuning_);
+      if (!meters_.contradicts(i, tuning_) || excess_[i] == 1.0) continue;  // it does not matter
       noisy_ = true;
       if (excess_[i] > standing_[i].ratio) {
         standing_[i].ratio = excess_[i];
-        standing_[i].seen = meters_[i].sigma();
+        standing_[i].seen = meters_.sigma(i);
       }
     }
   }
@@ -251,6 +262,7 @@ class Detector {
     const RowLayout& layout = observer_.row_layout();
     double wrench[6], load[6];
     bool known = false;
+    segments_[g].off = false;
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
       const DetectionRow& row = rows_[i];
       RowSample& s = samples_[i];
@@ -267,8 +279,10 @@ class Detector {
         s.gap_std = row_[layout.segment_gap_std() + 2 * g + (row.component < 3 ? 0 : 1)];
       }
       s.known = s.known && std::isfinite(s.residual);
+      residuals_[i] = s.residual;
+      known_[i] = s.known ? 1.0 : 0.0;
       segments_[g].off |= fires_[g] &&
-          (states_[i].shown > row.contact || meters_[i].contradicts(tuning_));
+          (states_[i].shown > row.contact || meters_.contradicts(i, tuning_));
       if (!std::isfinite(s.innovation)) s.innovation = s.residual;  // samples were lost
     }
   }
@@ -288,18 +302,26 @@ class Detector {
     return true;
   }
 
-  double bandwidth(const DetectionRow& row) const {
+  template <class Number>
+  std::vector<double> of_rows(Number&& number) const {
+    std::vector<double> all;
+    for (const DetectionRow& row : rows_) all.push_back(number(row));
+    return all;
+  }
+  static double least_noise(const DetectionRow& row) {
+    return row.contact / std::max(row.seen, 1.0);
+  }
+  double bandwidth_of(const DetectionRow& row) const {
     if (row.component < 0) return observer_.joints()[row.joint].bandwidth;
     return observer_.sensors()[observer_.layout().segments[row.segment].sensor].bandwidth;
   }
 
-  void test_row(std::size_t i, double dt) {
+  void test_row(std::size_t i) {
     const DetectionRow& row = rows_[i];
     RowState& s = states_[i];
     RowSample& sample = samples_[i];
-    normalized_[i] = 0.0;
-    if (!sample.known) return borne_out_[i].interrupt();
-    borne_out_[i].add(sample.residual, dt, bandwidth(row));
+    normalized_[i] = shares_[i] = 0.0;
+    if (!sample.known) return;
     if (!s.started) {  // what stands there when observation begins is an offset
       s.baseline = s.anchor = s.reference = s.trend = sample.residual;
       s.started = true;
@@ -310,17 +332,18 @@ class Detector {
     limits_[i] = largest_noise(i) / row.contact;
     normalized_[i] = (sample.residual - s.baseline) / row.contact;
     const double x = normalized_[i] / limits_[i];
+    const double share = shares_[i] = std::fabs(x);
     Segment& segment = segments_[row.segment];
-    segment.peak = std::max(segment.peak, std::fabs(x));
+    segment.peak = std::max(segment.peak, share);
     segment.slow = std::max(segment.slow, slow_share(i));
-    const double borne = (borne_out_[i].value() - s.baseline) / (row.contact * limits_[i]);
+    const double borne = (borne_out_.value(i) - s.baseline) / (row.contact * limits_[i]);
     segment.borne = std::max(segment.borne, std::fabs(borne));
     if (!(learns(i) && spreads_[i].limit(tuning_) > row.contact)) {
       segment.sum += x * x;
       segment.borne_sum += borne * borne;
     }
-    const double least = row.contact / row.collision;
-    segment.collision = std::max(segment.collision, std::fabs(x) * least);
+    const double least = collision_shares_[i];
+    segment.collision = std::max(segment.collision, share * least);
     segment.borne_collision = std::max(segment.borne_collision, std::fabs(borne) * least);
   }
 
@@ -334,7 +357,7 @@ class Detector {
         samples_[i].gap_std > 0.0) return 0.0;
     const double now = samples_[i].residual - s.baseline, mean = s.trend - s.baseline;
     if (now * mean <= 0.0) return 0.0;
-    const double limit = std::max(row.contact, trend_meters_[i].limit(row.seen,
+    const double limit = std::max(row.contact, trend_meters_.limit(i, row.seen,
         first_looks_[i].ratio(), tuning_));
     return std::min(std::fabs(now), std::fabs(mean)) / limit;
   }
@@ -346,7 +369,7 @@ class Detector {
     const DetectionRow& row = rows_[i];
     double most = row.contact;
     if (row.seen > 0.0) {
-      const double noise = meters_[i].limit(row.seen, first_looks_[i].ratio(), tuning_);
+      const double noise = meters_.limit(i, row.seen, first_looks_[i].ratio(), tuning_);
       const double variance = row.slow.moving_variance(activity());
       const double error = variance > 0.0 ? row.seen * std::sqrt(variance) : 0.0;
       most = std::max(most, error > 0.0 ? std::hypot(noise, error) : noise);
@@ -394,8 +417,10 @@ class Detector {
 
   void decide(std::size_t g, double dt) {
     Segment& s = segments_[g];
-    if (levels_[g] == 0 && !s.pending) s.origin = origin(g, dt);
-    if (s.origin == Origin::reversal && pushed(g)) s.origin = Origin::push;
+    const bool quiet = levels_[g] == 0 && !s.pending;
+    const bool may_begin = s.score > 1.0 || s.collision > 1.0 || (s.off && still_ < tuning_.pause);
+    if (quiet && may_begin) s.origin = origin(g, dt);
+    if ((!quiet || may_begin) && s.origin == Origin::reversal && pushed(g)) s.origin = Origin::push;
     advance(s.score > 1.0, dt, s.pending, s.above);
     s.highest = s.pending ? std::max(s.highest, s.score) : 0.0;
     advance(s.collision > 1.0, dt, s.pending_collision, s.above_collision);
@@ -462,8 +487,7 @@ class Detector {
         tuning_.start_samples * dt) return Origin::start;
     bool slow = true, creeps = true;
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
-      const double share = std::fabs(normalized_[i]) / limits_[i];
-      if (share < std::min(1.0, segments_[g].peak)) continue;
+      if (shares_[i] < std::min(1.0, segments_[g].peak)) continue;
       const RowState& s = states_[i];
       const double quick = samples_[i].residual - s.trend, before = s.trend - s.baseline;
       slow = slow && rows_[i].component < 0 &&
@@ -529,7 +553,7 @@ class Detector {
     RowState& s = states_[i];
     s.baseline = s.anchor = s.reference = s.trend;
     s.shown = std::max(s.shown, std::fabs(s.anchor));
-    s.age = s.referred = tuning_.trend / bandwidth(rows_[i]);
+    s.age = s.referred = tuning_.trend / bandwidths_[i];
   }
 
   // What is left of a contact and does not change rests there: an offset from now on. What stood
@@ -590,7 +614,7 @@ class Detector {
     const DetectionRow& row = rows_[i];
     const double value = samples_[i].residual;
     if (!samples_[i].known) return;
-    s.trend += (value - s.trend) * std::min(1.0, dt * bandwidth(row) * per_trend_);
+    s.trend += (value - s.trend) * std::min(1.0, dt * bandwidths_[i] * per_trend_);
     confirm_start(i, dt);
     if (learns(i) && dt > 0.0) {
       const bool touched = levels_[row.segment] > 0;
@@ -620,7 +644,7 @@ class Detector {
     const double most = learns(i)
         ? std::max(row.baseline_limit, spreads_[i].limit(tuning_)) : row.baseline_limit;
     s.baseline = std::clamp(next, s.anchor - most, s.anchor + most);
-    if (s.age < tuning_.trend / bandwidth(row)) s.anchor = s.baseline;
+    if (s.age < tuning_.trend / bandwidths_[i]) s.anchor = s.baseline;
   }
 
   // Noise is measured while nothing is felt, and of what is felt where it goes to and fro more often
@@ -630,20 +654,19 @@ class Detector {
     RowState& s = states_[i];
     const double off = samples_[i].residual - s.trend,
         most = tuning_.fro * limits_[i] * rows_[i].contact;
-    s.turns *= std::max(0.0, 1.0 - dt * bandwidth(rows_[i]) * per_fro_memory_);
+    s.turns *= std::max(0.0, 1.0 - dt * bandwidths_[i] * per_fro_memory_);
     if (off * s.side < -most) s.turns += 1.0;
     if (std::fabs(off) > most) s.side = off > 0.0 ? 1.0 : -1.0;
-    const bool counts = !felt || s.turns > tuning_.fro_turns;
     first_looks_[i].add(samples_[i].residual, tuning_);
-    meters_[i].add(samples_[i].residual, dt, counts, tuning_);
-    trend_meters_[i].add(s.trend, dt, counts, tuning_);
+    trends_[i] = s.trend;
+    counts_[i] = !felt || s.turns > tuning_.fro_turns ? 1.0 : 0.0;
   }
 
   // What stood there at the first sample may be a rest of settling, or of an arm that is set going.
   // It shows that the arm is not as told only if it still stands there a while later.
   void confirm_start(std::size_t i, double dt) {
     RowState& s = states_[i];
-    const double end = tuning_.confirm / bandwidth(rows_[i]), before = s.seconds;
+    const double end = tuning_.confirm / bandwidths_[i], before = s.seconds;
     s.seconds += dt;
     if (before >= end || s.seconds < end) return;
     const double least = std::min(std::fabs(s.trend), std::fabs(s.anchor));
@@ -660,9 +683,9 @@ class Detector {
         const double tau = std::min(quiet_[g], settings_.times.baseline);
         baseline_posture_.average(g, q, std::min(1.0, dt / tau));
       }
-      const double way2 = baseline_posture_.distance2(g, q);
+      const DriftShares shares(activity(), baseline_posture_.distance2(g, q), tuning_);
       for (std::size_t i = first_[g]; i < first_[g + 1]; ++i)
-        drift_[i] = std::sqrt(drifted(rows_[i], activity(), way2, tuning_));
+        drift_[i] = std::sqrt(drifted(rows_[i], activity(), shares));
     }
   }
 
@@ -676,16 +699,21 @@ class Detector {
   RowCovariance told_;
   ActivityMeter activity_;
   BaselinePosture baseline_posture_;
+  std::vector<double> bandwidths_;  // per row: of its filter [rad/s]
   std::vector<RowState> states_;
   std::vector<MotionSpread> spreads_;  // per row
-  std::vector<BorneOut> borne_out_;    // per row
+  BorneOut borne_out_;
+  // Of the sample: residuals, means of the last moments, whether they are known and count as noise.
+  RowLanes residuals_, trends_, known_, counts_;
   std::vector<RowSample> samples_;
   std::vector<Segment> segments_;
   std::vector<double> slowest_;     // per segment: the least bandwidth of its rows [rad/s]
   std::vector<std::size_t> first_;  // per segment: its first row; they stand together
   std::vector<SegmentTests> tests_;
-  std::vector<NoiseMeter> meters_, trend_meters_;  // per row: of the residual, of its trend
-  std::vector<double> normalized_, limits_, drift_, excess_;
+  NoiseMeter meters_, trend_meters_;  // of the residuals, of their trends
+  std::vector<double> collision_shares_;  // per row: its threshold, in those of a collision
+  std::vector<double> normalized_, shares_;  // in thresholds; the size of that, in limits
+  std::vector<double> limits_, drift_, excess_;
   std::vector<Standing> standing_;  // per row
   std::vector<FirstLook> first_looks_;  // per row
   std::vector<int> levels_;

@@ -18,6 +18,7 @@ class FirstLook {
   // The residual's variances that are told: of readings, which its filter keeps at a rate of
   // `bandwidth` [rad/s] and samples `dt` [s] apart; of velocities, which are nearly white.
   void tell(double of_readings, double of_velocities, double bandwidth, double dt) {
+    if (over()) return;
     const double a = std::exp(-bandwidth * dt);
     // Of r[k] = a r[k-1] + (1 - a) (x[k] + x[k-1]) / 2, whose autocorrelations are (1 + a) / 2 times
     // 1, a and a^2.
