@@ -278,8 +278,11 @@ inline nb::tuple events(Pipeline& p, std::size_t from) {
 }
 
 // Begins anew with the same robot but other figures, of its biases or loads. Events that last end
-// with the last sample; the numbers of events go on.
-inline void restart(Pipeline& p, const tl::Robot& robot, std::vector<tl::StandIn> stand_ins) {
+// with the last sample; the numbers of events go on. `same`: robot and stand-ins are those of before.
+inline void restart(Pipeline& p, const tl::Robot& robot, std::vector<tl::StandIn> stand_ins,
+                    bool same) {
+  std::vector<tl::StandIn> kept;
+  if (same) kept.swap(stand_ins);
   auto fresh = std::make_unique<tl::RedundantPipeline>(robot, p.value->tuning(),
                                                        std::move(stand_ins));
   const tl::Robot& before = p.value->robot();
@@ -298,6 +301,7 @@ inline void restart(Pipeline& p, const tl::Robot& robot, std::vector<tl::StandIn
   });
   fresh->number_events_from(p.value->next_event());
   fresh->count_resets_from(*p.value);
+  if (same) fresh->take_stand_ins(*p.value, std::move(kept));
   p.value.swap(fresh);
 }
 
@@ -433,7 +437,8 @@ inline void bind(nb::module_& m) {
       .def("update", &update, "time"_a, "q"_a, "qd"_a, "tau"_a.none(), "wrench"_a.none())
       .def("run", &run, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a)
       .def("events", &events, "since"_a)
-      .def("restart", &restart, "robot"_a, "stand_ins"_a = std::vector<tl::StandIn>{})
+      .def("restart", &restart, "robot"_a, "stand_ins"_a = std::vector<tl::StandIn>{},
+           "same"_a = false)
       .def("keep", [](Pipeline& p, std::size_t most) {
              const guard::Turn turn(p.turn);
              p.most = most;

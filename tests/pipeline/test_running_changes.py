@@ -162,6 +162,36 @@ def test_after_a_reset_all_is_as_at_the_start(sara):
     np.testing.assert_array_equal(expected.segment_wrench, found.segment_wrench)
 
 
+@pytest.mark.parametrize("lost", [False, True])
+def test_after_a_reset_stand_ins_are_as_at_the_start(sara, lost):
+    still = at_rest(sara)
+    dead = replace(still, wrench=still.wrench.copy())
+    dead.wrench[300:700, 0] = np.nan
+    once, again = tl.Pipeline(sara), tl.Pipeline(sara)
+    feed(again, dead if lost else still)
+    again.reset()
+    expected, found = feed(once, dead, 5.0), feed(again, dead, 5.0)
+    assert np.any(expected.health & tl.Health.SENSOR_EXCLUDED)
+    np.testing.assert_array_equal(expected.tau_ext, found.tau_ext)
+    np.testing.assert_array_equal(expected.segment_wrench, found.segment_wrench)
+    np.testing.assert_array_equal(expected.health, found.health)
+
+
+def test_a_pipeline_begins_afresh_as_a_new_one(sara):
+    still = at_rest(sara)
+    pushed = replace(still, wrench=still.wrench + np.array([0.0, 0.0, -30.0, 0.0, 0.0, 0.0]))
+    used, new = tl.Pipeline(sara), tl.Pipeline(sara)
+    feed(used, still)
+    feed(used, pushed, 1.0)
+    count, afresh = len(used.events), used.afresh()
+    assert count and not afresh.events
+    for samples, start in ((still, 5.0), (pushed, 6.0)):
+        expected, found = feed(new, samples, start), feed(afresh, samples, start)
+        np.testing.assert_array_equal(expected.tau_ext, found.tau_ext)
+    assert [repr(event) for event in afresh.events] == [repr(event) for event in new.events]
+    assert len(used.events) == count
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_grasped_body_is_weighed_in_three_seconds_of_motion(sara, seed):
     com = np.array([0.02, -0.01, 0.06])

@@ -69,11 +69,7 @@ class RedundantPipeline {
     faults_ = before_ = sound_;
     left_.resize(sound_.size());
     restarts_.resize(n + levels_.size(), 0);
-    for (StandIn& given : stand_ins) {
-      check(given);
-      stand_ins_.push_back(std::make_unique<Second>(std::move(given), tuning, k));
-      find_parts(*stand_ins_.back());
-    }
+    for (StandIn& given : stand_ins) add(std::move(given));
   }
 
   const RowLayout& row_layout() const { return whole_.row_layout(); }
@@ -154,6 +150,19 @@ class RedundantPipeline {
   // goes on for this one, with other figures, counts on from there.
   Span<Reset> resets() const { return {resets_.resets().data(), resets_.resets().size()}; }
   void count_resets_from(const RedundantPipeline& before) { resets_.go_on_from(before.resets_); }
+  // The stand-ins of another pipeline of this very robot that begins anew: making one takes
+  // milliseconds, and those that it never used are as new.
+  void take_stand_ins(RedundantPipeline& before, std::vector<StandIn> given) {
+    for (std::size_t i = 0; i < given.size(); ++i) {
+      const bool fresh = i < before.stand_ins_.size() && !before.stand_ins_[i]->used;
+      if (fresh)
+        stand_ins_.push_back(std::move(before.stand_ins_[i]));
+      else
+        add(std::move(given[i]));
+    }
+    before.stand_ins_.clear();
+    before.now_ = before.warming_ = before.parts_ = nullptr;
+  }
   const RestMeter& rest() const { return whole_.rest(); }
   std::vector<SurfaceCell> region() const {
     return now_ != nullptr ? now_->pipeline.region() : whole_.region();
@@ -260,7 +269,9 @@ class RedundantPipeline {
       for (const std::unique_ptr<Second>& second : stand_ins_) {
         const std::vector<int>& told = second->given.segments;  // of its own ones, as told
         for (std::size_t i = 0; i < told.size(); ++i) {
-          if (second->told_as[g] == told[i]) second->pipeline.doubt(i, since, until);
+          if (second->told_as[g] != told[i]) continue;
+          second->used = true;
+          second->pipeline.doubt(i, since, until);
         }
       }
     }
@@ -328,8 +339,15 @@ class RedundantPipeline {
     Pipeline pipeline;
     std::vector<double> wrench;
     std::vector<char> without;  // per sensor of the whole robot
+    bool used = false;          // has it been told anything?
     std::vector<int> told_as;   // per segment of the whole robot: the one that it is part of here
   };
+
+  void add(StandIn given) {
+    check(given);
+    stand_ins_.push_back(std::make_unique<Second>(std::move(given), tuning(), absent_.size()));
+    find_parts(*stand_ins_.back());
+  }
 
   // Which segments of the whole robot are one where a stand-in speaks.
   void find_parts(Second& second) const {
@@ -354,6 +372,7 @@ class RedundantPipeline {
 
   // Tells a stand-in what stands on the arm while nothing touches it.
   void teach(Second& second) {
+    second.used = true;
     const std::vector<DetectionRow>& rows = second.pipeline.robot().rows;
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const int known = second.given.rows[i];
@@ -478,6 +497,7 @@ class RedundantPipeline {
   }
 
   Result feed(Second& second, const Sample& sample) {
+    second.used = true;
     for (std::size_t s = 0; s < second.given.sensors.size(); ++s)
       std::copy_n(sample.wrench + 6 * second.given.sensors[s], 6, second.wrench.data() + 6 * s);
     return second.pipeline.update(

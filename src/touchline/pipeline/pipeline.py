@@ -3,6 +3,7 @@
 
 from collections import deque
 from collections.abc import Callable, Mapping
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -127,7 +128,12 @@ class Pipeline:
         self._weights = period, bandwidth, wrench_error, torque_error, pushes, self.tuning
         self._model_error = model_error
         self._made, self._stand_ins = self._native(), self._make_stand_ins()
-        self._core = core.Pipeline(self._made, native, self._stand_ins)
+        self._native_tuning = native
+        self._begin()
+
+    def _begin(self) -> None:
+        robot = self.robot
+        self._core = core.Pipeline(self._made, self._native_tuning, self._stand_ins)
         self._update = self._core.update
         names = Names.of(
             robot.segment_names,
@@ -230,9 +236,19 @@ class Pipeline:
         """
         write_robot(Path(path), self._native())
 
+    def afresh(self) -> "Pipeline":
+        """Another pipeline that begins with what this one knows of the robot, and has felt nothing.
+
+        It takes a part of the time of a new one, and says what a new one would say.
+        """
+        other = copy(self)
+        other._begin()
+        other._loads = dict(self._loads)
+        return other
+
     def reset(self) -> None:
         """Forgets the past, as after a long gap; events that last end, their numbers go on."""
-        self._core.restart(self._made, self._stand_ins)
+        self._core.restart(self._made, self._stand_ins, same=True)
 
     def tare(self) -> Tare:
         """Takes what is felt now for the sensors' and joints' offsets: nothing may touch the arm.
