@@ -2,6 +2,7 @@
 """What can be felt: the smallest force on each link that these sensors and thresholds find."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -61,7 +62,8 @@ class Felt:
         return f"{start}: {100 * SHARE:.0f} % are found from {self.force:.1f} N on"
 
 
-def felt(robot: Robot, period: float = 1e-3) -> list[Felt]:
+@lru_cache(maxsize=4)
+def felt(robot: Robot, period: float = 1e-3) -> tuple[Felt, ...]:
     """What can be felt on each link that has a surface.
 
     A push of force F at a place x with direction u loads the joints by J(x)^T u F (eq. 2) and the
@@ -82,7 +84,7 @@ def felt(robot: Robot, period: float = 1e-3) -> list[Felt]:
     for i, row in enumerate(rows):
         screws[:, i] = screw_of(robot, row, frames)
     patches = Skin(robot).patches
-    return [_on_link(robot, patch, rows, limits, frames, screws, rng) for patch in patches]
+    return tuple(_on_link(robot, patch, rows, limits, frames, screws, rng) for patch in patches)
 
 
 def note_felt(robot: Robot, findings: Findings, period: float = 1e-3) -> None:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Noise figures beside the noise of a recording."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from touchline.arrays import Array
@@ -14,6 +16,12 @@ OFF = 1.5  # times the figure in use; thresholds follow from it
 ODD = 2.0  # times what is usual among the joints: one that stands out is told by itself
 
 
+@lru_cache(maxsize=4)
+def _given(robot: Robot) -> frozenset[str]:
+    """Which noise figures the description gives: `tau`, names of sensors."""
+    return frozenset(given_keys(robot.description.path).get("noise") or ())
+
+
 def check_noise(robot: Robot, seen: Seen, findings: Findings) -> None:
     """White noise per sample beside the figures in use.
 
@@ -21,7 +29,7 @@ def check_noise(robot: Robot, seen: Seen, findings: Findings) -> None:
     more noise is one: a driver that filters its signals shows less per sample, which says nothing
     of what it lets through.
     """
-    given = given_keys(robot.description.path).get("noise") or {}
+    given = _given(robot)
     _torques(robot, seen, findings, "tau" in given)
     k = len(robot.sensor_names)
     sigma = seen.wrench_noise.sigma().reshape(k, 6)

@@ -6,6 +6,7 @@ arm for external: its residuals are the readings to be expected while nothing to
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -119,14 +120,19 @@ class WindowMaker:
 
 
 def _expecting(robot: Robot, compensated: str) -> Observer:
+    bare = _bare(robot, compensated)
+    return Observer(bare, bandwidth=1e9, method="paper", discretization="exponential")
+
+
+@lru_cache(maxsize=8)
+def _bare(robot: Robot, compensated: str) -> Robot:
     description = robot.description
     sensors = tuple(
         replace(s, compensated=compensated, bias=(0.0,) * 6, polarity="outboard", frame="sensor")
         for s in description.sensors
     )
     joints = tuple(replace(j, bias=0.0, friction=Friction(), rest=None) for j in description.joints)
-    bare = Robot(replace(description, sensors=sensors, joints=joints), robot.mechanism)
-    return Observer(bare, bandwidth=1e9, method="paper", discretization="exponential")
+    return Robot(replace(description, sensors=sensors, joints=joints), robot.mechanism)
 
 
 def _read_torques(robot: Robot, part: Samples) -> Array:

@@ -6,6 +6,7 @@ import resource
 import time
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +107,15 @@ def blank(job: Job, status: str, reason: str) -> Row:
     }
 
 
+@lru_cache(maxsize=4)
+def _model(robot: str, configuration: str, friction: float | None, reach: float | None) -> Any:
+    """A robot; `configuration` is the hash of all that it is described by."""
+    from touchline.model.pushes import with_pushes
+    from touchline.model.robot import load_robot
+
+    return with_pushes(load_robot(robot), friction, reach)
+
+
 def _at_hand(job: Job) -> AbstractContextManager[Path]:
     """The recording as a file of this machine."""
     if job.recording.url:
@@ -114,12 +124,15 @@ def _at_hand(job: Job) -> AbstractContextManager[Path]:
 
 
 def _analyzed(job: Job, log: Path) -> Row:
-    from touchline.report.analysis import analyze
+    from touchline.report.analysis import analyze_as
     from touchline.report.outputs import NAMES
 
-    out = job.out / job.recording.name
+    out, robot = job.out / job.recording.name, job.recording.robot
+    options = dict(job.options)
+    pushes = options.pop("friction", None), options.pop("reach", None)
+    model = _model(robot, job.configuration, *pushes)
     origin = job.recording.url or None
-    analysis = analyze(log, job.recording.robot, out, **job.options, origin=origin)
+    analysis = analyze_as(model, robot, log, out, **options, origin=origin)
     make_figures(out, analysis.robot.name)
     clock = analysis.statistics.clock
     files = [out / name for name in (*NAMES, FIGURES) if (out / name).is_file()]

@@ -2,6 +2,7 @@
 """The main job on a recording: log in, estimates, contacts, events and report out."""
 
 from collections.abc import Iterator
+from functools import lru_cache
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -78,11 +79,30 @@ def analyze(
             Older results in it stay then, and what this run had written stays readable in the
             folder `touchline.unfinished`.
     """
+    check_options(bandwidth, method, friction, reach)
+    source = robot.name if isinstance(robot, Robot) else robot
+    model = with_pushes(robot if isinstance(robot, Robot) else load_robot(robot), friction, reach)
+    options: dict[str, Any] = {"bandwidth": bandwidth, "method": method, "report": report}
+    return analyze_as(model, source, Path(log), Path(out), **options, origin=origin, beside=beside)
+
+
+def analyze_as(
+    model: Robot,
+    source: Path | str,
+    log: Path,
+    out: Path,
+    bandwidth: float | None = None,
+    method: str = "segment",
+    report: Report = "full",
+    origin: str | None = None,
+    beside: Path | str | None = None,
+) -> Analysis:
+    """`analyze` with a robot at hand, and `source`, where a later reader of the results finds it.
+
+    Many recordings of one robot need not find out anew what only depends on the robot.
+    """
     import pyarrow.parquet  # noqa: F401  the results need it: told before the work begins
 
-    check_options(bandwidth, method, friction, reach)
-    log, out, source = Path(log), Path(out), robot.name if isinstance(robot, Robot) else robot
-    model = with_pushes(robot if isinstance(robot, Robot) else load_robot(robot), friction, reach)
     check_inputs(out, log, Path(source))
     other = None if beside is None else Beside(Path(beside))
     with open_log(log, model.description) as recording:
@@ -92,7 +112,7 @@ def analyze(
             raise InputError(f"{log}: holds no samples")
         with ResultsFolder(out, NAMES) as folder:
             period = sample_period(recording, first.time)
-            pipeline = Pipeline(model, bandwidth, method, period)
+            pipeline = _pipeline(model, bandwidth, method, period).afresh()
             run = _Run(pipeline, folder.draft, period, other, report)
             glanced = Glance()
             for part in _with_progress(recording, chain([first], parts)):
@@ -116,6 +136,12 @@ def analyze(
                 write_text(folder.draft / REPORT, page_text(analysis, report == "full"))
             folder.commit()
     return analysis
+
+
+@lru_cache(maxsize=4)
+def _pipeline(model: Robot, bandwidth: float | None, method: str, period: float) -> Pipeline:
+    """A pipeline that stays as it begins."""
+    return Pipeline(model, bandwidth, method, period)
 
 
 class Glance:
