@@ -99,7 +99,9 @@ class Raster {
   // The first pixel of some whose middle lies at or behind a place.
   static int after(double place, int least, int most) {
     if (!(place > least)) return least;
-    return static_cast<int>(std::min(std::ceil(place - 0.5), static_cast<double>(most)));
+    if (!(place - 0.5 < most)) return most;
+    const int below = static_cast<int>(place - 0.5);  // towards zero; `std::ceil` is a call
+    return below + (below < place - 0.5);
   }
 
   Window window_;

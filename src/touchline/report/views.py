@@ -62,7 +62,8 @@ def _scores(scene: Scene, directions: Floats) -> Floats:
     # The arm from its side: spread out rather than foreshortened.
     points = scene.outline
     middle = points - points.mean(axis=0)
-    shortened = ((middle @ directions.T) ** 2).sum(axis=0) / (middle**2).sum()
+    moments = middle.T @ middle
+    shortened = np.einsum("di,ij,dj->d", directions, moments, directions) / np.trace(moments)
     scores += 0.8 * np.sqrt((1 - shortened).clip(0))
     marks = [mark for mark in scene.marks if mark.kind != "candidate"] or scene.marks
     for mark in marks:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Simple solids to mark things with: arrows, balls, ellipsoids, rods."""
 
+from functools import cache
+
 import numpy as np
 
 from touchline.arrays import Floats
@@ -33,8 +35,7 @@ def ball(centre: Floats, radius: float) -> Triangles:
 
 def ellipsoid(centre: Floats, axes: Floats) -> Triangles:
     """An ellipsoid about `centre` (3,) [m] with half axes in the columns of `axes` (3, 3) [m]."""
-    angle = np.linspace(-np.pi / 2, np.pi / 2, SIDES // 2 + 1)
-    sphere = _turned(np.column_stack([np.sin(angle), np.cos(angle).clip(0)]))
+    sphere = _sphere()
     corners = sphere.corners @ axes.T + centre
     normals = sphere.corners @ np.linalg.inv(axes)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
@@ -51,6 +52,13 @@ def spread(covariance: Floats, sigmas: float, least: float) -> Floats:
     """
     variances, directions = np.linalg.eigh((covariance + covariance.T) / 2)
     return directions * np.maximum(sigmas * np.sqrt(variances.clip(0)), least)
+
+
+@cache
+def _sphere() -> Triangles:
+    """A ball of radius 1 about the origin."""
+    angle = np.linspace(-np.pi / 2, np.pi / 2, SIDES // 2 + 1)
+    return _turned(np.column_stack([np.sin(angle), np.cos(angle).clip(0)]))
 
 
 def _turned(profile: Floats) -> Triangles:
