@@ -183,11 +183,15 @@ def test_a_plot_is_saved_as_csv_and_png(report):
     until(lambda: report.run("saved.length === 2 && saved.every((s) => s.text)"), pause=report.rest)
     table, picture = sorted(report.run("saved"), key=lambda s: s["type"], reverse=True)
     head, *rows = table["text"].splitlines()
-    assert head == "time,largest test least,largest test largest" and len(rows) > 500
+    unit = "[of the contact threshold]"
+    assert head == f"time [s],largest test least {unit},largest test largest {unit}"
+    assert len(rows) > 500
     numbers = np.array([[float(x or "nan") for x in row.split(",")] for row in rows])
     assert (np.diff(numbers[:, 0]) > 0).all() and np.nanmax(numbers[:, 2]) > 1.0
     assert (numbers[:, 2] >= numbers[:, 1])[np.isfinite(numbers[:, 1])].all()
     assert picture["text"][1:4] == "PNG" and picture["size"] > 3000
+    height = 256 * ord(picture["text"][22]) + ord(picture["text"][23])
+    assert height > 2 * PLOT[1] + 40, "title, unit and key stand above the curves"
     assert table["name"].endswith(".csv") and title.split(":")[0] in table["name"]
 
 

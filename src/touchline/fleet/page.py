@@ -19,6 +19,7 @@ from touchline.report.outputs import EVENTS, REPORT, write_text
 
 PAGE_FILE = "fleet.html"
 DRIFTS = 30  # joints that the page names, the worst first
+HOURS = "Hour of the day in UTC; of a recording without dates, hours since its first sample."
 MOST_FAINT = 20  # lines
 MOST_RECORDINGS = 20_000  # lines of the last table: some 4 MB
 
@@ -52,7 +53,7 @@ def write_page(out: Path, recordings: list[Row], figures: dict[str, Figures], ro
         _header(recordings),
         _robots(recordings, figures),
         _by(rows, "link", "Contacts by link", "link"),
-        _by(rows, "hour", "Contacts by hour", "hour"),
+        _by(rows, "hour", "Contacts by hour", "hour", note(HOURS)),
         _faint(recordings),
         _drift(figures),
         _health(rows),
@@ -116,7 +117,7 @@ def _faint(recordings: list[Row]) -> str:
     return section("Below what can be felt", f"<ul>{''.join(items)}</ul>")
 
 
-def _by(rows: Rows, key: str, title: str, head: str) -> str:
+def _by(rows: Rows, key: str, title: str, head: str, words: str = "") -> str:
     groups: dict[tuple[str, Any], Counter[str]] = defaultdict(Counter)
     forces: dict[tuple[str, Any], float] = defaultdict(float)
     for row in rows["contacts"]:
@@ -129,9 +130,8 @@ def _by(rows: Rows, key: str, title: str, head: str) -> str:
         for (robot, value), told in sorted(groups.items(), key=lambda item: (str(item[0]),))
     ]
     names = ["robot", head, "contacts", "collisions", "largest force [N]"]
-    return section(
-        title, table(names, [_short(line) for line in lines]) if lines else "<p>None.</p>"
-    )
+    shown = table(names, [_short(line) for line in lines]) if lines else "<p>None.</p>"
+    return section(title, shown, words)
 
 
 def _drift(figures: dict[str, Figures]) -> str:
@@ -168,13 +168,15 @@ def _health(rows: Rows) -> str:
         for key, value in row.items():
             if isinstance(value, int) and key != "hour":
                 totals[row["robot"]][key] += value
-    bits = sorted({key for told in totals.values() for key in told} - {"samples", "healthy"})
+    met = {key for told in totals.values() for key, count in told.items() if count}
+    bits = sorted(met - {"samples", "healthy"})
     lines = [
         [robot, 100.0 * told["healthy"] / max(told["samples"], 1), *(told[bit] for bit in bits)]
         for robot, told in sorted(totals.items())
     ]
     head = ["robot", "without remark [%]", *(bit.lower().replace("_", " ") for bit in bits)]
-    return section("Health of the samples", table(head, [_short(line) for line in lines]))
+    words = note("Samples with each remark; remarks that no sample has are left out.")
+    return section("Health of the samples", table(head, [_short(line) for line in lines]), words)
 
 
 def _recordings(out: Path, recordings: list[Row]) -> str:
@@ -196,4 +198,5 @@ def _recordings(out: Path, recordings: list[Row]) -> str:
 
 
 def _short(line: list[Any]) -> list[Any]:
-    return [float(f"{x:.4g}") if isinstance(x, float) else x for x in line]
+    """Four digits, and no more than four decimals: what is smaller is noise."""
+    return [round(float(f"{x:.4g}"), 4) + 0.0 if isinstance(x, float) else x for x in line]

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small pieces of HTML."""
 
+import re
 from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Any
 
 import numpy as np
+
+SHORT = 24  # characters of a cell that stay on one line
 
 
 def text(value: Any) -> str:
@@ -31,17 +34,21 @@ def table(head: Sequence[str], rows: Iterable[Sequence[Any]], rows_as: Sequence[
     kept = [i for i in range(len(head)) if not rows or any(text(row[i]) for row in rows)]
     head, rows = [head[i] for i in kept], [[row[i] for i in kept] for row in rows]
     numeric = [all(_is_number(row[i]) for row in rows) for i in range(len(head))]
-    kinds = [' class="number"' if is_number else "" for is_number in numeric]
+    kinds = [
+        _kind(is_number, [cell(row[i]) for row in rows]) for i, is_number in enumerate(numeric)
+    ]
     # What scrolls takes the keyboard's focus, and needs a name; an empty header is none.
     named = escape(", ".join(name for name in head if name) or "facts")
     lines = [f'<div class="scroll" tabindex="0" role="group" aria-label="table: {named}">']
-    lines.append("<table><thead><tr>")
-    tags = ["th" if name else "td" for name in head]
-    lines += [
-        f"<{tag}{kind}>{escape(name)}</{tag}>"
-        for tag, name, kind in zip(tags, head, kinds, strict=True)
-    ]
-    lines.append("</tr></thead><tbody>")
+    lines.append("<table>")
+    if any(head):
+        tags = ["th" if name else "td" for name in head]
+        names = "".join(
+            f"<{tag}{kind}>{escape(name)}</{tag}>"
+            for tag, name, kind in zip(tags, head, kinds, strict=True)
+        )
+        lines.append(f"<thead><tr>{names}</tr></thead>")
+    lines.append("<tbody>")
     for i, row in enumerate(rows):
         cells = (f"<td{kind}>{cell(v)}</td>" for v, kind in zip(row, kinds, strict=True))
         lines.append(f"<tr{rows_as[i] if rows_as else ''}>{''.join(cells)}</tr>")
@@ -55,6 +62,14 @@ class Cell(str):
 def cell(value: Any) -> str:
     """The content of a table's cell."""
     return value if isinstance(value, Cell) else text(value)
+
+
+def _kind(is_number: bool, cells: Sequence[str]) -> str:
+    """How a column breaks: numbers and short words do not, sentences have room."""
+    longest = max((len(re.sub("<[^>]*>", "", one)) for one in cells), default=0)
+    if is_number:
+        return ' class="number"'
+    return ' class="tight"' if longest <= SHORT else ' class="words"'
 
 
 def _is_number(value: Any) -> bool:

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Everything about the robot description that an analysis used."""
 
+from collections.abc import Sequence
 from html import escape
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -70,8 +72,8 @@ def _joints(analysis: Analysis) -> str:
                 _torque(joint),
                 robot.joint_segments[j],
                 analysis.bandwidth or description.bandwidth_joints[j],
-                limit.contact if limit else None,
-                limit.collision if limit else None,
+                float(f"{limit.contact:.3g}") if limit else None,
+                float(f"{limit.collision:.3g}") if limit else None,
                 _friction(joint),
                 _conversion(joint),
                 joint.range if np.isfinite(joint.range) else None,
@@ -126,10 +128,18 @@ def _sensor(analysis: Analysis, sensor: SensorDescription) -> list[Any]:
     description = analysis.robot.description
     axes = "six" if len(sensor.axes) == 6 else " ".join(sensor.axes)
     values = (sensor.name, sensor.link, sensor.xyz, sensor.rpy, axes, sensor.polarity)
-    own = (sensor.frame, sensor.compensated, sensor.bias, sensor.delay, sensor.range)
-    noise = description.noise.sensors.get(sensor.name)
+    own = (sensor.frame, sensor.compensated, _repeated(sensor.bias), sensor.delay or None)
+    noise = description.noise.sensors.get(sensor.name, ())
     bandwidth = analysis.bandwidth or description.bandwidth_sensors[sensor.name]
-    return [*values, *own, noise, bandwidth]
+    return [*values, *own, _repeated(sensor.range), _repeated(noise), bandwidth]
+
+
+def _repeated(values: Sequence[float]) -> str:
+    """Numbers of six axes, equal neighbours once: "3 x 0.05, 3 x 0.01"; nothing for zeros."""
+    if not any(values):
+        return ""
+    runs = [(value, len(list(run))) for value, run in groupby(values)]
+    return ", ".join(f"{count} x {text(v)}" if count > 1 else text(v) for v, count in runs)
 
 
 def _bodies(robot: Robot) -> list[list[Any]]:

@@ -156,6 +156,8 @@
       const label = { x: at, y: frame.height - 5, "text-anchor": "middle" };
       node("text", label, svg).textContent = value.toFixed(digits);
     }
+    const unit = { x: 2, y: frame.height - 5, "text-anchor": "start" };
+    node("text", unit, svg).textContent = "time [s]";
   };
   const rule = (svg, frame, v, kind) => node("line",
     { x1: LEFT, x2: frame.width - RIGHT, y1: frame.y(v), y2: frame.y(v), class: kind }, svg);
@@ -378,9 +380,10 @@
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
   };
-  const csv = (plot, names) => {
+  const csv = (plot, names, unit) => {
     const { source, panel } = plot, frame = { from: plot.group.view[0], to: plot.group.view[1] };
-    const lines = [["time", ...names.flatMap((name) => [`${name} least`, `${name} largest`])]];
+    const lines = [["time [s]", ...names.flatMap((name) =>
+      [`${name} least [${unit}]`, `${name} largest [${unit}]`])]];
     const [from, to] = pieces(source, frame);
     for (let i = from; i < to; i++) {
       const values = panel.columns.flatMap((column) =>
@@ -393,7 +396,24 @@
   };
   const PAINT = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-opacity", "font",
     "stroke-dasharray", "vector-effect", "color"];
-  const png = (plot, done) => {
+  const HEAD = 26;  // pixels above the picture: title, unit, and the key in the curves' colours
+  const title = (pen, header, scale) => {
+    let at = 8;
+    pen.scale(scale, scale);
+    for (const part of header.querySelectorAll("b, .soft, .key")) {
+      const style = getComputedStyle(part), words = part.firstChild?.textContent ?? "";
+      pen.font = `${style.fontWeight} 13px ${style.fontFamily}`;
+      pen.fillStyle = style.color;
+      if (part.classList.contains("key")) {
+        pen.fillRect(at, 13, 14, 2);
+        at += 20;
+      }
+      pen.fillText(words, at, 18);
+      at += pen.measureText(words).width + 14;
+    }
+    pen.setTransform(1, 0, 0, 1, 0, 0);
+  };
+  const png = (plot, header, done) => {
     const { svg } = plot, copy = svg.cloneNode(true), { width, height } = svg.viewBox.baseVal;
     const own = [...svg.querySelectorAll("*")];
     [...copy.querySelectorAll("*")].forEach((one, i) => {
@@ -406,11 +426,12 @@
     const image = new Image();
     image.onload = () => {
       const canvas = document.createElement("canvas");
-      [canvas.width, canvas.height] = [2 * width, 2 * height];
+      [canvas.width, canvas.height] = [2 * width, 2 * (height + HEAD)];
       const pen = canvas.getContext("2d");
       pen.fillStyle = getComputedStyle(document.body).backgroundColor;
       pen.fillRect(0, 0, canvas.width, canvas.height);
-      pen.drawImage(image, 0, 0);
+      pen.drawImage(image, 0, 2 * HEAD);
+      title(pen, header, 2);
       canvas.toBlob(done, "image/png");
     };
     image.src = "data:image/svg+xml;charset=utf-8," +
@@ -418,19 +439,23 @@
   };
   const offer = (holder, plot) => {
     const header = holder.querySelector("header");
-    const title = header.querySelector("b").textContent;
+    const name = header.querySelector("b").textContent;
     const names = [...header.querySelectorAll(".key")].map((key) => key.firstChild.textContent);
-    const file = title.replace(/[^A-Za-z0-9]+/g, "_");
+    const unit = header.querySelector(".soft").textContent;
+    const saves = document.createElement("span");
+    saves.className = "saves";
+    header.append(saves);
+    const file = name.replace(/[^A-Za-z0-9]+/g, "_");
     const button = (kind, act) => {
       const made = document.createElement("button");
       made.className = "save";
       made.textContent = kind;
-      made.setAttribute("aria-label", `save ${title} as ${kind}`);
+      made.setAttribute("aria-label", `save ${name} as ${kind}`);
       made.addEventListener("click", act);
-      header.append(made);
+      saves.append(made);
     };
-    button("CSV", () => save(`${file}.csv`, new Blob([csv(plot, names)], { type: "text/csv" })));
-    button("PNG", () => png(plot, (blob) => save(`${file}.png`, blob)));
+    button("CSV", () => save(`${file}.csv`, new Blob([csv(plot, names, unit)], { type: "text/csv" })));
+    button("PNG", () => png(plot, header, (blob) => save(`${file}.png`, blob)));
   };
 
   const length = Math.max(data.count * data.width, 1e-9);
