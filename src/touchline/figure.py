@@ -13,7 +13,7 @@ COLUMN, PAGE = 3.45, 7.1  # widths [inch]
 INK, FAINT = "#22262b", "#8d949c"
 # Of contacts, in pictures and on pages. Vermilion and violet are told apart with any colour vision,
 # and are no colours of the axes x, y, z.
-FELT, TRUE, CANDIDATE = "#d55e00", "#6a3d9a", "#e69f00"
+FELT, TRUE, CANDIDATE = "#d55e00", "#8a5cc4", "#e69f00"
 X, Y, Z = "#c0392b", "#2c7a4b", "#2f6db3"  # axes of pages of arms, on white and on black
 COLORS = {
     "classical": "#c8602c",

@@ -120,9 +120,9 @@ def test_a_replay_is_seen_played_and_jumped_in(browser, touched):
         drawn = browser.run(f"{charts}.map((c) => [c.scales.x.min, c.scales.x.max])")
         assert len(drawn) == 3 and all(low < high for low, high in drawn)
         series = f"{charts}.map((c) => c.series.map((s) => s.label).join(' '))"
-        assert "s fx fy fz no data now" in browser.run(series)
+        assert "time [s] fx fy fz no data now" in browser.run(series)
         page.plots[0].choose(JOINTS)
-        curves = " ".join(["s", *replay.robot.joint_names, "no data now"])
+        curves = " ".join(["time [s]", *replay.robot.joint_names, "no data now"])
         visitor.until(lambda: browser.run(series).count(curves) == 2, "other curves")
         assert browser.complaints == []
 

@@ -14,6 +14,7 @@ from touchline.live.session import Session
 from touchline.live.streams import StreamState
 from touchline.result.kinds import Watch
 from touchline.view.contacts import ContactScene
+from touchline.view.controls import FELT_MARK
 from touchline.view.scene import RobotScene, dress
 from touchline.view.server import PageServer
 from touchline.view.widgets import WidgetScene
@@ -103,4 +104,5 @@ class RobotPage:
                     lines.append(html.escape(told))
         if self._answer:
             lines.append(html.escape(self._answer))
+        lines.append(FELT_MARK)
         return f'<div style="font-size:12px;padding:0 0.75em 0.75em">{"<br>".join(lines)}</div>'

@@ -15,10 +15,12 @@ ADVICE = (
     "**Drag on the arm** to pull it, **click** on it to push it; "
     "drag beside it to look from elsewhere."
 )
+FELT_MARK = (
+    f'<span style="color:{FELT}">&#9679;</span> felt, with line of action and uncertainty (2 sigma)'
+)
 LEGEND = f"""\
-<div style="font-size:12px;padding:0 0.75em 0.5em">
-<span style="color:{FELT}">&#9679;</span> felt, with line of action and uncertainty (2 sigma);
-<span style="color:{TRUE}">&#9675;</span> true</div>"""
+<div style="font-size:12px;padding:0 0.75em 0.5em">{FELT_MARK};
+<b style="color:{TRUE}">&#9675;</b> true</div>"""
 MOTIONS = {"stands": False, "moves": True}
 
 

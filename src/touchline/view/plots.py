@@ -9,7 +9,7 @@ from touchline.figure import X, Y, Z
 from touchline.view.history import SECONDS, History
 
 COLOURS = (X, Y, Z)
-HEIGHT = 160  # pixels
+HEIGHT = 176  # pixels
 QUANTITIES = {"force": (0, "f", "N", 5.0), "moment": (3, "m", "Nm", 1.0)}
 
 
@@ -34,7 +34,7 @@ class WrenchPlots:
             title=_title(segment, "force"),
             scales={"x": uplot.Scale(time=False, range=(-SECONDS, 0.0))},
             legend=uplot.Legend(live=False),
-            axes=(uplot.Axis(size=28), uplot.Axis(size=44)),
+            axes=(uplot.Axis(size=44), uplot.Axis(size=44)),
             height=HEIGHT,
         )
 
@@ -62,9 +62,9 @@ def _series(quantity: str) -> tuple[uplot.Series, ...]:
         uplot.Series(label=f"{letter}{axis}", stroke=colour, width=1.5)
         for axis, colour in zip("xyz", COLOURS, strict=True)
     )
-    return (uplot.Series(label="s"), *lines)
+    return (uplot.Series(label="time [s]"), *lines)
 
 
 def _title(segment: str, quantity: str) -> str:
     about = "" if quantity == "force" else " about the base"
-    return f"{segment}: {quantity} felt{about} [{QUANTITIES[quantity][2]}]"
+    return f"{segment}: {quantity} felt{about} [{QUANTITIES[quantity][2]}], last {SECONDS:g} s"

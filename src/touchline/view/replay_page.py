@@ -25,6 +25,7 @@ PLOTTED = 0.1  # s; between plots while it plays
 IDLE = 0.2  # s; between looks for visitors while there are none
 SPEEDS = {"1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "1": 1.0, "2": 2.0, "5": 5.0, "20": 20.0}
 WINDOWS = {"1 s": 1.0, "5 s": 5.0, "20 s": 20.0, "60 s": 60.0, "whole recording": None}
+BROAD = 0.8  # width over height of a view that shows an arm with its arrows
 VIEW = (0.78, 0.58, 0.33)  # from the middle to the camera, in sizes of the space that the arm uses
 CURVES_WIDTH = 440  # pixels
 NAMED = 3  # candidates in words
@@ -54,6 +55,7 @@ class ReplayPage:
         self._page = server.page
         dress(self._page)
         look_from(self._page.initial_camera, replay)
+        self._page.on_client_connect(_keep_in_view)
         self._arm = RobotScene(self._page.scene, replay.robot)
         self._contacts = ContactScene(self._page.scene, self._arm)
         self._faint = faint_events(replay)
@@ -209,6 +211,21 @@ def look_from(camera: viser.InitialCameraConfig, replay: Replay) -> None:
     size = max(float(np.linalg.norm(high - low)), 0.3)
     camera.look_at = tuple(middle)
     camera.position = tuple(middle + size * np.array(VIEW))
+
+
+def _keep_in_view(client: viser.ClientHandle) -> None:
+    """Moves the camera away where panels leave a narrow view, or arrows would be cut off."""
+    camera, moved = client.camera, [1.0]
+
+    def fit(_: viser.CameraHandle) -> None:
+        farther = max(1.0, BROAD / camera.aspect)
+        if abs(farther / moved[0] - 1.0) > 0.02:
+            offset = (camera.position - camera.look_at) * farther / moved[0]
+            moved[0] = farther
+            camera.position = camera.look_at + offset
+
+    camera.on_update(fit)
+    fit(camera)
 
 
 def _sentence(contact: Contact) -> str:

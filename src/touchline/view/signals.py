@@ -248,7 +248,7 @@ def _series(group: SignalGroup, low: float) -> tuple[uplot.Series, ...]:
         for i, name in enumerate(group.names)
     ]
     nothing = uplot.Series(label="no data", width=0, fill=NO_DATA, fillTo=low, points=points)
-    return (uplot.Series(label="s"), *curves, nothing, now_series())
+    return (uplot.Series(label="time [s]"), *curves, nothing, now_series())
 
 
 def colour_of(name: str, number: int) -> str:

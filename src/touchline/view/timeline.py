@@ -37,7 +37,7 @@ class Timeline:
         ]
         self._times, self._heights = areas(bars, (self._box.left, self._box.right))
         none = uplot.Series_Points(show=False)
-        series = [uplot.Series(label="s")]
+        series = [uplot.Series(label="time [s]")]
         for i, (row, _) in enumerate(bars):
             colour = COLLISION if i % 2 else CONTACT
             area = uplot.Series(width=0, fill=colour, fillTo=row - THICK, points=none)
@@ -45,7 +45,7 @@ class Timeline:
         self._plot = gui.add_uplot(
             self._data(replay.start),
             (*series, now_series()),
-            title=", ".join(self._rows) + (" (from below)" if rows[1:] else ""),
+            title=("rows from the top: " if rows[1:] else "") + ", ".join(reversed(self._rows)),
             scales={
                 "x": uplot.Scale(time=False, range=(self._box.left, self._box.right)),
                 "y": uplot.Scale(range=(self._box.low, self._box.high)),
