@@ -12,7 +12,8 @@ Line = dict[str, str]
 
 METHODS = ("rows", "scaled", "chi2", "glrt", "cusum", "lowpass")
 LOOKS = {m: LINES[i] | {"color": SHADES[i], "label": m} for i, m in enumerate(METHODS)}
-COLUMNS = 4
+COLUMNS = 3
+DELAYS = (0.05, 70.0)  # ms; the same in all panels, so that they can be compared
 
 
 def draw(lines: list[Line], out: Path) -> None:
@@ -33,6 +34,7 @@ def _roc(axes: Any, lines: list[Line], goal: tuple[float, float]) -> None:
         rates = [float(line["alarms_wanted_per_hour"]) for line in at]
         found = [100 * float(line["found_within_goal"]) for line in at]
         axes.semilogx(rates, found, **LOOKS[method])
+    axes.set_xticks([0.1, 1.0, 10.0, 100.0], ["0.1", "1", "10", "100"])
     axes.axhline(95, color=FAINT, lw=0.6, ls=":")
     axes.set_ylim(0, 103)
     axes.set_xlabel("false alarms per hour, as set")
@@ -48,6 +50,8 @@ def _delay(axes: Any, lines: list[Line], goal: tuple[float, float]) -> None:
         axes.set_xticks(forces, [f"{force:g}" for force in forces])
     axes.axvline(goal[0], color=FAINT, lw=0.6, ls=":")
     axes.set_xticks([], minor=True)
+    axes.set_ylim(*DELAYS)
+    axes.set_yticks([0.1, 1.0, 10.0], ["0.1", "1", "10"])
     axes.set_xlabel("force [N]")
     axes.set_ylabel("median delay at 1 per hour [ms]")
 
@@ -60,7 +64,7 @@ def _sheet(
     settings = dict(sorted(_by(lines, "observer", "rate_hz", "velocity_noise").items(), key=_place))
     columns = min(COLUMNS, len(settings))
     rows = -(-len(settings) // columns)
-    figure = new_figure(2.6 * columns, 2.3 * rows)
+    figure = new_figure(2.6 * columns, 2.2 * rows + 0.3)
     with styled():
         grid = figure.subplots(rows, columns, squeeze=False)
         for axes in grid.flat[len(settings) :]:
@@ -69,7 +73,11 @@ def _sheet(
             observer, rate, velocity = name
             panel(axes, own, GOALS[float(rate), float(velocity)])
             panel_label(axes, f"{observer}, {float(rate) / 1000:g} kHz, {velocity} rad/s")
-            axes.legend(handlelength=2.6)
+        drawn = dict.fromkeys(line["method"] for line in lines)
+        shown = {handle.get_label(): handle for axes in grid.flat for handle in axes.get_lines()}
+        handles = [shown[method] for method in METHODS if method in drawn]
+        place = "outside lower center"
+        figure.legend(handles=handles, loc=place, ncols=len(handles), handlelength=2.6)
     path.write_bytes(rendered(figure, "svg"))
 
 
