@@ -9,7 +9,7 @@ from touchline.figure import X, Y, Z
 from touchline.view.history import SECONDS, History
 
 COLOURS = (X, Y, Z)
-HEIGHT = 176  # pixels
+HEIGHT = 160  # pixels
 QUANTITIES = {"force": (0, "f", "N", 5.0), "moment": (3, "m", "Nm", 1.0)}
 
 
@@ -34,7 +34,7 @@ class WrenchPlots:
             title=_title(segment, "force"),
             scales={"x": uplot.Scale(time=False, range=(-SECONDS, 0.0))},
             legend=uplot.Legend(live=False),
-            axes=(uplot.Axis(size=44), uplot.Axis(size=44)),
+            axes=(uplot.Axis(size=38), uplot.Axis(size=44)),
             height=HEIGHT,
         )
 
