@@ -23,6 +23,7 @@ POSES = {
     "ur10": (0.3, -1.1, 1.4, -0.8, -1.2, 0.4),
 }
 SARA = (0.35, 0.62, -0.25, 1.15, 0.35, 0.75, 0.0)
+SPAN = (1e-4, 2e3)  # mm; without noise errors are some micrometres
 ROOM = 1.5  # the colours reach so much beyond what nearly all of the values are
 VIEWS = ((1.0, -1.0, 0.45), (-1.0, 1.0, 0.45))  # from where
 
@@ -125,7 +126,7 @@ def distributions(trials: Sequence[Trial]) -> Any:
         left.set_ylabel("touches farther off [%]")
         for axes in (left, middle, right):
             axes.axvline(1e3 * NEAR, color=FAINT, lw=0.6, ls=":")
-            axes.set(xscale="log", yscale="log", xlabel="distance [mm]", xlim=(1e-2, 2e3))
+            axes.set(xscale="log", yscale="log", xlabel="distance [mm]", xlim=SPAN)
             axes.set_ylim(0.05, 110.0)
             if axes.get_legend_handles_labels()[0]:
                 axes.legend(loc="upper right", fontsize=6.5)
@@ -155,9 +156,9 @@ def _curve(axes: Any, errors: Array, label: str, color: str, **look: Any) -> Non
     far = np.sort(np.where(np.isfinite(errors), errors, np.inf))
     beyond = 100.0 * (1.0 - np.arange(1, len(far) + 1) / len(far))
     shown = np.isfinite(far)
-    x = np.maximum(1e3 * far[shown], 1e-2)
+    x = np.maximum(1e3 * far[shown], SPAN[0])
     axes.step(
-        np.r_[1e-2, x, 2e3],
+        np.r_[SPAN[0], x, SPAN[1]],
         np.r_[100.0, beyond[shown], beyond[shown][-1:] if shown.any() else [100.0]],
         where="post",
         color=color,
