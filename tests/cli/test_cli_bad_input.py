@@ -444,3 +444,31 @@ def test_a_truth_that_cannot_be_read_is_none(log, tmp_path, links, metadata):
 def test_a_truth_beside_what_others_left_is_read(log):
     with_truth(log, 0, {"author": "me", "robot": '{"truth.links": ["link1"]}'})
     assert [contact.link for contact in read_truth(log)] == ["link1"]
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "view {absent}",
+        "calibrate --plan sara --out {file}",
+        "demo --headless --out {file}",
+        "live --robot sara --source sim:// --record {file}/a.parquet",
+        "label {log} --robot sara --out {file}/a.parquet",
+    ],
+)
+def test_what_cannot_be_read_or_written_is_told_before_the_work(command, tmp_path, log, capsys):
+    file = tmp_path / "text.txt"
+    file.write_text("hello")
+    names = {"absent": tmp_path / "absent", "file": file, "log": log}
+    assert main([word.format(**names) for word in command.split()]) == 2
+    told = capsys.readouterr()
+    (line,) = told.err.splitlines()
+    assert str(tmp_path) in line and told.out == ""
+
+
+def test_a_file_of_another_kind_is_told_in_one_line(tmp_path, capsys):
+    path = tmp_path / "a.csv"
+    path.write_text("a,b\n1,2\n")
+    assert main(["check", "sara", str(path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "columns are missing" in line and "columns present: a, b" in line

@@ -87,3 +87,18 @@ def test_help_has_no_default_that_tells_nothing(name, capsys):
     text = " ".join(capsys.readouterr().out.replace("│", " ").split())
     for nothing in ("default: None", "default: False", "default: )", "inspect._empty", "{None}"):
         assert nothing not in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["check"], "Missing from touchline check: ROBOT"),
+        (["reproduce", "fig9"], "invalid choice 'fig9'"),
+        (["analyze", "a", "--robt", "sara", "--out", "o"], "Perhaps you meant: --robot"),
+        (["analyze", "a", "--out", "o", "--workers", "two"], "Error parsing --workers"),
+    ],
+)
+def test_arguments_that_cannot_be_understood_are_told_in_one_line(arguments, words, capsys):
+    assert main(arguments) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert words in line and line.endswith(f"see touchline {arguments[0]} --help")

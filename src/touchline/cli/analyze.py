@@ -89,7 +89,7 @@ def analyze(
     options |= {"friction": friction, "reach": reach}
     if is_single(logs):
         if robot is None:
-            raise InputError(f"--robot: {logs[0]}: name the robot of this recording")
+            raise InputError(f"{logs[0]}: --robot is missing; it names the robot of this recording")
         return _one(
             Path(logs[0]), robot, out, options | {"beside": beside}, Viewers(rerun, foxglove)
         )

@@ -95,9 +95,12 @@ def calibrate(
 
 def _plan(robot: str, folder: Path) -> int:
     from touchline.calibrate.plan import make_plan, write_plan
+    from touchline.folder import make_folder
     from touchline.model.robot import load_robot
 
-    plan = make_plan(load_robot(robot))
+    model = load_robot(robot)
+    make_folder(folder)  # before the search, which takes a minute
+    plan = make_plan(model)
     written = write_plan(plan, folder)
     print(plan.text())
     print("\nwritten: " + ", ".join(str(path) for path in written))

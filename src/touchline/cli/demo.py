@@ -87,6 +87,7 @@ def _show(
 
 
 def _print(duration: float, out: Path, seed: int, name: str) -> int:
+    from touchline.folder import make_folder
     from touchline.logs import write_table
     from touchline.model.robot import load_robot
     from touchline.report.analysis import analyze
@@ -100,6 +101,7 @@ def _print(duration: float, out: Path, seed: int, name: str) -> int:
     for module in ("mujoco", "pyarrow"):  # told before the work begins
         need(module)
     robot = load_robot(name)
+    make_folder(out)
     print(f"simulating {duration:g} s of the arm being touched (as long on a slow machine) ...")
     log = out / "demo.parquet"
     settings = Run(seed, noise=SensorNoise())

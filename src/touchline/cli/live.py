@@ -51,12 +51,16 @@ def live(
     """
     if duration is not None:
         check_positive(duration=duration)
+    from touchline.folder import check_file
     from touchline.live.connection import Connection
     from touchline.live.session import Session
     from touchline.live.sources import make_source
     from touchline.model.robot import load_robot
 
     model = load_robot(robot)
+    for path in (record, events):
+        if path is not None:
+            check_file(path)
     connection = Connection(make_source(source, model))
     with Session(model, connection, record, force, events) as session, ExitStack() as kept:
         print(f"connecting to {source}; the robot must stand still for a second ...", flush=True)

@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """`touchline COMMAND`: finds the command, runs it, and turns errors into messages."""
 
+import contextlib
+import functools
 import inspect
+import io
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from itertools import takewhile
+from typing import Any
 
 from touchline import __version__
 from touchline.cli.analyze import analyze
@@ -131,12 +135,44 @@ def _check_name(kind: str, name: str, known: Iterable[str]) -> None:
 
 
 def _run(command: Callable[..., int], name: str, arguments: list[str]) -> int:
+    """Run a command; arguments that cannot be understood are told in one line."""
     import tyro
 
+    said = io.StringIO()
     try:
-        return int(tyro.cli(for_help(command), prog=f"touchline {name}", args=arguments))
+        with contextlib.redirect_stderr(said):
+            call = tyro.cli(_deferred(for_help(command)), prog=f"touchline {name}", args=arguments)
     except SystemExit as stop:  # help, or arguments that cannot be understood
-        return stop.code if isinstance(stop.code, int) else 2
+        if stop.code:
+            raise InputError(_in_one_line(said.getvalue(), name)) from None
+        return 0
+    return int(call())
+
+
+def _deferred(command: Callable[..., int]) -> Callable[..., Callable[[], int]]:
+    """The same command, which is not run yet: it gives the call with all its arguments."""
+
+    @functools.wraps(command)
+    def taken(*given: Any, **options: Any) -> Callable[[], int]:
+        return functools.partial(command, *given, **options)
+
+    return taken
+
+
+def _in_one_line(box: str, name: str) -> str:
+    """What a box of tyro says, without its frame: parts between its rules, joined by semicolons."""
+    parts: list[list[str]] = [[]]
+    for line in box.splitlines():
+        words = line.strip("\u2502 ")
+        if not words or words[0] in "\u256d\u2570":
+            continue
+        if words.strip("\u2500") == "":
+            parts.append([])
+        else:
+            parts[-1].append(words)
+    said = [" ".join(part) for part in parts if part and not part[0].startswith("For full")]
+    told = [words.replace(" (required)", "").rstrip(".") for words in said]
+    return f"{'; '.join(told) or 'arguments missing'}; see touchline {name} --help"
 
 
 def _usage() -> str:

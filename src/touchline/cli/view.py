@@ -45,6 +45,8 @@ def view(
         if out is not None:
             raise InputError(f"--out {out}: {recording} holds results already")
         return _show(Replay(recording, robot), recording, (host, port, token), browser)
+    if not recording.exists():
+        raise InputError(f"{recording}: no such file")
     if recording.is_dir() and not any(recording.iterdir()):
         raise InputError(f"{recording}: is empty; neither a recording nor results")
     if robot is None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from touchline.check.felt import felt
 from touchline.errors import InputError
+from touchline.folder import check_file
 from touchline.label.hdf5 import ENDINGS, label_hdf5
 from touchline.label.labelled import Labelled
 from touchline.label.lerobot import is_lerobot, label_lerobot
@@ -40,7 +41,7 @@ def label(
         return _in_place(dataset, robot, given, workers)
     if out.exists():
         raise InputError(f"--out {out}: exists already; name a new place")
-    out.parent.mkdir(parents=True, exist_ok=True)
+    check_file(out)
     draft = out.with_name(f".part.{out.name}")  # keeps the ending: it tells the kind
     try:
         (shutil.copytree if dataset.is_dir() else shutil.copyfile)(dataset, draft)

@@ -12,6 +12,8 @@ from touchline.logs.naming import Column, Naming
 from touchline.model.description import AXES, RobotDescription
 from touchline.suggest import did_you_mean, listing
 
+MOST_NAMED = 3  # missing columns that are told one by one
+
 
 @dataclass(frozen=True)
 class Pick:
@@ -103,6 +105,12 @@ def _missing_problems(
             "under `log: tau`, or give joints without a torque signal `torque: none`"
         )
         missing = [pick for pick in missing if pick.signal != "tau"]
+    if len(missing) > MOST_NAMED:  # another kind of file: its columns say more than ours
+        return [
+            f"{path}: {len(missing)} columns are missing, such as "
+            f"{', '.join(repr(pick.column.name) for pick in missing[:MOST_NAMED])}; columns "
+            f"present: {listing(present, 20)}; other names are given under `log`"
+        ]
     for pick in missing:
         problems.append(
             f"{path}: missing column {pick.column.name!r}{did_you_mean(pick.column.name, present)}"

@@ -26,6 +26,7 @@ from touchline.suggest import did_you_mean
 DESCRIPTIONS = (".yaml", ".yml")
 MODELS = (".urdf", ".xml", ".mjcf", ".xacro")
 EXAMPLE_DATA = "example-robot-data"
+WELL_KNOWN = ("panda", "iiwa", "ur5", "kinova")  # of its robots, as examples
 DESCRIPTIONS_PACKAGE = "robot_descriptions"
 
 
@@ -148,11 +149,12 @@ def _from_cache_alone(name: str) -> Iterator[None]:
 def _unknown(name: str, shipped: list[str], examples: list[str]) -> str:
     known = [*shipped, *examples]
     message = (
-        f"{name}: no such file, and no robot of this name; with Touchline come "
-        f"{', '.join(shipped)}{did_you_mean(name, known)}"
+        f"{name}: no such file, and no robot of this name{did_you_mean(name, known)}; "
+        f"with Touchline come {', '.join(shipped)}"
     )
     if examples:
-        message += f"; {EXAMPLE_DATA} has {len(examples)} more, such as {', '.join(examples[:3])}"
+        told = [example for example in WELL_KNOWN if example in examples] or examples[:3]
+        message += f"; {EXAMPLE_DATA} has {len(examples)} more, such as {', '.join(told)}"
     absent = [] if examples else [EXAMPLE_DATA]
     absent += [] if find_spec(DESCRIPTIONS_PACKAGE) else [DESCRIPTIONS_PACKAGE]
     return f"{message}; more names come with: pip install {' '.join(absent)}" if absent else message

@@ -23,7 +23,7 @@ POSES = {
     "ur10": (0.3, -1.1, 1.4, -0.8, -1.2, 0.4),
 }
 SARA = (0.35, 0.62, -0.25, 1.15, 0.35, 0.75, 0.0)
-SPAN = (1e-4, 2e3)  # mm; without noise errors are some micrometres
+SPAN = (1e-2, 2e3)  # mm, of the distances that are drawn
 ROOM = 1.5  # the colours reach so much beyond what nearly all of the values are
 VIEWS = ((1.0, -1.0, 0.45), (-1.0, 1.0, 0.45))  # from where
 
@@ -115,7 +115,10 @@ def distributions(trials: Sequence[Trial]) -> Any:
         panel_label(left, "one contact")
         for cell in singles:
             noise = f"{TIERS[cell.tier].force:g} N" if cell.tier else "noise-free"
-            _curve(left, _errors(trials, cell), noise, SHADES[cell.tier])
+            errors = _errors(trials, cell)
+            if 1e3 * np.max(errors) < SPAN[0]:
+                noise += f", below {SPAN[0]:g} mm"  # a curve on the axis is not seen
+            _curve(left, errors, noise, SHADES[cell.tier])
         panel_label(middle, f"number, {TIERS[min(noisy)]}")
         for i, cell in enumerate(several):
             label = f"{cell.contacts}, {cell.timing}".strip(", ")
