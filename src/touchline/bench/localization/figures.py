@@ -115,10 +115,7 @@ def distributions(trials: Sequence[Trial]) -> Any:
         panel_label(left, "one contact")
         for cell in singles:
             noise = f"{TIERS[cell.tier].force:g} N" if cell.tier else "noise-free"
-            errors = _errors(trials, cell)
-            if 1e3 * np.max(errors) < SPAN[0]:
-                noise += f", below {SPAN[0]:g} mm"  # a curve on the axis is not seen
-            _curve(left, errors, noise, SHADES[cell.tier])
+            _curve(left, _errors(trials, cell), noise, SHADES[cell.tier])
         panel_label(middle, f"number, {TIERS[min(noisy)]}")
         for i, cell in enumerate(several):
             label = f"{cell.contacts}, {cell.timing}".strip(", ")
