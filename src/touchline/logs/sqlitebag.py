@@ -2,6 +2,7 @@
 """Reads the messages of a rosbag2 sqlite3 file, also of one that was cut off or is damaged."""
 
 import sqlite3
+from collections import Counter
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,9 @@ from touchline.logs.messages import Messages
 
 _BATCH = 8192  # rows that are handed out at a time
 _MOST_SKIPS = 64  # places behind damage at which reading is tried again
+_WHOLE = (  # of a row
+    "typeof(topic_id) = 'integer' AND typeof(timestamp) = 'integer' AND typeof(data) = 'blob'"
+)
 _Row = tuple[Any, Any, Any]
 
 
@@ -69,7 +73,7 @@ class SqliteFile:
         for rows in self._batches(wanted) if self.damage is None else self._salvaged():
             taken += len(rows)
             self.done = min(taken / max(self._total, 1), 1.0)
-            if not _all_messages(rows):
+            if not self._whole:
                 whole = [row for row in rows if _is_message(row)]
                 self.odd += len(rows) - len(whole)
                 rows = whole
@@ -113,34 +117,30 @@ class SqliteFile:
 
     def _look(self) -> None:
         """Count the messages, by walking through the whole table."""
-        query = "SELECT topic_id, count(*), min(timestamp), max(timestamp), sum(length(data)) "
+        self.counts = dict.fromkeys(self.topics, 0)
+        of_each = "".join(f", sum(topic_id = {number})" for number in self._topics)
+        query = f"SELECT count(*), sum({_WHOLE}), min(timestamp), max(timestamp){of_each}"
         try:
-            found = self._file.execute(query + "FROM messages NOT INDEXED GROUP BY topic_id")
-            rows = [row[:4] for row in found if all(isinstance(cell, int) for cell in row[:4])]
+            row = self._file.execute(f"{query}, sum(length(data)) FROM messages NOT INDEXED")
+            rows, whole, first, last, *counts = [cell or 0 for cell in row.fetchone()]
+            self._whole = rows == whole
         except sqlite3.Error as error:
             self.damage = str(error)
-            rows = [
-                (n, 1, t, t) for part in self._salvaged() for n, t, _ in filter(_is_message, part)
-            ]
-        counts: dict[int, int] = {}
-        for number, count, _, _ in rows:
-            counts[number] = counts.get(number, 0) + count
-        self._total = sum(counts.get(number, 0) for number in self._topics)
-        self.counts = dict.fromkeys(self.topics, 0)
-        for number, topic in self._topics.items():
-            self.counts[topic] += counts.get(number, 0)
-        self.first = min((row[2] for row in rows), default=0)
-        self.last = max((row[3] for row in rows), default=0)
+        if self.damage is not None or not self._whole:  # row by row
+            self._whole = False
+            read = [(n, t) for part in self._salvaged() for n, t, _ in filter(_is_message, part)]
+            found = Counter(number for number, _ in read)
+            counts = [found[number] for number in self._topics]
+            first = min((time for _, time in read), default=0)
+            last = max((time for _, time in read), default=0)
+        for topic, count in zip(self._topics.values(), counts, strict=False):
+            self.counts[topic] += count
+        self._total = sum(self.counts.values())
+        self.first, self.last = first, last
 
     def close(self) -> None:
         """Release the file."""
         self._file.close()
-
-
-def _all_messages(rows: list[_Row]) -> bool:
-    """Whether all rows are, told column by column, which is faster than row by row."""
-    kinds = [set(map(type, column)) for column in zip(*rows, strict=True)]
-    return kinds == [{int}, {int}, {bytes}]
 
 
 def _is_message(row: _Row) -> bool:
