@@ -187,14 +187,16 @@ class Curves:
         return np.hstack(parts)
 
     def _joint_values(self, estimate: Estimate, detection: Detection) -> list[Array]:
+        torques, own_torques = estimate.tau_ext, estimate.segment_torque
+        settled = estimate.joint_settled
         values = []
         for j in range(len(self._robot.joint_names)):
-            columns = [estimate.tau_ext[:, j]]
+            columns = [torques[:, j]]
             if j in self._joint_rows:
                 i = self._joint_rows[j]
-                own, test = estimate.segment_torque[:, j], detection.normalized[:, i]
-                settled = np.where(estimate.joint_settled[:, j], own, np.nan)
-                columns += [own, settled - test * self._rows[i].contact]
+                own, test = own_torques[:, j], detection.normalized[:, i]
+                known = np.where(settled[:, j], own, np.nan)
+                columns += [own, known - test * self._rows[i].contact]
             values.append(np.column_stack(columns))
         return values
 
