@@ -39,16 +39,15 @@ def analyze(
     results were made from) and postures.parquet (joint positions, at most 100 a second). Prints a
     summary.
     Older results in DIR are replaced when the new ones are whole; other files in it are left alone.
-    If it is stopped, the older results stand, and what was finished of the new ones is in the
-    folder touchline.unfinished: events.json, and estimates.parts and contacts.parts with Parquet
-    files.
+    If it is stopped, the older results stay. The finished part of the new ones is in the folder
+    touchline.unfinished: events.json, and Parquet files in estimates.parts and contacts.parts.
 
     Several recordings are analyzed by all cores, each into a folder of its own below DIR. Name
     them, or a folder, a pattern ("runs/*.mcap"), a URL (s3://, http://), or a list (CSV, Parquet)
     with the columns log and robot. The page fleet.html there tells what they have in common, and so
     do tables as Parquet. The file manifest.jsonl tells what became of each and why: ok, partial
     (something in it could not be read), failed or skipped. It has hashes of input, configuration
-    and results. The same command goes on where it was stopped, and leaves alone what is unchanged.
+    and results. The same command continues where it was stopped, and skips what is unchanged.
     Without --robot the robot.yaml in the recording's folder, or the nearest above it, is taken.
     Exit status then: 0 all ok, 3 some are not, 1 none.
 

@@ -80,7 +80,7 @@ def localization(
     seed: int = 0,
     out: Directory = None,
 ) -> int:
-    """Where contacts are, how many and how surely, by the protocol of Han and Kim.
+    """How well contacts are located, counted and trusted, by the protocol of Han and Kim.
 
     Example: touchline bench localization --robots panda sara --runs 10000 --out figures
 
@@ -206,7 +206,7 @@ def detection(
 
 
 def real(*, data: Directory = None, rate: float | None = None, leave_one_out: bool = False) -> int:
-    """What holds on recordings of real arms of which nothing but the model is told.
+    """How well touches are found on recordings of real arms, described by their model alone.
 
     Example: touchline bench real --data recordings
 
@@ -292,10 +292,10 @@ def identify(
     Example: touchline bench identify --arms sara-full --runs 10
 
     Simulated arms follow the motion of `touchline calibrate --plan`. Their inertias are 1.5 % off,
-    and they carry a payload that the model lacks. Five kinds of arms: with no more errors, with a
-    sensor's frame 2 degrees and 5 mm off, a bias of 2 N, friction of 1 Nm, or a delay of 5 ms. Each
-    line has a figure's error and how many runs are within the goal. For real arms: what is left of
-    the residuals on motion that played no part.
+    and they carry a payload that the model lacks. Five kinds of arms: without further errors, with
+    a sensor's frame 2 degrees and 5 mm off, a bias of 2 N, friction of 1 Nm, or a delay of 5 ms.
+    Each line has a figure's error and how many runs are within the goal. For real arms: what is
+    left of the residuals on motion that played no part.
 
     Exit status: 1 where a goal is missed.
 
@@ -321,9 +321,9 @@ def check(*, cases: int = 300, seed: int = 0) -> int:
 
     Example: touchline bench check --cases 300
 
-    Prints by error in how many recordings it was and was named, and what was said instead; then
-    what was said of clean recordings, a quarter as many. Takes two seconds a recording. The models
-    of the Panda and the UR10 come with the package example-robot-data.
+    Prints for each error how many recordings had it, in how many it was named, and what was said
+    instead. Then it prints what was said of clean recordings, a quarter as many. Takes two seconds
+    a recording. The models of the Panda and the UR10 come with the package example-robot-data.
 
     Exit status: 1 where fewer than 95 % are named, or fewer than 98 % of the clean ones are silent.
 
@@ -394,7 +394,7 @@ def workers(
     workers: int = 2,
     dask: tuple[int, ...] = (),
 ) -> int:
-    """How much faster several processes analyze many recordings, and whether they say the same.
+    """How much faster several processes analyze many recordings, and whether results are the same.
 
     Example: touchline bench workers --minutes 1 --dask 1 2 4
 
@@ -511,7 +511,7 @@ def tuning(
     numbers: tuple[str, ...] = (),
     out: Annotated[Path | None, arg(metavar="FILE")] = None,
 ) -> int:
-    """What half and double of each tuning number do, on a few simulated recordings.
+    """How half and double of each tuning number change the results of a few simulated recordings.
 
     Example: touchline bench tuning --numbers place localizer.young --out benchmarks/tuning.json
 

@@ -31,18 +31,17 @@ def calibrate(
 
     Move the robot as it will move at work, touch nothing, and record: a minute tells friction and
     inertias, half an hour thresholds. Finds offsets of joints and sensors, friction, rotor inertias
-    (torque: motor) and inertias, each as far as the data can tell it, and prints the residuals
-    before and after on data that played no part. What is no better there is not written. Noise and
-    thresholds follow; these hold for the sample rate of the recordings. All other keys and comments
-    stay.
+    (torque: motor) and inertias, each as far as the data show it. It prints the residuals before
+    and after on held-out data, and writes only what is better there. Noise and thresholds follow;
+    these hold for the sample rate of the recordings. All other keys and comments stay.
 
     Stretches in which something seems to touch the robot are left out and listed. Where most of a
     recording seems touched it is refused, with the row that stands out.
 
-    With --plan ROBOT it proposes a motion of a minute instead, within the limits of joints, speeds,
-    torques and of the arm's own links, and foretells what it will identify. It writes the motion
-    into the folder --out: as a table, as a JointTrajectory (YAML, JSON) and as Python lists; for an
-    arm with force-torque sensors also poses to rest in.
+    With --plan ROBOT it proposes a motion of a minute instead, and predicts what that will
+    identify. The motion keeps the limits of joints, speeds and torques, and the arm's links do not
+    meet. It writes the motion into the folder --out: as a table, as a JointTrajectory (YAML, JSON)
+    and as Python lists; for an arm with force-torque sensors also poses to rest in.
     Example: touchline calibrate --plan robot.yaml --out motion
 
     Args:
