@@ -22,7 +22,7 @@ import touchline as tl
 from touchline.cli import main
 from touchline.errors import InputError
 from touchline.fleet.forecast import forecast, forecast_text
-from touchline.fleet.manifest import MANIFEST, Manifest
+from touchline.fleet.manifest import MANIFEST, Manifest, configuration_hash
 from touchline.fleet.plan import is_single, make_plan
 from touchline.fleet.pool import Pool
 from touchline.fleet.tables import COMMON
@@ -101,6 +101,27 @@ def test_every_recording_has_its_row(made, results):
         assert set(row["outputs"]) == {p.name for p in folder.glob("*") if row["outputs"]}
     journal = [json.loads(line) for line in (results / "log.jsonl").read_text().splitlines()]
     assert {line["name"] for line in journal} == set(STATUS)
+
+
+def test_a_configuration_is_all_that_a_robot_is_made_of(tmp_path):
+    mesh = tmp_path / "cube.stl"
+    corners = ["0 0 0", "1 0 0", "0 1 0"]
+    facet = "".join(f"vertex {corner} " for corner in corners)
+    text = f"solid c facet normal 0 0 1 outer loop {facet} endloop endfacet endsolid c"
+    mesh.write_text(text)
+    model = tmp_path / "arm.urdf"
+    model.write_text(
+        '<robot name="arm"><link name="base"/><link name="tip"><inertial><mass value="1"/>'
+        '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial><visual><geometry>'
+        '<mesh filename="cube.stl"/></geometry></visual></link><joint name="j" type="revolute">'
+        '<parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>'
+        '<limit lower="-1" upper="1" effort="9" velocity="1"/></joint></robot>'
+    )
+    before = configuration_hash(str(model), OPTIONS)
+    assert configuration_hash(str(model), OPTIONS) == before
+    mesh.write_text(text.replace("1 0 0", "2 0 0"))
+    assert configuration_hash(str(model), OPTIONS) != before
+    assert configuration_hash(str(model), OPTIONS | {"report": "full"}) != before
 
 
 def test_what_is_unchanged_is_left_alone(made, results, tmp_path, capsys):

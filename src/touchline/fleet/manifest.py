@@ -71,10 +71,15 @@ def configuration_hash(robot: str, options: dict[str, Any]) -> str:
     Raises:
         InputError: the robot cannot be loaded.
     """
-    description = load_robot(robot).description
+    model = load_robot(robot)
+    description = model.description
+    learned = {joint.name: joint.rest for joint in description.joints if joint.rest is not None}
     digest = hashlib.blake2b(digest_size=16)
-    digest.update(json.dumps([__version__, options], sort_keys=True).encode())
-    for path in (description.path, description.model):
+    told = [__version__, options, {name: vars(rest) for name, rest in learned.items()}]
+    digest.update(json.dumps(told, sort_keys=True).encode())
+    shapes = (s for link in model.mechanism.links.values() for s in (*link.visual, *link.collision))
+    meshes = sorted({shape.path for shape in shapes if shape.path is not None})
+    for path in (description.path, description.model, *meshes):
         if path is not None and Path(path).is_file():
             digest.update(Path(path).read_bytes())
     return digest.hexdigest()
