@@ -312,17 +312,18 @@ inline nb::tuple rest(Pipeline& p) {
   return nb::make_tuple(meter.seconds(), meter.torque(), meter.wrench());
 }
 
-// Per row of the detector: what stood there at the start and stands there now, seen noise, its ratio.
+// Per row of the detector: what stood there at the start, stands there now and has drifted; seen
+// noise, its ratio.
 inline nb::object standing(Pipeline& p) {
   std::vector<double> numbers;
   {
     const guard::Turn turn(p.turn);
     for (std::size_t i = 0; i < p.value->rows(); ++i) {
       const tl::Standing s = p.value->standing(static_cast<int>(i));
-      numbers.insert(numbers.end(), {s.start, s.now, s.seen, s.ratio});
+      numbers.insert(numbers.end(), {s.start, s.now, s.drift, s.seen, s.ratio});
     }
   }
-  return arrays::table(numbers, 4);
+  return arrays::table(numbers, 5);
 }
 
 inline nb::dict slices(const Pipeline& p) {

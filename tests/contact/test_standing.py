@@ -78,11 +78,64 @@ def test_noise_beyond_told_is_named_with_its_size(factor):
     assert "noise is larger" in line and "touchline calibrate" in line
 
 
+def warming_up(drift, begin, end):
+    """Ten minutes of a standing arm whose joint 2 reads `drift` [Nm] less in the end than at first.
+
+    Link 4 is pushed down by 15 N from `begin` to `end` [s].
+    """
+    rng = np.random.default_rng(0)
+    n, rate = 60000, 100.0
+    time, still, told = np.arange(n) / rate, gravity_loads(ROBOT, Q), ROBOT.description.noise
+    tau = still.torque + np.array(told.tau) * rng.normal(size=(n, 6))
+    qd = np.array(told.qd) * rng.normal(size=(n, 6))
+    tau[:, 1] -= drift * time / time[-1]
+    wrench = np.tile(still.wrench, (n, 1, 1))
+    force = np.array([0.0, 0.0, -15.0])
+    place = ROBOT.T_world_links(Q)["link4"][:3, 3]
+    touch = contact_loads(ROBOT, Q[None], "link4", np.r_[force, np.cross(place, force)][None])
+    pushed = (time >= begin) & (time < end)
+    tau[pushed] -= touch.torque[0]
+    wrench[pushed] -= touch.wrench[0]
+    pipeline = Pipeline(ROBOT, period=1.0 / rate)
+    estimate, _ = pipeline.run(time, np.tile(Q, (n, 1)), qd, tau, wrench)
+    return pipeline, estimate.health.astype(int)
+
+
+def test_a_sensor_that_warms_up_is_followed_and_told():
+    pipeline, health = warming_up(1.0, 400.0, 460.0)
+    (event,) = pipeline.events  # held for a minute, in which the drift goes on
+    assert event.detected == pytest.approx(400.0, abs=0.05)
+    assert event.cleared == pytest.approx(460.0, abs=0.6)
+    assert event.status == "located" and event.link == "link4"
+    told = health & Health.OFFSET
+    assert told[-1] and not told[: len(told) // 10].any()
+    (standing,) = unlike_told(pipeline.standing)
+    assert standing.signal == ROBOT.joint_names[1] and standing.start == standing.now == 0.0
+    assert standing.drift == pytest.approx(1.0, abs=0.2)  # it lags by a minute
+    (line,) = standing_lines(pipeline.standing)
+    assert "slow drift" in line and f"{standing.drift:+.2f} Nm" in line
+
+
+def test_a_drift_is_followed_only_so_far():
+    pipeline, _ = warming_up(6.0, 700.0, 700.0)
+    most = {s.signal: 10.0 * s.threshold for s in pipeline.standing}[ROBOT.joint_names[1]]
+    assert pipeline.events
+    assert all(abs(s.drift) <= most * (1.0 + 1e-12) for s in pipeline.standing)
+
+
 def test_update_tells_the_same_as_run():
     pipeline, health = watched(bias=2.0)
-    assert {"segment", "signal", "unit", "threshold", "start", "now", "seen", "noise"} == set(
-        pipeline.standing[0].to_dict()
-    )
+    assert {
+        "segment",
+        "signal",
+        "unit",
+        "threshold",
+        "start",
+        "now",
+        "drift",
+        "seen",
+        "noise",
+    } == set(pipeline.standing[0].to_dict())
     other = Pipeline(ROBOT, period=1.0 / RATE)
     still = gravity_loads(ROBOT, Q)
     tau = still.torque - np.array([0.0, 2.0, 0, 0, 0, 0])

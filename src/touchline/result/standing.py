@@ -18,12 +18,14 @@ class Standing:
     Attributes:
         segment: segment that the signal belongs to.
         signal: "JOINT" for a joint's torque, "SENSOR.fx" for a wrench in that sensor's frame.
-        unit: "N" or "Nm", of the next four values.
+        unit: "N" or "Nm", of the next five values.
         threshold: what a touch must exceed.
         start: what stood there when observation began, and still a while later. It was a touch, an
             error of the model, or a bias. 0 where it did not exceed the threshold.
         now: what stands there now and does not change, since the start or since a touch. 0 where
             it does not exceed the threshold.
+        drift: by which that has changed since then, so slowly that no hand does it, as sensors do that
+            warm up; the detector follows it. 0 where it does not exceed the threshold.
         seen: one sigma of the residual's noise, when it was largest against what was told.
         noise: ratio of that to the sigma that is told; 1 where nothing speaks against it.
     """
@@ -34,6 +36,7 @@ class Standing:
     threshold: float
     start: float
     now: float
+    drift: float
     seen: float
     noise: float
 
@@ -44,7 +47,7 @@ class Standing:
 
 def unlike_told(all_signals: Sequence[Standing]) -> list[Standing]:
     """Those that have shown anything."""
-    return [s for s in all_signals if s.start or s.now or s.noise > NOISIER]
+    return [s for s in all_signals if s.start or s.now or s.drift or s.noise > NOISIER]
 
 
 def standing_lines(all_signals: Sequence[Standing]) -> list[str]:
@@ -63,6 +66,13 @@ def standing_lines(all_signals: Sequence[Standing]) -> list[str]:
         lines.append(
             f"offset since a touch or a stop: {what} still stand there at the end and do not "
             "change, as friction does. `touchline calibrate` identifies it"
+        )
+    drifted = [s for s in all_signals if s.drift]
+    if drifted:
+        what = _largest([(abs(s.drift) / s.threshold, _amount(s, s.drift)) for s in drifted])
+        lines.append(
+            f"slow drift: {what}, as sensors show that warm up. It counts as no touch and is taken "
+            "off what contacts are judged by. `Pipeline.tare` takes it off the estimate, too"
         )
     noisy = [s for s in all_signals if s.noise > NOISIER]
     if noisy:

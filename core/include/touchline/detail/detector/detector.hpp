@@ -112,7 +112,7 @@ class Detector {
     offset_ = false;
     for (std::size_t i = 0; i < rows_.size(); ++i) {
       follow_offset(i, dt);
-      offset_ = offset_ || stands_off(i);
+      offset_ = offset_ || stands_off(i) || warmed(i);
     }
     if (dt > 0.0) {
       meters_.add(residuals_, known_, counts_, dt, tuning_);
@@ -151,6 +151,7 @@ class Detector {
   Standing standing(int row) const {
     Standing standing = standing_[row];
     standing.now = stands_off(row) ? states_[row].anchor : 0.0;
+    standing.drift = warmed(row) ? states_[row].anchor - states_[row].origin : 0.0;
     return standing;
   }
   bool stands_off() const { return offset_; }
@@ -164,7 +165,8 @@ class Detector {
     RowState& s = states_[row];
     const double moved = baseline - other.states_[of].baseline;
     s = other.states_[of];
-    for (double* value : {&s.baseline, &s.anchor, &s.reference, &s.other.baseline, &s.other.anchor})
+    for (double* value : {&s.baseline, &s.anchor, &s.origin, &s.reference, &s.other.baseline,
+                          &s.other.anchor})
       *value += moved;
     s.trend = baseline;
     spreads_[row] = other.spreads_[of];
@@ -185,7 +187,8 @@ class Detector {
   };
   struct RowState {
     double baseline = 0.0, reference = 0.0;
-    double anchor = 0.0;  // what stood there at the start, or rests there since a contact
+    double origin = 0.0;  // what stood there at the start, or rests there since a contact
+    double anchor = 0.0;  // the same, with what it has drifted by since
     double shown = 0.0;   // the largest of these so far
     double seconds = 0.0;  // since the first settled sample
     double trend = 0.0;   // mean of the last moments
@@ -323,7 +326,7 @@ class Detector {
     normalized_[i] = shares_[i] = 0.0;
     if (!sample.known) return;
     if (!s.started) {  // what stands there when observation begins is an offset
-      s.baseline = s.anchor = s.reference = s.trend = sample.residual;
+      s.baseline = s.anchor = s.origin = s.reference = s.trend = sample.residual;
       s.started = true;
     }
     sample.offset = s.baseline;
@@ -551,7 +554,7 @@ class Detector {
   // What the last moments have of a row is an offset from now on.
   void rest(std::size_t i) {
     RowState& s = states_[i];
-    s.baseline = s.anchor = s.reference = s.trend;
+    s.baseline = s.anchor = s.origin = s.reference = s.trend;
     s.shown = std::max(s.shown, std::fabs(s.anchor));
     s.age = s.referred = tuning_.trend / bandwidths_[i];
   }
@@ -584,7 +587,7 @@ class Detector {
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
       RowState& s = states_[i];
       rest(i);
-      s.anchor = s.other.anchor;
+      s.anchor = s.origin = s.other.anchor;
       s.shown = s.other.shown;
     }
     end_event(g);
@@ -607,6 +610,11 @@ class Detector {
   // Does more than a threshold stand on a row of an arm that has shown that it is not as told?
   bool stands_off(std::size_t i) const {
     return std::min(std::fabs(states_[i].anchor), states_[i].shown) > rows_[i].contact;
+  }
+
+  // Has what stands on a row drifted by more than a threshold?
+  bool warmed(std::size_t i) const {
+    return std::fabs(states_[i].anchor - states_[i].origin) > rows_[i].contact;
   }
 
   void follow_offset(std::size_t i, double dt) {
@@ -644,7 +652,13 @@ class Detector {
     const double most = learns(i)
         ? std::max(row.baseline_limit, spreads_[i].limit(tuning_)) : row.baseline_limit;
     s.baseline = std::clamp(next, s.anchor - most, s.anchor + most);
-    if (s.age < tuning_.trend / bandwidths_[i]) s.anchor = s.baseline;
+    if (s.age < tuning_.trend / bandwidths_[i]) {
+      s.anchor = s.origin = s.baseline;
+    } else {  // no hand rises as slowly as a sensor warms up
+      const double farthest = tuning_.warming_most * row.contact;
+      s.anchor += (s.baseline - s.anchor) * std::min(1.0, dt / tuning_.warming);
+      s.anchor = std::clamp(s.anchor, s.origin - farthest, s.origin + farthest);
+    }
   }
 
   // Noise is measured while nothing is felt, and of what is felt where it goes to and fro more often

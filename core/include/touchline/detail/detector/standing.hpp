@@ -9,6 +9,7 @@ namespace touchline {
 struct Standing {
   double start = 0.0;  // stood there when observation began, and a while later; 0: no such thing
   double now = 0.0;    // stands there now and is no touch: since the start, or since a contact
+  double drift = 0.0;  // by which that has changed slowly since then; 0: by less than a threshold
   double seen = 0.0;   // one sigma of its noise, when that was largest against what was told
   double ratio = 1.0;  // of that to the sigma that is told; 1: nothing speaks against it
 };

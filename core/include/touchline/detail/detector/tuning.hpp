@@ -114,6 +114,15 @@ struct DetectorTuning {
   // sags a little counts as not as told.
   double alike = 3.0;
 
+  // ---- Slow drift ----
+  // Over so long the middle of what the baseline may follow follows it [s], as sensors warm up.
+  // Half: a hand that leans on the arm ever more for half a minute is a drift. Double: a sensor that
+  // drifts by a threshold in a minute is a touch.
+  double warming = 60.0;
+  // Thresholds: the largest drift that is followed. Half: sensors that drift farther are touches.
+  // Double: hands that lean so slowly are felt later.
+  double warming_most = 10.0;
+
   // ---- What makes an event ----
   // Thresholds: a sample that no noise makes needs no other. Half: two bad packets are an event.
   // Double: blows are told a sample later.
@@ -192,6 +201,8 @@ struct DetectorTuning {
     v("start", "1/K", t.start);
     v("start_samples", "samples", t.start_samples);
     v("alike", "1", t.alike);
+    v("warming", "s", t.warming);
+    v("warming_most", "1", t.warming_most);
     v("alone", "1", t.alone);
     v("unseen", "1", t.unseen);
     v("barely", "1", t.barely);
