@@ -24,8 +24,8 @@ class Standing:
             error of the model, or a bias. 0 where it did not exceed the threshold.
         now: what stands there now and does not change, since the start or since a touch. 0 where
             it does not exceed the threshold.
-        drift: by which that has changed since then, so slowly that no hand does it, as sensors do that
-            warm up; the detector follows it. 0 where it does not exceed the threshold.
+        drift: by how much that has changed since then, so slowly that no hand does it. Sensors that
+            warm up drift so, and the detector follows. 0 where it does not exceed the threshold.
         seen: one sigma of the residual's noise, when it was largest against what was told.
         noise: ratio of that to the sigma that is told; 1 where nothing speaks against it.
     """
