@@ -6,7 +6,7 @@ python tests/references/accept.py [NAME ...]
 
 import sys
 
-from referenced import RECORDINGS, Absent, accept, accepted, differences, outputs
+from referenced import RECORDINGS, Absent, accept, changed, outputs
 
 
 def main(names: list[str]) -> int:
@@ -20,11 +20,11 @@ def main(names: list[str]) -> int:
         except Absent as absent:
             print(f"{name}: left as it is, {absent}")
             continue
-        changed = differences(accepted(name), answer)
-        print(f"{name}: {len(changed)} changed" if changed else f"{name}: as it was")
-        for line in changed[:10]:
+        found = changed(name, answer)
+        print(f"{name}: {len(found)} changed" if found else f"{name}: as it was")
+        for line in found[:10]:
             print(f"  {line}")
-        if changed:
+        if found:
             accept(name, answer)
     return 0
 

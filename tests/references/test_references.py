@@ -7,11 +7,13 @@ import json
 import pytest
 from referenced import (
     FOLDER,
+    HANGING,
     REAL,
     RECORDINGS,
     SIMULATED,
     Absent,
     accepted,
+    changed,
     differences,
     outputs,
 )
@@ -24,9 +26,9 @@ def test_outputs_are_those_that_were_accepted(name):
         recording = RECORDINGS[name]()
     except Absent as absent:
         pytest.skip(str(absent))
-    changed = differences(accepted(name), outputs(recording))
-    assert not changed, "\n".join(
-        [f"{name}: {len(changed)} outputs changed; `make accept` takes them", *changed[:20]]
+    found = changed(name, outputs(recording))
+    assert not found, "\n".join(
+        [f"{name}: {len(found)} outputs changed; `make accept` takes them", *found[:20]]
     )
 
 
@@ -58,13 +60,13 @@ def _places(value, at=()):
 def test_each_change_of_an_output_is_found_and_rounding_is_none():
     whole = accepted("sara_full_moving")
     for at, value in _places(whole):
-        changed, close = copy.deepcopy(whole), copy.deepcopy(whole)
-        to, near = changed, close
+        other, close = copy.deepcopy(whole), copy.deepcopy(whole)
+        to, near = other, close
         for key in at[:-1]:
             to, near = to[key], near[key]
         number = isinstance(value, float | int) and not isinstance(value, bool)
         to[at[-1]] = value * 1.001 + 1e-3 if number else f"not {value}"
-        assert len(differences(whole, changed)) == 1, at
+        assert len(differences(whole, other)) == 1, at
         if isinstance(value, float):
             near[at[-1]] = value * (1.0 + 1e-8)
             assert differences(whole, close) == []
@@ -78,3 +80,16 @@ def test_references_are_small():
     sizes = [path.stat().st_size for path in FOLDER.glob("*.json")]
     assert max(sizes) < 30_000 and sum(sizes) < 200_000
     assert all(json.loads(path.read_text()) for path in FOLDER.glob("*.json"))
+
+
+def test_only_places_of_real_arms_may_hang_on_rounding():
+    event = {"position": [0.1, 0.2, 0.3], "force": [1.0, 2.0, 3.0], "probability": 0.9}
+    near = {"position": [0.104, 0.2, 0.3], "force": [1.0, 2.0, 3.0], "probability": 0.89}
+    assert len(differences(event, near)) == 2
+    assert differences(event, near, hanging=HANGING) == []
+    for far in (
+        near | {"position": [0.106, 0.2, 0.3]},
+        near | {"force": [1.001, 2.0, 3.0]},
+        near | {"probability": 0.87},
+    ):
+        assert len(differences(event, far, hanging=HANGING)) == 1
