@@ -145,14 +145,19 @@ def replaced_file(path: Path) -> Iterator[Path]:
         os.close(lock)
 
 
-def check_file(path: Path) -> None:
+def check_file(path: Path, option: str = "") -> None:
     """Make sure, before the work begins, that a file can be written; makes its folder.
+
+    Args:
+        path: of the file.
+        option: of the command that names it, for the message.
 
     Raises:
         InputError: it is a folder, or cannot be written.
     """
+    named = f"{option} {path}".strip()
     if path.is_dir():
-        raise InputError(f"{path}: cannot be written: it is a directory")
+        raise InputError(f"{named}: cannot be written: it is a directory")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         if path.exists() and not os.access(path, os.W_OK):
@@ -163,7 +168,7 @@ def check_file(path: Path) -> None:
             if not draft.stat().st_size:
                 draft.unlink()
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from error
+        raise InputError(f"{named}: cannot be written: {error.strerror}") from error
 
 
 def _draft(path: Path) -> Path:

@@ -58,9 +58,9 @@ def live(
     from touchline.model.robot import load_robot
 
     model = load_robot(robot)
-    for path in (record, events):
+    for option, path in (("--record", record), ("--events", events)):
         if path is not None:
-            check_file(path)
+            check_file(path, option)
     connection = Connection(make_source(source, model))
     with Session(model, connection, record, force, events) as session, ExitStack() as kept:
         print(f"connecting to {source}; the robot must stand still for a second ...", flush=True)
