@@ -19,10 +19,9 @@ from touchline.errors import InputError
 from touchline.logs.parquet import METADATA_KEY
 from touchline.model.description import AXES
 
-# What a kill can cost. An hour at 1 kHz is one part, which need not be written a second time: that
-# is an eighth of what its analysis takes.
+# What a kill can cost. An hour at 1 kHz is one part, which need not be written a second time.
 PART_ROWS = 1 << 22
-PART_SECONDS = 120.0
+PART_SECONDS = 30.0
 _GROUP_ROWS = 1 << 16
 _RESULTS = ("estimates", "contacts", "postures")
 _DOCUMENTS = ("events.json", "analysis.json", "report.html")

@@ -129,7 +129,11 @@ MEANINGS: dict[str, tuple[str, str, str]] = {
     "detection.release": ("number, 0 to 1", "", "Share of the thresholds that counts as calm."),
     "detection.baseline": ("mapping", "", "The slow mean that is taken out of the residuals."),
     "detection.baseline.time": ("number", "s", "Its time constant."),
-    "detection.baseline.limit": ("number", "thresholds", "Residuals beyond this are not followed."),
+    "detection.baseline.limit": (
+        "number",
+        "thresholds",
+        "How far it may go from where it began, but for slow drift.",
+    ),
     "detection.calibration": ("mapping", "", "Written by `calibrate`; not for editing by hand."),
     "detection.calibration.hours": ("number", "h", "Contact-free motion that it rests on."),
     "detection.calibration.period": ("number", "s", "Sample period for which it holds."),

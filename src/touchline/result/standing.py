@@ -3,7 +3,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from touchline.tuning import DEFAULTS
 
@@ -55,24 +55,23 @@ def standing_lines(all_signals: Sequence[Standing]) -> list[str]:
     lines: list[str] = []
     began = [s for s in all_signals if s.start]
     if began:
-        what = _largest([(abs(s.start) / s.threshold, _amount(s, s.start)) for s in began])
         lines.append(
-            f"offset since the start: {what}. Something touched the arm then, or its model or a "
-            "bias is off. It counts as no touch. `touchline calibrate` takes it off"
+            f"offset since the start: {_amounts(began, 'start')}. Something touched the arm then, "
+            "or its model or a bias is off. It counts as no touch. `touchline calibrate` takes it "
+            "off"
         )
     stayed = [s for s in all_signals if s.now and not s.start]
     if stayed:
-        what = _largest([(abs(s.now) / s.threshold, _amount(s, s.now)) for s in stayed])
         lines.append(
-            f"offset since a touch or a stop: {what} still stand there at the end and do not "
-            "change, as friction does. `touchline calibrate` identifies it"
+            f"offset since a touch or a stop: {_amounts(stayed, 'now')} still stand there at the "
+            "end and do not change, as friction does. `touchline calibrate` identifies it"
         )
     drifted = [s for s in all_signals if s.drift]
     if drifted:
-        what = _largest([(abs(s.drift) / s.threshold, _amount(s, s.drift)) for s in drifted])
         lines.append(
-            f"slow drift: {what}, as sensors show that warm up. It counts as no touch and is taken "
-            "off what contacts are judged by. `Pipeline.tare` takes it off the estimate, too"
+            f"slow drift: {_amounts(drifted, 'drift')}. Sensors drift so as they warm up. It "
+            "counts as no touch, and contacts are judged without it. `Pipeline.tare` takes it off "
+            "the estimate, too"
         )
     noisy = [s for s in all_signals if s.noise > NOISIER]
     if noisy:
@@ -84,8 +83,14 @@ def standing_lines(all_signals: Sequence[Standing]) -> list[str]:
     return lines
 
 
-def _amount(of: Standing, value: float) -> str:
-    return f"{of.signal} {value:+.2f} {of.unit} (threshold {of.threshold:.2g})"
+def _amounts(signals: Sequence[Standing], key: Literal["start", "now", "drift"]) -> str:
+    """One of the offsets of each signal; those that are largest in thresholds come first."""
+    named: list[tuple[float, str]] = []
+    for s in signals:
+        value: float = getattr(s, key)
+        told = f"{s.signal} {value:+.2f} {s.unit} (threshold {s.threshold:.2g})"
+        named.append((abs(value) / s.threshold, told))
+    return _largest(named)
 
 
 def _largest(named: list[tuple[float, str]]) -> str:
