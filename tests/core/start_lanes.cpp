@@ -8,6 +8,15 @@
 
 using namespace touchline;
 
+// A^T B of two (rows, 6).
+static void multiply(const double* A, const double* B, int rows, double* out) {
+  for (int r = 0; r < rows; ++r) {
+    for (int i = 0; i < 6; ++i) {
+      for (int j = 0; j < 6; ++j) out[6 * i + j] += A[6 * r + i] * B[6 * r + j];
+    }
+  }
+}
+
 int main() {
   constexpr int kRows = 9, kStarts[2] = {5, 7};
   constexpr double kScale = 50.0;
@@ -20,7 +29,8 @@ int main() {
     square += y * y;
     std::printf(" %.17g", y);
   }
-  StartLanes lanes[2] = {{kStarts[0], kRows}, {kStarts[1], kRows}};
+  StartLanes lanes[2] = {StartLanes(kStarts[0]), StartLanes(kStarts[1])};
+  double N[3][36] = {}, h[2][6] = {};  // of the first body, of the second, and what couples them
   for (int e = 0; e < 2; ++e) {
     std::printf("\nmap");
     for (double& m : maps[e]) std::printf(" %.17g", m = draw());
@@ -31,10 +41,15 @@ int main() {
       normals.push_back({draw(), draw(), draw()});
       std::printf(" %.17g %.17g %.17g", points[i].x, points[i].y, points[i].z);
     }
-    lanes[e].fill(points.data(), normals.data(), kStarts[e], maps[e], target, kRows, kScale);
+    multiply(maps[e], maps[e], kRows, N[e]);
+    for (int r = 0; r < kRows; ++r) {
+      for (int i = 0; i < 6; ++i) h[e][i] += maps[e][6 * r + i] * target[r];
+    }
+    lanes[e].fill(points.data(), normals.data(), kStarts[e], N[e], 6, h[e], kScale);
   }
+  multiply(maps[0], maps[1], kRows, N[2]);
   for (int i = 0; i < kStarts[0]; ++i) {
-    StartBeside one(lanes[0], i, square);
+    StartBeside one(lanes[0], i, N[2], 6, square);
     for (int block = 0; block < lanes[1].blocks(); ++block) {
       const Lanes misfit = one.misfit(lanes[1], block);
       Lanes f[6];

@@ -51,6 +51,10 @@ class BodyStarts {
   // How far it is from anywhere on the body to one of them, or little farther [m].
   double reach() const { return reach_; }
   int surface(int i) const { return surface_[i]; }
+  // In the frame of the node.
+  const Vec3& own_point(int i) const { return own_[i].point; }
+  // The triangle's place in the mesh.
+  int place(int i) const { return own_[i].place; }
   const Vec3* points() const { return points_.data(); }
   const Vec3* normals() const { return normals_.data(); }
   // Where the points were when the rows felt them.

@@ -13,6 +13,7 @@ namespace touchline {
 // One point of a pair, with its force.
 struct PairEnd {
   int surface = -1, body = -1, node = -1;  // `body`: of the segment's
+  int place = -1;  // of its triangle in the mesh, where it is known
   Vec3 point, normal, force;
   double along[3] = {};  // covariance of the two tangent coordinates
 };

@@ -15,26 +15,27 @@ namespace touchline {
 
 class PairAnswer {
  public:
-  explicit PairAnswer(const LocalizerSettings& settings) : settings_(settings) {}
+  PairAnswer(const LinkSurfaces& surfaces, const LocalizerSettings& settings)
+      : surfaces_(surfaces), settings_(settings) {}
 
   // Are there two places that can be told apart?
-  bool separable(const PairSearch& pairs, int rows) const {
+  bool separable(const PairSearch& pairs) const {
     if (pairs.count() == 0 || pairs[0].rank < PairSearch::kUnknowns) return false;
     double enough = 0.0;  // probability of pairs that can be told apart
     for (int i = 0; i < pairs.count(); ++i)
       enough += pairs[i].rank >= PairSearch::kUnknowns ? pairs[i].weight : 0.0;
     return enough >= kSeparable &&
-           pairs[0].chi2 < chi2_limit(std::max(1, rows - PairSearch::kUnknowns), settings_.pitch_limit);
+           pairs[0].chi2 < chi2_limit(degrees(pairs), settings_.pitch_limit);
   }
 
   // What is said of one contact of the best pair, with its places in the other solutions.
-  void name(const PairSearch& pairs, int k, int rows, Answer& answer) const {
+  void name(const PairSearch& pairs, int k, Answer& answer) const {
     const Pair& best = pairs[0];
     answer = Answer{};
     double here = 0.0;
     for (int i = 0; i < pairs.count(); ++i) {
       const Pair& s = pairs[i];
-      add(answer, s.ends[k], s.weight);
+      add(answer, now(s.ends[k], pairs.view()), s.weight);
       const bool same = s.ends[0].node == best.ends[0].node && s.ends[1].node == best.ends[1].node;
       if (same && norm(s.ends[0].point - best.ends[0].point) < settings_.place_radius &&
           norm(s.ends[1].point - best.ends[1].point) < settings_.place_radius)
@@ -47,7 +48,7 @@ class PairAnswer {
     const bool sure = here >= kSure && spread < settings_.spread_limit();
     answer.status = sure ? Status::located : Status::ambiguous;
     answer.chi2 = best.chi2;
-    answer.degrees = std::max(1, rows - PairSearch::kUnknowns);
+    answer.degrees = degrees(pairs);
     if (best.rank > PairSearch::kUnknowns) return;
     answer.rank = best.rank;  // none is left over, that would speak against a third contact
     answer.unknowns = PairSearch::kUnknowns;
@@ -57,18 +58,18 @@ class PairAnswer {
   void name_all(const PairSearch& pairs, Answer& a) {
     begin(pairs.count() > 0 ? pairs[0].rank : 0, 2, a);
     pairs.starts().regions([&](int surface, const Vec3& point, double cost, double reach) {
-      add(surface, point, cost, reach);
+      add(surface, surfaces_.to_world(point, surfaces_[surface].node), cost, reach);
     });
     gather(a);
   }
 
   // The same, as a walk over all that explains has it.
-  void name_all(const PairParts& parts, const LinkSurfaces& surfaces, Answer& a) {
+  void name_all(const PairParts& parts, Answer& a) {
     begin(parts.rank(), 2, a);
     for (int i = 0; i < parts.count(); ++i) {
       const PairParts::Part& part = parts[i];
       if (!parts.explains(part)) continue;
-      const Vec3 point = surfaces.to_world(part.point, surfaces[part.surface].node);
+      const Vec3 point = surfaces_.to_world(part.point, surfaces_[part.surface].node);
       add(part.surface, point, part.cost, parts.reach());
     }
     gather(a);
@@ -90,7 +91,19 @@ class PairAnswer {
     Vec3 point;
     double cost, reach;  // how far around it [m]
     int region;
+    double square;  // of the distance from its centre [m2]
   };
+
+  static int degrees(const PairSearch& pairs) {
+    return std::max(1, pairs.view().rows() - PairSearch::kUnknowns);
+  }
+
+  // An end of a pair, to where its body is now.
+  PairEnd now(PairEnd e, const PairView& then) const {
+    e.point = surfaces_.to_world(then.to_body(e.point, e.body), e.node);
+    e.normal = surfaces_.turn_to_world(then.turn_to_body(e.normal, e.body), e.node);
+    return e;
+  }
 
   void begin(int rank, int contacts, Answer& a) {
     a.status = Status::not_separable;
@@ -102,83 +115,92 @@ class PairAnswer {
 
   void add(int surface, const Vec3& point, double cost, double reach) {
     if (cells_ == kCells) return;
-    cell_[cells_++] = {surface, point, cost, reach, -1};
+    cell_[cells_++] = {surface, point, cost, reach, -1, std::numeric_limits<double>::infinity()};
     least_ = std::min(least_, cost);
   }
 
   // One region for each link, then the widest ones in two.
   void gather(Answer& a) {
-    for (int i = 0; i < cells_ && a.count < Answer::kCandidates; ++i) {
-      bool known = false;
-      for (int k = 0; k < a.count; ++k) known = known || a.candidates[k].surface == cell_[i].surface;
-      if (!known) centre(a, i);
+    for (int i = 0; i < cells_; ++i) {
+      if (cell_[i].region < 0 && a.count < Answer::kCandidates) centre(a, i);
     }
-    assign(a);
     while (a.count > 0 && a.count < Answer::kCandidates) {
-      const int far = farthest(a);
+      const int far = farthest();
       if (far < 0) break;
       centre(a, far);
-      assign(a);
     }
     for (int turn = 0; turn < kTurns; ++turn) {
       for (int k = 0; k < a.count; ++k) recentre(a, k);
-      assign(a);
+      for (int i = 0; i < cells_; ++i) cell_[i].square = std::numeric_limits<double>::infinity();
+      for (int k = 0; k < a.count; ++k) join(a, k);
     }
+    weigh(a);
   }
 
   // To the cell from which it is not far to any other of its region.
   void recentre(Answer& a, int region) {
-    double least = std::numeric_limits<double>::infinity();
+    int count = 0;
     for (int i = 0; i < cells_; ++i) {
-      if (cell_[i].region != region) continue;
+      if (cell_[i].region == region) members_[count++] = i;
+    }
+    double least = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < count; ++i) {
+      const Vec3& point = cell_[members_[i]].point;
       double far = 0.0;
-      for (int j = 0; j < cells_ && far < least; ++j) {
-        if (cell_[j].region == region) far = std::max(far, norm(cell_[j].point - cell_[i].point));
-      }
+      for (int j = 0; j < count && far < least; ++j)
+        far = std::max(far, squared_distance(cell_[members_[j]].point, point));
       if (!(far < least)) continue;
       least = far;
-      a.candidates[region].point = cell_[i].point;
+      a.candidates[region].point = point;
     }
   }
 
+  // A new region about a cell.
   void centre(Answer& a, int cell) {
     Candidate& k = a.candidates[a.count++];
     k = Candidate{};
     k.surface = cell_[cell].surface;
     k.point = cell_[cell].point;
+    join(a, a.count - 1);
   }
 
   // The cell farthest from the centre of its region; -1 where all are near enough.
-  int farthest(const Answer& a) const {
+  int farthest() const {
     int far = -1;
-    double most = settings_.place_radius;
+    double most = settings_.place_radius * settings_.place_radius;
     for (int i = 0; i < cells_; ++i) {
-      if (cell_[i].region < 0) continue;
-      const double distance = norm(cell_[i].point - a.candidates[cell_[i].region].point);
-      if (distance > most) {
-        most = distance;
-        far = i;
-      }
+      if (cell_[i].region < 0 || !(cell_[i].square > most)) continue;
+      most = cell_[i].square;
+      far = i;
     }
     return far;
   }
 
-  // Gives each cell to the nearest region of its link.
-  void assign(Answer& a) {
-    double sum = 0.0;
-    for (int k = 0; k < a.count; ++k) a.candidates[k].weight = a.candidates[k].radius = 0.0;
+  // Gives a region the cells of its link that are nearer to it than to theirs.
+  void join(const Answer& a, int region) {
+    const Candidate& k = a.candidates[region];
     for (int i = 0; i < cells_; ++i) {
-      double least = std::numeric_limits<double>::infinity();
-      cell_[i].region = -1;
-      for (int k = 0; k < a.count; ++k) {
-        const double distance = norm(a.candidates[k].point - cell_[i].point);
-        if (a.candidates[k].surface != cell_[i].surface || distance > least) continue;
-        least = distance;
-        cell_[i].region = k;
-      }
+      Cell& cell = cell_[i];
+      if (cell.surface != k.surface) continue;
+      const double square = squared_distance(k.point, cell.point);
+      if (square > cell.square) continue;
+      cell.square = square;
+      cell.region = region;
+    }
+  }
+
+  static double squared_distance(const Vec3& a, const Vec3& b) {
+    const Vec3 way = a - b;
+    return dot(way, way);
+  }
+
+  // What each region stands for: how far it reaches, and how likely it is.
+  void weigh(Answer& a) const {
+    double sum = 0.0;
+    for (int i = 0; i < cells_; ++i) {
       if (cell_[i].region < 0) continue;
       Candidate& k = a.candidates[cell_[i].region];
-      k.radius = std::max(k.radius, least + cell_[i].reach);
+      k.radius = std::max(k.radius, std::sqrt(cell_[i].square) + cell_[i].reach);
       const double weight = std::exp(0.5 * (least_ - cell_[i].cost));
       k.weight += weight;
       sum += weight;
@@ -204,8 +226,10 @@ class PairAnswer {
     std::copy(e.along, e.along + 3, k.along);
   }
 
+  const LinkSurfaces& surfaces_;
   const LocalizerSettings& settings_;
   Cell cell_[kCells];
+  int members_[kCells];
   int cells_ = 0;
   double least_ = 0.0;
 };

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Moves a pair of points over the surfaces to where it explains better. No allocation.
+// Moves a pair of points over the surfaces to where it explains better, some steps at a time. No
+// allocation.
 // Theory: docs/theory.md, section 6.5.
 #pragma once
 
@@ -9,49 +10,73 @@
 
 namespace touchline {
 
+// One descent at a time, in as many parts as wanted: where it ends does not depend on them.
 class PairDescent {
  public:
   PairDescent(const PairView& view, PairFit& fit) : view_(view), fit_(fit) {}
 
-  // At most so many steps, a third of them where the cost is `hopeless` by then; how many there
-  // were. `bound`: do the friction cones guide it too, or do they only judge where it ends? `held`:
-  // the end that is to move as little as it can.
-  int descend(Pair& s, int most, double hopeless, bool bound, int held = -1) {
-    fit_.solve_forces(s, bound);
-    double damping = 1e-3;
+  // From where, and at most so many steps, a third of them where the cost is `hopeless` by then.
+  // `bound`: do the friction cones guide it too, or do they only judge where it ends? `held`: the end
+  // that is to move as little as it can.
+  void begin(const Pair& from, int most, double hopeless, bool bound, int held = -1) {
+    pair_ = from;
+    most_ = most;
+    hopeless_ = hopeless;
+    bound_ = bound;
+    held_ = held;
+    steps_ = 0;
+    damping_ = 1e-3;
+    moved_ = working_ = true;
+    fit_.solve_forces(pair_, bound_);
+  }
+  void drop() { working_ = false; }
+  bool working() const { return working_; }
+  // Where it has come to.
+  const Pair& pair() const { return pair_; }
+
+  // Goes on by at most so many steps; how many there were.
+  int work(int steps) {
     int i = 0;
-    for (; i < most && damping < 1e6; ++i) {
-      Pair next = s;
-      const double length = step(next, damping, bound, held);
-      if (length < 1e-5) break;
-      fit_.solve_forces(next, bound);
-      if (next.cost < s.cost) {
-        const bool flat = s.cost - next.cost < 1e-3 * s.cost && length < 1e-3;
-        s = next;
-        damping = std::max(1e-6, 0.2 * damping);
-        if (flat) break;
-      } else {
-        damping *= 8.0;
-      }
-      if (i == most / 3 && s.cost > hopeless) break;
-    }
-    return i + 1;
+    for (; i < steps && working_; ++i) working_ = improve();
+    return i;
   }
 
  private:
   static constexpr double kHold = 5e-3;      // of an end that is held, one sigma of a step [m]
   static constexpr double kFarthest = 0.04;  // that a step goes [m]
 
+  // One step more; false if it was the last one.
+  bool improve() {
+    if (moved_) fit_.information(pair_, H_, g_, bound_);
+    Pair next = pair_;
+    const double length = step(next);
+    if (length < 1e-5) return false;
+    fit_.solve_forces(next, bound_);
+    moved_ = next.cost < pair_.cost;
+    if (moved_) {
+      const double better = pair_.cost - next.cost;
+      const bool flat = better < 1e-3 * pair_.cost && length < 1e-3;
+      pair_ = next;
+      damping_ = std::max(1e-6, 0.2 * damping_);
+      if (flat) return false;
+    } else {
+      damping_ *= 8.0;
+    }
+    const bool hopeless = steps_ == most_ / 3 && pair_.cost > hopeless_;
+    return !hopeless && ++steps_ < most_ && damping_ < 1e6;
+  }
+
   // One damped Gauss-Newton step of the points; its length [m].
-  double step(Pair& s, double damping, bool bound, int held) {
+  double step(Pair& s) const {
     constexpr int n = PairFit::kUnknowns;
     double H[n * n], x[n];
-    fit_.information(s, H, x, bound);
-    for (int i = 6; i < n; ++i) H[i * (n + 1)] *= 1.0 + damping;
-    for (int i = 6 + 2 * held; held >= 0 && i < 8 + 2 * held; ++i)
+    std::copy_n(H_, n * n, H);
+    std::copy_n(g_, n, x);
+    for (int i = 6; i < n; ++i) H[i * (n + 1)] *= 1.0 + damping_;
+    for (int i = 6 + 2 * held_; held_ >= 0 && i < 8 + 2 * held_; ++i)
       H[i * (n + 1)] += 1.0 / (kHold * kHold);
-    if (!cholesky(H, n)) return 0.0;
-    solve_cholesky(H, n, x);
+    if (!cholesky<n>(H)) return 0.0;
+    solve_cholesky<n>(H, x);
     double length = 0.0;
     for (int k = 0; k < 2; ++k) {
       PairEnd& e = s.ends[k];
@@ -61,17 +86,25 @@ class PairDescent {
       const double size = norm(way), most = std::min(size, kFarthest);
       if (size > kFarthest) way = (kFarthest / size) * way;
       // The surface is no farther from there than where it was left.
-      const SurfacePoint p = view_.nearest(e.surface, e.body, e.point + way, most + 1e-6);
+      const SurfacePoint p = view_.nearest(e.surface, e.body, e.point + way, most + 1e-6, e.place);
       if (p.face < 0) return 0.0;
       length = std::max(length, norm(p.point - e.point));
       e.point = p.point;
       e.normal = p.normal;
+      e.place = p.place;
     }
     return length;
   }
 
   const PairView& view_;
   PairFit& fit_;
+  Pair pair_;
+  int most_ = 0, held_ = -1, steps_ = 0;
+  double hopeless_ = 0.0, damping_ = 0.0;
+  // `moved_`: since the information was taken?
+  bool bound_ = false, moved_ = false, working_ = false;
+  // Of the pair that is left: its information and the gradient, as `PairFit` has them.
+  double H_[PairFit::kUnknowns * PairFit::kUnknowns], g_[PairFit::kUnknowns];
 };
 
 }  // namespace touchline

@@ -25,32 +25,26 @@ class PairFit {
   // The forces at given points that explain best, in closed form; where they are `bound`, with what
   // is beyond the friction cones.
   void solve_forces(Pair& s, bool bound) {
-    double A[36] = {}, g[6] = {}, square = 0.0;
     set_forces(s.ends);
-    for (int r = 0; r < view_.rows(); ++r) {
-      const double *d = columns_ + r * kUnknowns, y = view_.white_values()[r];
-      square += y * y;
-      for (int i = 0; i < 6; ++i) {
-        g[i] += d[i] * y;
-        for (int j = 0; j <= i; ++j) A[6 * i + j] += d[i] * d[j];
-      }
-    }
+    double A[36], g[6];
+    std::copy_n(A_, 36, A);
+    std::copy_n(g_, 6, g);
     for (int i = 0; i < 6; ++i) A[7 * i] += prior(i);
     s.cost = std::numeric_limits<double>::infinity();
     double L[36], x[6];
     std::copy(A, A + 36, L);
     std::copy(g, g + 6, x);
-    if (!cholesky(L, 6)) return;
-    solve_cholesky(L, 6, x);
-    judge(A, g, square, x, s);
+    if (!cholesky<6>(L)) return;
+    solve_cholesky<6>(L, x);
+    judge(A, g, x, s);
     for (int turn = 0; bound && turn < kTurns && s.cost > s.chi2 + kBeyond; ++turn) {
       std::copy(A, A + 36, L);
       std::copy(g, g + 6, x);
       add_cones(s, L, 6, x);
-      if (!cholesky(L, 6)) return;
-      solve_cholesky(L, 6, x);
+      if (!cholesky<6>(L)) return;
+      solve_cholesky<6>(L, x);
       Pair other = s;
-      judge(A, g, square, x, other);
+      judge(A, g, x, other);
       if (!(other.cost < s.cost)) return;
       s = other;
     }
@@ -62,18 +56,38 @@ class PairFit {
   void information(const Pair& s, double* H, double* g, bool bound) {
     constexpr int n = kUnknowns;
     set_forces(s.ends);
-    set_tangents(s.ends);
-    std::fill(H, H + n * n, 0.0);
-    std::fill(g, g + n, 0.0);
     const Vec3 &f = s.ends[0].force, &h = s.ends[1].force;
     const double forces[6] = {f.x, f.y, f.z, h.x, h.y, h.z};
-    for (int r = 0; r < view_.rows(); ++r) {
-      const double* d = columns_ + r * n;
-      double rest = view_.white_values()[r];
-      for (int i = 0; i < 6; ++i) rest -= d[i] * forces[i];
-      for (int i = 0; i < n; ++i) {
-        g[i] += d[i] * rest;
-        for (int j = 0; j <= i; ++j) H[n * i + j] += d[i] * d[j];
+    for (int i = 0; i < 6; ++i) {
+      g[i] = g_[i];
+      for (int j = 0; j < 6; ++j) g[i] -= A_[6 * std::max(i, j) + std::min(i, j)] * forces[j];
+      for (int j = 0; j <= i; ++j) H[n * i + j] = A_[6 * i + j];
+    }
+    // Ways of the points along their surfaces change the moments of their forces.
+    double moments[4][3];
+    for (int i = 0; i < 4; ++i) {
+      const int k = i / 2, row = 6 * k + 3;
+      const PairEnd& e = s.ends[k];
+      Vec3 along[2];
+      tangents(e.normal, along[0], along[1]);
+      store(cross(along[i % 2], e.force), moments[i]);
+      g[6 + i] = 0.0;
+      for (int r = 0; r < 3; ++r) {
+        const double* t = loads_ + 6 * (row + r);
+        double rest = h_[row + r];
+        for (int j = 0; j < 6; ++j) rest -= t[j] * forces[j];
+        g[6 + i] += moments[i][r] * rest;
+      }
+      for (int j = 0; j < 6; ++j) {
+        double& sum = H[n * (6 + i) + j] = 0.0;
+        for (int r = 0; r < 3; ++r) sum += moments[i][r] * loads_[6 * (row + r) + j];
+      }
+      for (int j = 0; j <= i; ++j) {
+        const double* N = block(k, j / 2) + 21;
+        double& sum = H[n * (6 + i) + 6 + j] = 0.0;
+        for (int r = 0; r < 3; ++r) {
+          for (int c = 0; c < 3; ++c) sum += moments[i][r] * N[6 * r + c] * moments[j][c];
+        }
       }
     }
     for (int i = 0; i < n; ++i) H[i * (n + 1)] += prior(i);
@@ -90,7 +104,8 @@ class PairFit {
   }
 
   // Takes forces over, with their misfit.
-  void judge(const double* A, const double* g, double square, const double* x, Pair& s) const {
+  void judge(const double* A, const double* g, const double* x, Pair& s) const {
+    double square = view_.square();
     for (int i = 0; i < 6; ++i) {
       double own = 0.5 * A[7 * i] * x[i] - g[i];
       for (int j = 0; j < i; ++j) own += A[6 * i + j] * x[j];
@@ -134,40 +149,47 @@ class PairFit {
     }
   }
 
-  // What forces at both ends do to the rows: f . row + (p x f) . moments = f . (row + moments x p).
+  // The normal equations of forces at both ends, from those of wrenches on their bodies: a force f at
+  // p is the wrench (f, p x f), so that row . f + moments . (p x f) = f . (row + moments x p).
   void set_forces(const PairEnd* ends) {
+    Vec3 p[2];
     for (int k = 0; k < 2; ++k) {
-      const double* m = view_.white_map(ends[k].body);
-      const Vec3 p = view_.earlier(ends[k].point, ends[k].body);
-      for (int r = 0; r < view_.rows(); ++r, m += 6) {
-        const Vec3 row = Vec3{m[0], m[1], m[2]} + cross(Vec3{m[3], m[4], m[5]}, p);
-        double* d = columns_ + r * kUnknowns + 3 * k;
-        d[0] = row.x;
-        d[1] = row.y;
-        d[2] = row.z;
+      p[k] = view_.earlier(ends[k].point, ends[k].body);
+      bodies_[k] = ends[k].body;
+      std::copy_n(view_.vector(ends[k].body), 6, h_ + 6 * k);
+    }
+    for (int k = 0; k < 2; ++k) {
+      for (int l = 0; l < 2; ++l) {
+        const double* N = block(k, l);
+        double* t = loads_ + 36 * k + 3 * l;
+        for (int r = 0; r < 6; ++r, N += 6, t += 6)
+          store(Vec3{N[0], N[1], N[2]} + cross(Vec3{N[3], N[4], N[5]}, p[l]), t);
+      }
+      const double *h = h_ + 6 * k, *t = loads_ + 36 * k;
+      store(Vec3{h[0], h[1], h[2]} + cross(Vec3{h[3], h[4], h[5]}, p[k]), g_ + 3 * k);
+      for (int j = 0; j < 3 * (k + 1); ++j) {
+        double column[3];
+        store(Vec3{t[j], t[6 + j], t[12 + j]} + cross(Vec3{t[18 + j], t[24 + j], t[30 + j]}, p[k]),
+              column);
+        for (int i = 0; i < 3; ++i) A_[6 * (3 * k + i) + j] = column[i];
       }
     }
   }
 
-  // What ways of both points along their surfaces do, under their forces.
-  void set_tangents(const PairEnd* ends) {
-    for (int k = 0; k < 2; ++k) {
-      const PairEnd& e = ends[k];
-      const double* m = view_.white_map(e.body);
-      Vec3 s[2];
-      tangents(e.normal, s[0], s[1]);
-      const Vec3 moments[2] = {cross(s[0], e.force), cross(s[1], e.force)};
-      for (int r = 0; r < view_.rows(); ++r, m += 6) {
-        double* d = columns_ + r * kUnknowns + 6 + 2 * k;
-        for (int i = 0; i < 2; ++i) d[i] = dot(Vec3{m[3], m[4], m[5]}, moments[i]);
-      }
-    }
+  const double* block(int k, int l) const { return view_.information(bodies_[k], bodies_[l]); }
+  static void store(const Vec3& v, double* out) {
+    out[0] = v.x;
+    out[1] = v.y;
+    out[2] = v.z;
   }
 
   const PairView& view_;
   const LocalizerSettings& settings_;
   double cone_;
-  double columns_[PairView::kRows * kUnknowns];  // forces of both ends, then their tangents
+  // Of the points at hand: the two bodies, what forces at both do to the normal equations of the
+  // wrenches (12, 6), and those (12); and the normal equations of the forces.
+  int bodies_[2] = {};
+  double loads_[72], h_[12], A_[36], g_[6];
 };
 
 }  // namespace touchline

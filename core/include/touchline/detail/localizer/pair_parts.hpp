@@ -42,7 +42,8 @@ class PairParts {
     count_ = steps_ = 0;
     drop();
     for (int i = 0; i < search.count(); ++i) wait(search[i], -1);
-    search.starts().plausible([&](const Pair& pair, int end) { wait(pair, end); });
+    Pair pair;
+    for (int place = 0, end; search.starts().plausible(place, pair, end);) wait(pair, end);
   }
 
   void drop() { head_ = waits_ = 0; }
@@ -51,11 +52,12 @@ class PairParts {
   // Goes on for about so many steps.
   void work(int steps) {
     for (const int until = steps_ + steps; waits_ > 0 && steps_ < until;) {
-      Task task = waiting_[head_];
+      const Task& task = waiting_[head_];
       head_ = (head_ + 1) % kWaiting;
       --waits_;
-      steps_ += descent_.descend(task.pair, kSteps, kHopeless, true, task.held);
-      take(task.pair);
+      descent_.begin(task.pair, kSteps, kHopeless, true, task.held);
+      while (descent_.working()) steps_ += descent_.work(kSteps);
+      take(descent_.pair());
     }
   }
 
@@ -152,10 +154,11 @@ class PairParts {
       Pair next = s;
       PairEnd& e = next.ends[k];
       const Vec3 target = e.point + (i % 2 ? stride : -stride) * ways[i / 2];
-      const SurfacePoint p = view_.nearest(e.surface, e.body, target, stride);
+      const SurfacePoint p = view_.nearest(e.surface, e.body, target, stride, e.place);
       if (p.face < 0) continue;
       e.point = p.point;
       e.normal = p.normal;
+      e.place = p.place;
       wait(next, k);
     }
   }

@@ -21,23 +21,25 @@ class PairSearch {
  public:
   static constexpr int kSolutions = 48, kUnknowns = PairFit::kUnknowns;
 
+  // On segment g.
   PairSearch(const Posture& posture, const LinkSurfaces& surfaces,
-             const LocalizerSettings& settings, std::size_t rows, int segments)
+             const LocalizerSettings& settings, std::size_t rows, int g)
       : surfaces_(surfaces),
         settings_(settings),
-        view_(posture, surfaces, rows, segments),
+        view_(posture, surfaces, rows, g),
         fit_(view_, settings),
         descent_(view_, fit_),
-        starts_(surfaces, settings, rows, segments) {}
+        starts_(surfaces, settings, g) {}
 
-  // Searches segment g, which `measurement` has read and whose rows are `lag` [s] old. The
+  // Searches what `measurement` has read of the segment, and whose rows are `lag` [s] old. The
   // solutions are those that explain, the most probable first.
-  void search(int g, double lag, const Measurement& measurement) {
+  void search(double lag, const Measurement& measurement) {
     count_ = 0;
     starts_.clear();
-    searched_ = view_.take(g, lag, measurement);
+    searched_ = view_.take(lag, measurement);
     if (!searched_) return;
-    starts_.find(view_);
+    starts_.begin(view_);
+    while (starts_.working()) starts_.work(kAll);
     for (int i = 0; i < starts_.count(); ++i) refine(starts_[i]);
     for (int i = 0, n = count_; i < n; ++i) enter(solutions_[i]);
     weigh();
@@ -53,12 +55,15 @@ class PairSearch {
 
  private:
   static constexpr int kSteps = 24;        // of a refinement
+  static constexpr int kAll = std::numeric_limits<int>::max();  // of the work on starts
   static constexpr double kSame = 0.01;    // solutions nearer than this are one [m]
   static constexpr double kWindow = 25.0;  // of cost: beyond it a solution weighs nothing
   static constexpr double kHopeless = 1e5;  // cost after a third of the steps
 
-  void refine(Pair s) {
-    descent_.descend(s, kSteps, kHopeless, false);
+  void refine(const Pair& start) {
+    descent_.begin(start, kSteps, kHopeless, false);
+    while (descent_.working()) descent_.work(kSteps);
+    const Pair& s = descent_.pair();
     if (s.cost < chi2_limit(view_.rows(), settings_.pitch_limit) + kWindow) add(s);
   }
 
@@ -75,6 +80,7 @@ class PairSearch {
           if (std::fabs(t) < kSame) return;
           Pair other = s;
           other.ends[k].surface = surface;
+          other.ends[k].place = -1;
           other.ends[k].point = point;
           other.ends[k].normal = normal;
           fit_.solve_forces(other, false);

@@ -18,45 +18,52 @@ class PairView {
  public:
   static constexpr int kRows = 64;  // beyond it nothing is searched
 
-  PairView(const Posture& posture, const LinkSurfaces& surfaces, std::size_t rows, int segments)
+  // Of segment g.
+  PairView(const Posture& posture, const LinkSurfaces& surfaces, std::size_t rows, int g)
       : posture_(&posture),
         surfaces_(&surfaces),
+        g_(g),
         values_(rows),
-        white_(rows),
-        covariance_(rows * rows) {
-    std::size_t most = 0;
-    for (int g = 0; g < segments; ++g) most = std::max(most, surfaces.bodies(g).size());
+        white_(rows) {
+    const std::size_t most = surfaces.bodies(g).size();
     maps_.resize(most * rows * 6);
-    white_maps_.resize(most * rows * 6);
+    information_.resize(most * most * 36);
+    vector_.resize(most * 6);
     feels_.resize(most * rows);
     poses_.resize(most);
     twists_.resize(most);
   }
 
-  // Takes what `measurement` has read of segment g, `lag` [s] old; false if that is too much.
-  bool take(int g, double lag, const Measurement& measurement) {
-    g_ = g;
+  // Takes what `measurement` has read of the segment, `lag` [s] old; false if that is too much.
+  bool take(double lag, const Measurement& measurement) {
     lag_ = measurement.lag(lag);
     has_wrench_ = measurement.has_wrench();
     rows_ = measurement.size();
     if (rows_ > kRows) return false;
     measurement.values(values_.data(), 1);
-    measurement.covariance(covariance_.data());
     std::copy_n(values_.data(), rows_, white_.data());
     measurement.whiten(white_.data(), 1);
+    square_ = 0.0;
+    for (int r = 0; r < rows_; ++r) square_ += white_[r] * white_[r];
     for (int b = 0; b < bodies(); ++b) {
       poses_[b] = posture_->pose(node(b));
       twists_[b] = posture_->twist(node(b));
       double* own = maps_.data() + b * 6 * rows_;
-      double* white = white_maps_.data() + b * 6 * rows_;
       for (int i = 0; i < 6; ++i) {
         double w[6] = {};
         w[i] = 1.0;
         measurement.load(node(b), touchline::load(w), lag_, own + i, 6);
+        measurement.whiten(own + i, 6);
       }
-      std::copy_n(own, 6 * rows_, white);
-      for (int i = 0; i < 6; ++i) measurement.whiten(white + i, 6);
       for (int r = 0; r < rows_; ++r) feels_[b * rows_ + r] = measurement.feels(r, node(b));
+    }
+    for (int a = 0; a < bodies(); ++a) {
+      double* h = vector_.data() + 6 * a;
+      std::fill(h, h + 6, 0.0);
+      for (int r = 0; r < rows_; ++r) {
+        for (int i = 0; i < 6; ++i) h[i] += maps_[6 * (a * rows_ + r) + i] * white_[r];
+      }
+      for (int b = a; b < bodies(); ++b) multiply(a, b);
     }
     return true;
   }
@@ -66,23 +73,38 @@ class PairView {
   int bodies() const { return static_cast<int>(surfaces_->bodies(g_).size()); }
   int node(int body) const { return surfaces_->bodies(g_)[body].node; }
   const LinkSurfaces& surfaces() const { return *surfaces_; }
-  // The measured numbers, and the same to the scale of the noise.
+  // The measured numbers.
   const double* values() const { return values_.data(); }
-  const double* white_values() const { return white_.data(); }
-  // What unit wrenches on a body do to the rows (rows, 6), and the same to the scale of the noise.
-  const double* map(int body) const { return maps_.data() + body * 6 * rows_; }
-  const double* white_map(int body) const { return white_maps_.data() + body * 6 * rows_; }
-  // The lower triangle of the covariance of all rows.
-  const double* covariance() const { return covariance_.data(); }
+  // The normal equations of a wrench on each body, all to the scale of the noise: W_a^T W_b (6, 6),
+  // W_a^T y (6) and y^T y, where W_a are the rows of unit wrenches on body a, and y is measured.
+  const double* information(int a, int b) const {
+    return information_.data() + 36 * (a * bodies() + b);
+  }
+  const double* vector(int body) const { return vector_.data() + 6 * body; }
+  double square() const { return square_; }
+  // Those of the wrenches on two bodies together: (12, 12), all of it, and (12).
+  void information(int a, int b, double* N, double* h) const {
+    const int of[2] = {a, b};
+    for (int k = 0; k < 2; ++k) {
+      std::copy_n(vector(of[k]), 6, h + 6 * k);
+      for (int l = 0; l < 2; ++l) {
+        const double* block = information(of[k], of[l]);
+        for (int i = 0; i < 6; ++i) std::copy_n(block + 6 * i, 6, N + 12 * (6 * k + i) + 6 * l);
+      }
+    }
+  }
 
   Vec3 to_world(const Vec3& p, int body) const { return poses_[body].R * p + poses_[body].p; }
   Vec3 to_body(const Vec3& p, int body) const {
     return transposed_times(poses_[body].R, p - poses_[body].p);
   }
   Vec3 turn_to_world(const Vec3& v, int body) const { return poses_[body].R * v; }
+  Vec3 turn_to_body(const Vec3& v, int body) const { return transposed_times(poses_[body].R, v); }
   // The point of a surface nearest to a point of the world, in world; `face` is -1 beyond `limit`.
-  SurfacePoint nearest(int surface, int body, const Vec3& target, double limit) const {
-    SurfacePoint p = (*surfaces_)[surface].mesh.nearest_to_point(to_body(target, body), limit);
+  // `near`: the place of a triangle in the mesh that may be near, if known.
+  SurfacePoint nearest(int surface, int body, const Vec3& target, double limit,
+                       int near = -1) const {
+    SurfacePoint p = (*surfaces_)[surface].mesh.nearest_to_point(to_body(target, body), limit, near);
     p.point = to_world(p.point, body);
     p.normal = turn_to_world(p.normal, body);
     return p;
@@ -115,13 +137,30 @@ class PairView {
   bool has_wrench() const { return has_wrench_; }
 
  private:
+  // W_a^T W_b, and its transpose.
+  void multiply(int a, int b) {
+    const double *A = maps_.data() + a * 6 * rows_, *B = maps_.data() + b * 6 * rows_;
+    double* own = information_.data() + 36 * (a * bodies() + b);
+    double* other = information_.data() + 36 * (b * bodies() + a);
+    double sum[36] = {};
+    for (int r = 0; r < rows_; ++r, A += 6, B += 6) {
+      for (int i = 0; i < 6; ++i) {
+        for (int j = 0; j < 6; ++j) sum[6 * i + j] += A[i] * B[j];
+      }
+    }
+    for (int i = 0; i < 6; ++i) {
+      for (int j = 0; j < 6; ++j) own[6 * i + j] = other[6 * j + i] = sum[6 * i + j];
+    }
+  }
+
   const Posture* posture_;
   const LinkSurfaces* surfaces_;
+  int g_, rows_ = 0;
   std::vector<Pose> poses_;      // of the bodies, at that instant
   std::vector<Spatial> twists_;  // and how they moved
-  std::vector<double> values_, white_, covariance_, maps_, white_maps_;
+  std::vector<double> values_, white_, maps_, information_, vector_;
+  double square_ = 0.0;
   std::vector<char> feels_;  // per body and row
-  int g_ = 0, rows_ = 0;
   bool has_wrench_ = false;
   double lag_ = 0.0;
 };

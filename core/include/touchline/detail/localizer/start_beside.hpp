@@ -13,10 +13,19 @@ namespace touchline {
 // One start of a body beside blocks of those of another.
 class StartBeside {
  public:
-  // Start i; `square`: of what is measured.
-  StartBeside(const StartLanes& own, int i, double square) : rows_(own.rows()) {
+  // Start i; `N` (6, 6), of which a row has `stride` numbers: what of the normal equations couples
+  // wrenches on its body with those on the other; `square`: of what is measured.
+  StartBeside(const StartLanes& own, int i, const double* N, int stride, double square) {
     const int block = i / kLanes, k = i % kLanes;
-    for (int r = 0; r < 3 * rows_; ++r) load_[r] = lane(own.load(block)[r], k);
+    const Lanes* wrenches = own.wrenches(block);
+    for (int q = 0; q < 3; ++q) {
+      double w[6];
+      for (int r = 0; r < 6; ++r) w[r] = lane(wrenches[3 * r + q], k);
+      for (int c = 0; c < 6; ++c) {
+        double& sum = load_[3 * c + q] = 0.0;
+        for (int r = 0; r < 6; ++r) sum += w[r] * N[stride * r + c];
+      }
+    }
     for (int c = 0; c < 6; ++c) turn_[c] = lane(own.turn(block)[c], k);
     rest_ = square + lane(own.beyond(block), k);
     for (int c = 0; c < 3; ++c) {
@@ -28,9 +37,9 @@ class StartBeside {
 
   // The misfit with each of a block of others, with the best forces in any direction.
   Lanes misfit(const StartLanes& others, int block) {
-    const Lanes *v = others.load(block), *g = others.target(block);
+    const Lanes *v = others.wrenches(block), *g = others.target(block);
     for (Lanes& c : coupling_) c = all_lanes(0.0);
-    for (int r = 0; r < rows_; ++r) {
+    for (int r = 0; r < 6; ++r) {
       for (int p = 0; p < 3; ++p) {
         for (int q = 0; q < 3; ++q) coupling_[3 * p + q] += v[3 * r + p] * load_[3 * r + q];
       }
@@ -45,12 +54,13 @@ class StartBeside {
         S[k] = all_lanes(p == q ? 1.0 : 0.0) - (c[0] * d[0] + c[1] * d[1] + c[2] * d[2]);
       }
     }
-    const Lanes l10 = S[1] / S[0], l20 = S[3] / S[0];
-    const Lanes d1 = S[2] - l10 * S[1], t = S[4] - l20 * S[1], l21 = t / d1;
+    const Lanes one = all_lanes(1.0), r0 = one / S[0];
+    const Lanes l10 = S[1] * r0, l20 = S[3] * r0;
+    const Lanes d1 = S[2] - l10 * S[1], t = S[4] - l20 * S[1], r1 = one / d1, l21 = t * r1;
     const Lanes d2 = S[5] - l20 * S[3] - l21 * t;
     y[1] -= l10 * y[0];
     y[2] -= l20 * y[0] + l21 * y[1];
-    const Lanes x0 = y[0] / S[0], x1 = y[1] / d1, x2 = y[2] / d2;
+    const Lanes x0 = y[0] * r0, x1 = y[1] * r1, x2 = y[2] / d2;
     const Lanes cost = all_lanes(rest_) - (y[0] * x0 + y[1] * x1 + y[2] * x2) + others.beyond(block);
     other_[2] = x2;
     other_[1] = x1 - l21 * x2;
@@ -82,8 +92,7 @@ class StartBeside {
     out[2] = lower[5] * x[2];
   }
 
-  int rows_;
-  double load_[3 * PairView::kRows], target_[3], turn_[6], normal_[3], rest_;
+  double load_[18], target_[3], turn_[6], normal_[3], rest_;
   Lanes coupling_[9], other_[3];
 };
 

@@ -14,33 +14,33 @@
 
 namespace touchline {
 
-// The starts of one body, whitened: what a force at each does to the rows, in those coordinates z
-// of the force in which its normal equations are the identity: f = turn^T z.
+// The starts of one body: the wrench of a force at each, in those coordinates z of the force in which
+// its normal equations are the identity: f = turn^T z.
 class StartLanes {
  public:
-  StartLanes(std::size_t starts, std::size_t rows) {
+  explicit StartLanes(std::size_t starts) {
     const std::size_t blocks = (starts + kLanes - 1) / kLanes;
-    loads_.resize(blocks * rows * 3);
+    wrenches_.resize(blocks * 18);
     targets_.resize(blocks * 3);
     turns_.resize(blocks * 6);
     normals_.resize(blocks * 3);
     beyond_.resize(blocks);
   }
 
-  // `points`: where they were when the rows felt them. `map` (rows, 6): what wrenches on the body do to whitened rows; `target` (rows): what is
-  // measured; `force_scale`: of forces that cannot be seen [N].
-  void fill(const Vec3* points, const Vec3* normals, int count, const double* map,
-            const double* target, int rows, double force_scale) {
+  // `points`: where they were when the rows felt them. The normal equations of a wrench on the body:
+  // `N` (6, 6), of which a row has `stride` numbers, and `h` (6). `force_scale`: of forces that cannot
+  // be seen [N].
+  void fill(const Vec3* points, const Vec3* normals, int count, const double* N, int stride,
+            const double* h, double force_scale) {
     count_ = count;
-    rows_ = rows;
     for (int i = 0; i < blocks() * kLanes; ++i) clear(i);
-    for (int i = 0; i < count; ++i) place(i, points[i], normals[i], map, target, force_scale);
+    for (int i = 0; i < count; ++i) place(i, points[i], normals[i], N, stride, h, force_scale);
   }
 
   int count() const { return count_; }
   int blocks() const { return (count_ + kLanes - 1) / kLanes; }
-  int rows() const { return rows_; }
-  const Lanes* load(int block) const { return loads_.data() + block * rows_ * 3; }
+  // (6, 3)
+  const Lanes* wrenches(int block) const { return wrenches_.data() + block * 18; }
   const Lanes* target(int block) const { return targets_.data() + block * 3; }
   const Lanes* turn(int block) const { return turns_.data() + block * 6; }
   const Lanes* normal(int block) const { return normals_.data() + block * 3; }
@@ -50,7 +50,7 @@ class StartLanes {
  private:
   void clear(int i) {
     const int block = i / kLanes, k = i % kLanes;
-    for (int r = 0; r < 3 * rows_; ++r) set_lane(loads_[3 * rows_ * block + r], k, 0.0);
+    for (int r = 0; r < 18; ++r) set_lane(wrenches_[18 * block + r], k, 0.0);
     for (int c = 0; c < 3; ++c) {
       set_lane(targets_[3 * block + c], k, 0.0);
       set_lane(normals_[3 * block + c], k, 0.0);
@@ -59,28 +59,35 @@ class StartLanes {
     set_lane(beyond_[block], k, std::numeric_limits<double>::infinity());
   }
 
-  void place(int i, const Vec3& p, const Vec3& normal, const double* map, const double* target,
-             double force_scale) {
+  void place(int i, const Vec3& p, const Vec3& normal, const double* N, int stride,
+             const double* h, double force_scale) {
     const int block = i / kLanes, k = i % kLanes;
     const double ridge = 1.0 / (force_scale * force_scale);
-    double u[3 * PairView::kRows], A[9] = {ridge, 0, 0, 0, ridge, 0, 0, 0, ridge}, g[3] = {}, T[9];
-    for (int r = 0; r < rows_; ++r) {
-      const double* m = map + 6 * r;
-      // f . row + (p x f) . moments = f . (row + moments x p)
-      const Vec3 row = Vec3{m[0], m[1], m[2]} + cross(Vec3{m[3], m[4], m[5]}, p);
-      for (int a = 0; a < 3; ++a) u[3 * r + a] = component(row, a);
-      for (int a = 0; a < 3; ++a) {
-        g[a] += u[3 * r + a] * target[r];
-        for (int b = 0; b <= a; ++b) A[3 * a + b] += u[3 * r + a] * u[3 * r + b];
-      }
+    // row . f + moments . (p x f) = f . (row + moments x p)
+    const auto at_point = [&p](const double* w, int step) {
+      return Vec3{w[0], w[step], w[2 * step]} +
+             cross(Vec3{w[3 * step], w[4 * step], w[5 * step]}, p);
+    };
+    double A[9] = {ridge, 0, 0, 0, ridge, 0, 0, 0, ridge}, g[3], T[9], loads[18];
+    for (int r = 0; r < 6; ++r) {
+      const Vec3 row = at_point(N + stride * r, 1);
+      for (int c = 0; c < 3; ++c) loads[3 * r + c] = component(row, c);
+    }
+    for (int c = 0; c < 3; ++c) {
+      g[c] = component(at_point(h, 1), c);
+      const Vec3 column = at_point(loads + c, 3);
+      for (int r = c; r < 3; ++r) A[3 * r + c] += component(column, r);
     }
     if (!cholesky(A, 3)) return;
     invert_lower(A, 3, T);
     const double turn[6] = {T[0], T[3], T[4], T[6], T[7], T[8]};
     for (int c = 0; c < 6; ++c) set_lane(turns_[6 * block + c], k, turn[c]);
-    for (int r = 0; r < rows_; ++r) {
-      for (int c = 0; c < 3; ++c)
-        set_lane(loads_[3 * (rows_ * block + r) + c], k, times(turn, u + 3 * r, c));
+    for (int c = 0; c < 3; ++c) {
+      const Vec3 force{T[3 * c], T[3 * c + 1], T[3 * c + 2]}, moment = cross(p, force);
+      for (int r = 0; r < 3; ++r) {
+        set_lane(wrenches_[18 * block + 3 * r + c], k, component(force, r));
+        set_lane(wrenches_[18 * block + 9 + 3 * r + c], k, component(moment, r));
+      }
     }
     for (int c = 0; c < 3; ++c) {
       set_lane(targets_[3 * block + c], k, times(turn, g, c));
@@ -96,8 +103,8 @@ class StartLanes {
     return lower[3] * x[0] + lower[4] * x[1] + lower[5] * x[2];
   }
 
-  std::vector<Lanes> loads_, targets_, turns_, normals_, beyond_;
-  int count_ = 0, rows_ = 0;
+  std::vector<Lanes> wrenches_, targets_, turns_, normals_, beyond_;
+  int count_ = 0;
 };
 
 }  // namespace touchline

@@ -24,10 +24,9 @@ class Twins {
         fit_(fit),
         known_(known),
         reports_(reports),
-        pairs_(measurement.posture(), surfaces, settings, rows, segments),
-        said_(settings) {
+        said_(surfaces, settings) {
     for (int g = 0; g < segments; ++g)
-      parts_.push_back(std::make_unique<PairParts>(pairs_.view(), settings));
+      work_.push_back(std::make_unique<Work>(measurement.posture(), surfaces, settings, rows, g));
   }
 
   // One contact explains nothing, from the beginning: looks for two, again and again while their
@@ -35,23 +34,24 @@ class Twins {
   void follow(SegmentContacts& s, const Answer& one, const SegmentSample& now) {
     const double time = now.time;
     Together& two = s.together;
+    Work& work = *work_[now.segment];
     if (!s.state.is(Tracking::pair)) {
       s.state.enter(Tracking::pair);
       s.suspected.explained.reset();
       two = Together{};
       two.since = two.next_search = time;
-      parts_[now.segment]->drop();
+      work.parts.drop();
     }
     if (time >= two.next_search) {
-      pairs_.search(now.segment, now.lag, measurement_);
-      take(s, one, now);
+      work.search.search(now.lag, measurement_);
+      take(s, work, one, now);
       two.searched = time;
       const double least = settings_.refit * now.brief();
       two.next_search = time + std::max(least, settings_.search_growth * (time - two.since));
     } else if (two.separable) {
       if (known_.explain_freely(two.contacts)) fit_.accept(two.contacts, known_.change(), 0.0);
     } else {
-      walk(two, *parts_[now.segment]);
+      walk(two, work);
     }
     if (!two.separable) {
       end_second(two);
@@ -81,27 +81,35 @@ class Twins {
     two.second.reset();
   }
 
+  // The search for pairs on a segment, and the walk from where one has ended.
+  struct Work {
+    Work(const Posture& posture, const LinkSurfaces& surfaces, const LocalizerSettings& settings,
+         std::size_t rows, int g)
+        : search(posture, surfaces, settings, rows, g), parts(search.view(), settings) {}
+    PairSearch search;
+    PairParts parts;
+  };
+
   // Takes the outcome of a search over.
-  void take(SegmentContacts& s, const Answer& one, const SegmentSample& now) {
-    PairParts& parts = *parts_[now.segment];
+  void take(SegmentContacts& s, Work& work, const Answer& one, const SegmentSample& now) {
     Together& two = s.together;
-    two.separable = said_.separable(pairs_, measurement_.size());
+    two.separable = said_.separable(work.search);
     if (!two.separable) {
       if (!two.walked) {
         two.inseparable = one;
-        said_.name_all(pairs_, two.inseparable);
+        said_.name_all(work.search, two.inseparable);
       }
-      if (!parts.working() && now.time - two.since >= settings_.risen * now.brief()) {
-        parts.begin(pairs_);
-        conclude(two, parts);
+      if (!work.parts.working() && now.time - two.since >= settings_.risen * now.brief()) {
+        work.parts.begin(work.search);
+        conclude(two, work);
       }
       return;
     }
     two.walked = false;
-    parts.drop();
+    work.parts.drop();
     two.contacts.count = 0;
     for (int k = 0; k < 2; ++k) {
-      said_.name(pairs_, k, measurement_.size(), answer_);
+      said_.name(work.search, k, answer_);
       two.contacts.add(found_contact(-1, answer_, surfaces_, s.touched.age, now.lag), settings_);
     }
     fit_.begin(measurement_, two.contacts);
@@ -109,19 +117,19 @@ class Twins {
   }
 
   // Goes on with what explains as well; what was said before stands until all is met.
-  void walk(Together& two, PairParts& parts) {
-    if (!parts.working()) return;
-    parts.work(settings_.pair_steps);
-    conclude(two, parts);
+  void walk(Together& two, Work& work) {
+    if (!work.parts.working()) return;
+    work.parts.work(settings_.pair_steps);
+    conclude(two, work);
   }
 
-  void conclude(Together& two, const PairParts& parts) {
-    if (parts.working()) return;
-    if (parts.count() > 0) {
-      said_.name_all(parts, surfaces_, two.inseparable);
+  void conclude(Together& two, const Work& work) {
+    if (work.parts.working()) return;
+    if (work.parts.count() > 0) {
+      said_.name_all(work.parts, two.inseparable);
       two.walked = true;
-    } else if (pairs_.exhaustive()) {
-      said_.name_none(pairs_, two.inseparable);
+    } else if (work.search.exhaustive()) {
+      said_.name_none(work.search, two.inseparable);
       two.walked = true;
     }
   }
@@ -132,8 +140,7 @@ class Twins {
   JointFit& fit_;
   KnownFit& known_;
   Reports& reports_;
-  PairSearch pairs_;
-  std::vector<std::unique_ptr<PairParts>> parts_;  // per segment
+  std::vector<std::unique_ptr<Work>> work_;  // per segment
   PairAnswer said_;
   Answer answer_;
 };

@@ -35,6 +35,40 @@ inline void solve_lower(const double* l, int n, double* x, int stride = 1) {
   }
 }
 
+// The same for sizes that are known when it is compiled: operations that do not wait for each other
+// stand together. The last bits differ.
+template <int n>
+bool cholesky(double* a, double tolerance = 1e-13) {
+  double column[n], diagonal[n];
+  for (int i = 0; i < n; ++i) diagonal[i] = a[i * n + i];
+  for (int j = 0; j < n; ++j) {
+    const double d = a[j * n + j];
+    if (!(d > tolerance * diagonal[j])) return false;
+    const double root = std::sqrt(d), inverse = 1.0 / root;
+    a[j * n + j] = root;
+    for (int i = j + 1; i < n; ++i) column[i] = a[i * n + j] *= inverse;
+    for (int i = j + 1; i < n; ++i) {
+      for (int k = j + 1; k <= i; ++k) a[i * n + k] -= column[i] * column[k];
+    }
+  }
+  return true;
+}
+
+// x = (L L^T)^-1 x.
+template <int n>
+void solve_cholesky(const double* l, double* x) {
+  double inverse[n];
+  for (int i = 0; i < n; ++i) inverse[i] = 1.0 / l[i * n + i];
+  for (int i = 0; i < n; ++i) {
+    x[i] *= inverse[i];
+    for (int k = i + 1; k < n; ++k) x[k] -= l[k * n + i] * x[i];
+  }
+  for (int i = n - 1; i >= 0; --i) {
+    x[i] *= inverse[i];
+    for (int k = 0; k < i; ++k) x[k] -= l[i * n + k] * x[i];
+  }
+}
+
 // The inverse of a lower factor, in `out`, with zeros above; its product with a vector takes no
 // division.
 inline void invert_lower(const double* l, int n, double* out) {

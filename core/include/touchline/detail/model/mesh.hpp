@@ -34,6 +34,7 @@ struct Crossing {
 struct SurfacePoint {
   double distance = std::numeric_limits<double>::infinity();
   int face = -1;
+  int place = -1;  // of the triangle in `Mesh::triangles`, where it is told
   Vec3 point, normal;
 };
 
@@ -70,7 +71,7 @@ class Mesh {
   SurfacePoint nearest_to_line(const ForceLine& line,
                                double limit = std::numeric_limits<double>::infinity()) const {
     return nearest(
-        limit,
+        limit, -1,
         [&](const Box& b) {
           const Vec3 low = exact(b.low), high = exact(b.high);
           const Vec3 centre = 0.5 * (low + high) - line.origin;
@@ -103,11 +104,13 @@ class Mesh {
     if (count > 0) nearer_to_line(some, count, line, limit, visit);
   }
 
-  // The point of the surface nearest to `p`, if nearer than `limit`.
+  // The point of the surface nearest to `p`, if nearer than `limit`. `near`: the place of a triangle
+  // that may be near: then there is less to search.
   SurfacePoint nearest_to_point(const Vec3& p,
-                                double limit = std::numeric_limits<double>::infinity()) const {
+                                double limit = std::numeric_limits<double>::infinity(),
+                                int near = -1) const {
     return nearest(
-        limit,
+        limit, near,
         [&](const Box& b) {
           const Vec3 d{outside(p.x, b.low.x, b.high.x), outside(p.y, b.low.y, b.high.y),
                        outside(p.z, b.low.z, b.high.z)};
@@ -115,14 +118,16 @@ class Mesh {
         },
         [](double distance) { return distance * distance; },
         [&](const Triangle& tri, SurfacePoint& best) {
-          if (std::fabs(dot(tri.normal, p - tri.a)) < best.distance)
-            offer(tri, nearest_on(tri, p), p, best);
+          if (std::fabs(dot(tri.normal, p - tri.a)) < best.distance &&
+              offer(tri, nearest_on(tri, p), p, best))
+            best.place = static_cast<int>(&tri - triangles().data());
         });
   }
 
  private:
   static constexpr int kLeaf = 4, kDepth = 64;  // triangles of a leaf; room for the stack
   static constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  static constexpr double kTouching = 1e-9;  // nearer than this nothing nearer is looked for [m]
   static constexpr double kEdge = 1e-9;  // of barycentric coordinates: edges belong to both sides
 
   struct Bounds {
@@ -311,11 +316,13 @@ class Mesh {
 
   // `bound(box)`: what the `measure` of the distance of anything in a box is not less than.
   template <class Bound, class Measure, class Offer>
-  SurfacePoint nearest(double limit, Bound&& bound, Measure&& measure,
+  SurfacePoint nearest(double limit, int near, Bound&& bound, Measure&& measure,
                        Offer&& offer_triangle) const {
     SurfacePoint best;
     best.distance = limit;
     if (empty()) return best;
+    if (near >= 0) offer_triangle(triangles()[near], best);
+    if (best.distance < kTouching) return best;
     const Box* const boxes = tree_->boxes.data();
     const Triangle* const triangles = tree_->triangles.data();
     struct Entry {
@@ -332,18 +339,22 @@ class Mesh {
         for (int i = box.next; i < box.next + box.count; ++i) offer_triangle(triangles[i], best);
         continue;
       }
-      Entry near{bound(boxes[entry.box + 1]), entry.box + 1}, far{bound(boxes[box.next]), box.next};
-      if (near.bound > far.bound) std::swap(near, far);
-      stack[size++] = far;
-      stack[size++] = near;
+      Entry nearer{bound(boxes[entry.box + 1]), entry.box + 1};
+      Entry farther{bound(boxes[box.next]), box.next};
+      if (nearer.bound > farther.bound) std::swap(nearer, farther);
+      stack[size++] = farther;
+      stack[size++] = nearer;
     }
     return best;
   }
 
-  static void offer(const Triangle& tri, const Vec3& point, const Vec3& target,
+  // Is it nearer?
+  static bool offer(const Triangle& tri, const Vec3& point, const Vec3& target,
                     SurfacePoint& best) {
     const double distance = norm(point - target);
-    if (distance < best.distance) best = {distance, tri.face, point, tri.normal};
+    if (!(distance < best.distance)) return false;
+    best = {distance, tri.face, -1, point, tri.normal};
+    return true;
   }
 
   // How far `v` is outside of a range; without a branch, which would be taken at random.
@@ -389,9 +400,9 @@ class Mesh {
       const Triangle& tri = *some[k];
       double t;
       if (crosses(tri, line, t)) {
-        if (limit > 0.0) visit(SurfacePoint{0.0, tri.face, line.at(t), tri.normal});
+        if (limit > 0.0) visit(SurfacePoint{0.0, tri.face, -1, line.at(t), tri.normal});
       } else if (lane(distance, k) < limit) {
-        visit(SurfacePoint{lane(distance, k), tri.face,
+        visit(SurfacePoint{lane(distance, k), tri.face, -1,
                            {lane(point.x, k), lane(point.y, k), lane(point.z, k)}, tri.normal});
       }
     }
@@ -404,7 +415,7 @@ class Mesh {
   static void nearer_to_line(const Triangle& tri, const ForceLine& line, SurfacePoint& best) {
     double t;
     if (crosses(tri, line, t)) {
-      if (best.distance > 0.0) best = {0.0, tri.face, line.at(t), tri.normal};
+      if (best.distance > 0.0) best = {0.0, tri.face, -1, line.at(t), tri.normal};
       return;
     }
     const Vec3 corners[3] = {tri.a, tri.a + tri.ab, tri.a + tri.ac};
@@ -417,7 +428,7 @@ class Mesh {
       const double s = length > 0.0 ? std::clamp(-dot(a, e) / length, 0.0, 1.0) : 0.0;
       const double distance = norm(a + s * e);
       if (distance < best.distance)
-        best = {distance, tri.face, corners[i] + s * edge, tri.normal};
+        best = {distance, tri.face, -1, corners[i] + s * edge, tri.normal};
     }
   }
 

@@ -30,6 +30,7 @@ struct Body {
 
 struct SurfaceSample {
   Vec3 point, normal;  // in the frame of the node
+  int place;           // of its triangle in the mesh
 };
 
 class LinkSurfaces {
@@ -149,7 +150,8 @@ class LinkSurfaces {
         v = std::fmod(v + 0.5698402909980532, 1.0);
         const bool inside = u + v <= 1.0;
         samples_.back().push_back(
-            {t.a + (inside ? u : 1.0 - u) * t.ab + (inside ? v : 1.0 - v) * t.ac, t.normal});
+            {t.a + (inside ? u : 1.0 - u) * t.ab + (inside ? v : 1.0 - v) * t.ac, t.normal,
+             static_cast<int>(&t - triangles.data())});
       }
     }
   }
