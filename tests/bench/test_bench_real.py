@@ -103,6 +103,8 @@ def test_an_arm_that_nothing_touches():
 def test_a_folder_without_recordings_is_told(tmp_path, capsys):
     assert main(["bench", "real", "--data", str(tmp_path)]) == 2
     assert "panda_touches" in capsys.readouterr().err
+    assert main(["bench", "real"]) == 2
+    assert "--data" in capsys.readouterr().err
 
 
 def test_a_lower_rate_keeps_samples_of_even_instants():

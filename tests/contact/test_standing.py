@@ -16,14 +16,16 @@ RATE, SECONDS = 1000.0, 3.0  # Hz, s
 STANDING = Health.OFFSET | Health.NOISY
 
 
-def watched(bias=0.0, noise=1.0, push=0.0, seed=0):
+def watched(bias=0.0, noise=1.0, push=0.0, seed=0, blind=0.0):
     """A standing arm with `noise` times what is told.
 
-    Joint 2 reads `bias` [Nm] too little. From 1.5 s on link 4 is pushed down by `push` [N].
+    Joint 2 reads `bias` [Nm] too little. From 1.5 s on link 4 is pushed down by `push` [N]. With
+    `blind` [s], nothing is received for so long after each half second, and a push ends in there.
     """
     rng = np.random.default_rng(seed)
     n = round(SECONDS * RATE)
     time, still = np.arange(n) / RATE, gravity_loads(ROBOT, Q)
+    pushed = time % 0.5 >= 0.15 if blind else time >= 1.5
     told = ROBOT.description.noise
     tau = still.torque + noise * np.array(told.tau) * rng.normal(size=(n, 6))
     qd = noise * np.array(told.qd) * rng.normal(size=(n, 6))
@@ -32,8 +34,9 @@ def watched(bias=0.0, noise=1.0, push=0.0, seed=0):
     force = np.array([0.0, 0.0, -push])
     place = ROBOT.T_world_links(Q)["link4"][:3, 3]
     touch = contact_loads(ROBOT, Q[None], "link4", np.r_[force, np.cross(place, force)][None])
-    tau[time >= 1.5] -= touch.torque[0]
-    wrench[time >= 1.5] -= touch.wrench[0]
+    tau[pushed] -= touch.torque[0]
+    wrench[pushed] -= touch.wrench[0]
+    time = time + blind * np.floor(time / 0.5)
     pipeline = Pipeline(ROBOT, period=1.0 / RATE)
     estimate, _ = pipeline.run(time, np.tile(Q, (n, 1)), qd, tau, wrench)
     return pipeline, estimate.health.astype(int)
@@ -65,6 +68,13 @@ def test_a_push_that_is_held_is_no_offset():
     (event,) = pipeline.events
     assert event.detected == pytest.approx(1.5, abs=0.05) and event.cleared is None
     assert not (health & STANDING).any()
+
+
+def test_pushes_that_end_where_nothing_is_received_are_no_noise():
+    pipeline, health = watched(push=15.0, blind=1.0)
+    assert not (health & STANDING).any()
+    began = [event.detected % 1.5 for event in pipeline.events]
+    assert began == pytest.approx([0.16] * 6, abs=0.02)
 
 
 @pytest.mark.parametrize("factor", [3.0, 10.0])

@@ -298,6 +298,19 @@ def test_labels_at_the_border_are_inside_as_well(robot):
     assert not any(a.meets(b) for i, a in enumerate(found) for b in found[:i])
 
 
+def test_no_label_lies_on_an_arrow(robot):
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        scene = Scene(robot, Q)
+        for _ in range(3):
+            place = np.array([0.1, 0.1, 0.9]) + rng.normal(scale=0.03, size=3)
+            scene.add_contact(place, 20.0 * rng.normal(size=3))
+        camera = camera_of(scene)
+        arrows = [camera.project(np.array(scene.arrow(mark)), SIZE)[0] for mark in scene.marks]
+        for label in labels(scene, camera, SIZE):
+            assert not any(label.lies_on(tail, tip) for tail, tip in arrows)
+
+
 def test_words_of_an_svg_are_escaped(robot):
     scene = Scene(robot, Q)
     scene.add_contact((0.1, 0.1, 0.9), None, label='<b> & "c"')

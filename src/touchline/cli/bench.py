@@ -15,7 +15,8 @@ def bench() -> int:
 
     Example: touchline bench localization --robots panda sara --runs 10000 --out figures
     """
-    return max(benchmark() for benchmark in BENCHMARKS.values())
+    print("Recordings of real arms: touchline bench real --data DIR")
+    return max(benchmark() for benchmark in BENCHMARKS.values() if benchmark is not real)
 
 
 def observer(
@@ -212,21 +213,21 @@ def real(*, data: Directory = None, rate: float | None = None, leave_one_out: bo
 
     Args:
         data: Folder with the recordings: panda_touches, panda_touches_more, panda_ur10_rosbag2,
-            kuka_lwr4, kinova_gen3; those that are missing are left out, all without a folder. The
+            kuka_lwr4, kinova_gen3; those that are missing are left out. The
             models of the Panda and the UR10 come with the package example-robot-data.
         rate: Looks at the touched recordings once more as if recorded at this rate [Hz].
         leave_one_out: For each touched recording, chooses three tuning numbers on all others, and
             prints what holds on the one left out.
     """
     from touchline.bench.real.run import main
+    from touchline.errors import InputError
     from touchline.numbers import check_positive
 
     if rate is not None:
         check_positive(rate=rate)
     if data is None:
-        print("Recordings of real arms: none, name their folder with --data")
-    else:
-        main(data, rate, leave_one_out)
+        raise InputError("real arms: no recordings, name their folder with --data")
+    main(data, rate, leave_one_out)
     return 0
 
 

@@ -49,13 +49,22 @@ class Label:
         beside = self.left > other.left + wide or other.left > self.left + width
         return not beside and abs(self.place[1] - other.place[1]) < LINE
 
+    def lies_on(self, tail: Floats, tip: Floats) -> bool:
+        """Whether an arrow from `tail` to `tip` (2,) [pixels] passes below the text."""
+        x, y = (tail + np.linspace(0.0, 1.0, 60)[:, None] * (tip - tail)).T
+        width = LETTER * len(self.text)
+        beside = (x < self.left) | (x > self.left + width)
+        return bool(np.any(~beside & (np.abs(y - self.place[1]) < LINE / 2)))
+
     def moved(self, down: float) -> "Label":
         """The label so many pixels further down."""
         return replace(self, place=(self.place[0], self.place[1] + down))
 
 
 def labels(scene: Scene, camera: Camera, size: Size = (640, 640)) -> list[Label]:
-    """The labels of a scene's contacts, beside the tails of their arrows, none over another.
+    """The labels of a scene's contacts, beside the tails of their arrows, none over another one.
+
+    Nor does one lie on an arrow, where there is another place.
 
     Args:
         scene: with its contacts.
@@ -63,19 +72,21 @@ def labels(scene: Scene, camera: Camera, size: Size = (640, 640)) -> list[Label]
         size: of the picture [pixels].
     """
     placed: list[Label] = []
-    for mark in scene.marks:
+    arrows = [camera.project(np.array(scene.arrow(mark)), size)[0] for mark in scene.marks]
+    for mark, (tail, tip) in zip(scene.marks, arrows, strict=True):
         if not mark.label:
             continue
-        (tail, tip), _ = camera.project(np.array(scene.arrow(mark)), size)
         label = _beside(tail, tail - tip, mark.label, COLOURS[mark.kind], size)
         out = 1 if label.place[1] >= tail[1] else -1
-        for step in sorted(range(-STACKED, STACKED + 1), key=lambda i: (abs(i), -i * out)):
-            moved = label.moved(step * LINE)
-            inside = 0.5 * LINE <= moved.place[1] <= size[1] - 0.5 * LINE
-            if inside and not any(moved.meets(other) for other in placed):
-                label = moved
-                break
-        placed.append(label)
+        steps = sorted(range(-STACKED, STACKED + 1), key=lambda i: (abs(i), -i * out))
+        free = [
+            moved
+            for moved in (label.moved(step * LINE) for step in steps)
+            if 0.5 * LINE <= moved.place[1] <= size[1] - 0.5 * LINE
+            and not any(moved.meets(other) for other in placed)
+        ]
+        clear = [moved for moved in free if not any(moved.lies_on(*arrow) for arrow in arrows)]
+        placed.append((clear or free or [label])[0])
     return placed
 
 

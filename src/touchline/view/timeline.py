@@ -12,7 +12,8 @@ from touchline.view.signals import Box, now_series, with_now
 
 CONTACT, COLLISION = "#e0a33a", "#d0503f"
 THICK = 0.33  # half of a bar, of the distance between rows
-ROW, ROOM = 18, 62  # pixels: of a segment, and of the axis below with the names above
+ROW, ROOM = 18, 62  # pixels: of a segment, and of the axis below with the title above
+LETTER, GAP = 7.5, 12.0  # pixels: width of a letter of a row's name, and beside the name
 
 
 class Timeline:
@@ -45,12 +46,12 @@ class Timeline:
         self._plot = gui.add_uplot(
             self._data(replay.start),
             (*series, now_series()),
-            title=("rows from the top: " if rows[1:] else "") + ", ".join(reversed(self._rows)),
+            title="events by segment, over time [s]",
             scales={
                 "x": uplot.Scale(time=False, range=(self._box.left, self._box.right)),
                 "y": uplot.Scale(range=(self._box.low, self._box.high)),
             },
-            axes=(uplot.Axis(), uplot.Axis(show=False)),
+            axes=(uplot.Axis(), _names(self._rows)),
             legend=uplot.Legend(show=False),
             height=ROOM + ROW * len(self._rows),
             padding=(0, 24, 0, 24),
@@ -95,6 +96,18 @@ def areas(
             y[2 * first + 1 : 2 * last + 1] = row + THICK
         heights.append(y)
     return x, np.array(heights).reshape(len(bars), len(x))
+
+
+def _names(rows: list[str]) -> uplot.Axis:
+    """The axis that names rows, from the lowest."""
+    return uplot.Axis(
+        splits=tuple(range(len(rows))),
+        values=tuple(rows),
+        size=GAP + LETTER * max(map(len, rows)),
+        space=1.0,
+        grid=uplot.Axis_Grid(show=False),
+        ticks=uplot.Axis_Ticks(show=False),
+    )
 
 
 def _of(events: list[Event], segment: str) -> list[Event]:

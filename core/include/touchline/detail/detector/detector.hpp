@@ -195,7 +195,7 @@ class Detector {
     double age = 0.0, referred = 0.0;  // over how long they have been averaged [s]
     Calm other;  // what stood there before the last contact came to rest; the model's zero at first
     double side = 1.0, turns = 0.0;  // of its trend it was last far off on, and how often of late
-    bool started = false;
+    bool started = false, known = false;  // was there a settled residual ever; at the last sample
   };
   enum class Origin {  // what an event began with
     start,     // of observation: an offset that has yet to be seen whole
@@ -621,7 +621,10 @@ class Detector {
     RowState& s = states_[i];
     const DetectionRow& row = rows_[i];
     const double value = samples_[i].residual;
-    if (!samples_[i].known) return;
+    const bool resumed = samples_[i].known && !s.known;
+    s.known = samples_[i].known;
+    if (!s.known) return;
+    if (resumed) s.trend = value;
     s.trend += (value - s.trend) * std::min(1.0, dt * bandwidths_[i] * per_trend_);
     confirm_start(i, dt);
     if (learns(i) && dt > 0.0) {

@@ -57,7 +57,7 @@ class NoiseMeter {
       const Lanes off = value - mean, part = dt * mean_rate_.at(i);
       const Lanes moved = mean + off * (part < one ? part : one);
       mean_.put(i, here > zero ? (runs > zero ? moved : value) : mean);
-      running_.put(i, here > zero ? here : runs);
+      running_.put(i, here);  // after what is not known the mean begins anew
       const Lanes taken = here * runs * counts.at(i);
       const Lanes variance = variance_.at(i), told = told_.at(i), count = count_.at(i);
       const Lanes told2 = told * told;
