@@ -11,7 +11,7 @@ from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scenario import scripted
 from touchline.simulation.scene import Run
 from touchline.trials.cell import Cell
-from touchline.trials.faults import channels_of
+from touchline.trials.faults import FAULTS, channels_of, injected
 from touchline.trials.recordings import record
 from touchline.trials.scene import arm_and_skin, make_pipeline, make_scene
 
@@ -50,6 +50,17 @@ def test_a_channel_that_wanders_is_named_and_never_a_collision(arm, name):
     assert [f.channel for f in told][:1] == [name]
     assert told[0].fault == Fault.DISAGREES
     assert wrong.time[told[0].sample] - BEGIN < 0.2
+    assert not [e for e in events if e.level == "collision"]
+
+
+@pytest.mark.parametrize("name", ["wrist", "handle"])
+def test_axes_that_are_swapped_are_named_and_never_a_collision(arm, name):
+    robot, pipeline, samples = arm
+    fault = next(f for f in FAULTS if f.name == "swapped axes")
+    channel = next(c for c in channels_of(robot) if c.name == name)
+    wrong, _ = injected(samples, fault, channel, BEGIN, np.random.default_rng(0))
+    _, told, events = heard(pipeline, wrong)
+    assert {f.channel for f in told} == {f"{name}.fx", f"{name}.fy"}
     assert not [e for e in events if e.level == "collision"]
 
 

@@ -21,6 +21,8 @@ SAME = 0.02  # s by which the times of an event may differ
 # Bits that tell of no fault by themselves.
 SILENT = Health.SETTLING | Health.PERIOD | Health.NO_ROOM | Health.OFFSET | Health.NOISY
 TELLS = np.uint32(sum(bit for bit in Health if bit not in SILENT))
+# What the arm shows over many seconds: no fault of a moment begins it or ends it.
+LASTING = np.uint32(Health.OFFSET | Health.NOISY)
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class Outcome:
         wrong: events with a sure body that is neither the touched one nor what the healthy
             recording says as surely.
         lost: events of the healthy recording that are missing.
-        recovery: after the fault's end until health and estimates are as without it [s].
+        recovery: after the fault's end until health is as without it, offsets and noise apart [s].
         seconds: that it took.
     """
 
@@ -171,6 +173,6 @@ def _finite(estimate: Estimate) -> bool:
 
 def _recovery(said: Said, healthy: Said, time: Array, end: float) -> float:
     after = time > end
-    differs = (said.estimate.health != healthy.estimate.health)[after]
+    differs = ((said.estimate.health ^ healthy.estimate.health) & ~LASTING != 0)[after]
     late = np.flatnonzero(differs)
     return float(time[after][late[-1]] - end) if len(late) else 0.0

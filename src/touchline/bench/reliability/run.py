@@ -110,10 +110,10 @@ def _goals(
     what = f"false reports in {hours:.2f} h of healthy motion"
     goals.append((what, f"{allowed:.0f}", str(len(reports)), len(reports) <= allowed))
     quick = [o.recovery for o in found if o.fault.group.startswith(("spike", "stuck", "absent"))]
-    late = float(np.median(quick)) if quick else 0.0
-    goals.append(
-        ("recovery after the fault, median", "50 ms", f"{1e3 * late:.0f} ms", late <= RECOVERED)
-    )
+    for what, part in (("median", 0.5), ("90 %", 0.9)):
+        late = float(np.quantile(quick, part)) if quick else 0.0
+        name = f"recovery after the fault, {what}"
+        goals.append((name, "50 ms", f"{1e3 * late:.0f} ms", late <= RECOVERED))
     return goals
 
 

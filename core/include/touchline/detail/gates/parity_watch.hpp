@@ -5,7 +5,8 @@
 // A sensor and the next one inboard. What a contact puts on the outer one, the inner one feels too,
 // so that the segment between them feels nothing of it. Where that segment feels the exact opposite,
 // the inner sensor feels nothing. Two contacts that squeeze the arm between them do that as well, but
-// not along one axis of the sensor without a moment about its origin: only that counts.
+// not along one axis of the sensor without a moment about its origin: only that counts. Nor do they
+// along a diagonal of two axes, where the error lies of axes that are swapped.
 //
 // A torque at the innermost sensor without a force is no single touch: no link is as far away. Two
 // may cancel, but then the joints between them feel it, or a sensor does. So nothing else may.
@@ -148,15 +149,45 @@ class ParityWatch {
                 tuning_.parity_noise * tuning_.parity_noise);
     }
     const int axis = now ? only_axis(outer, own) : -1;
-    if (broken(first, axis >= 0, dt)) contradicted(first + axis);
+    const int other = now && axis < 0 ? swapped_axis(pair.outer, own) : -1;
+    if (!broken(first, axis >= 0 || other >= 0, dt)) return;
+    if (axis >= 0) return contradicted(first + axis);
+    contradicted(first + static_cast<std::size_t>(largest(own)));
+    contradicted(first + static_cast<std::size_t>(other));
+  }
+
+  static int largest(const double* shown) {
+    int most = 0;
+    for (int i = 1; i < 6; ++i)
+      if (std::fabs(shown[i]) > std::fabs(shown[most])) most = i;
+    return most;
+  }
+
+  // The axis that shows as much as the largest one, of the same kind, where no other shows anything:
+  // what each of two swapped axes is wrong by is what the other one lacks. -1: it is not so.
+  int swapped_axis(int segment, const double* shown) const {
+    const int sensor = observer_.layout().segments[segment].sensor, most = largest(shown);
+    if (observer_.sensors()[sensor].turned) return -1;
+    const double little = std::max(tuning_.parity_noise,
+        tuning_.parity_alone * std::fabs(shown[most]));
+    int second = -1;
+    for (int i = 0; i < 6; ++i) {
+      if (i == most || !(std::fabs(shown[i]) > little)) continue;
+      if (second >= 0 || i / 3 != most / 3) return -1;
+      second = i;
+    }
+    if (second < 0) return -1;
+    const auto size = [&](int i) {
+      return std::fabs(shown[i]) * rows_[first_[segment] + i].contact;
+    };
+    const double a = size(most), b = size(second);
+    return std::fabs(a - b) > tuning_.parity_alone * std::max(a, b) ? -1 : second;
   }
 
   // The only axis along which a sensor shows anything; -1: there are several. `shown`: in thresholds.
   int only_axis(int sensor, const double* shown) const {
     if (observer_.sensors()[sensor].turned) return -1;
-    int most = 0;
-    for (int i = 1; i < 6; ++i)
-      if (std::fabs(shown[i]) > std::fabs(shown[most])) most = i;
+    const int most = largest(shown);
     const double little = std::max(tuning_.parity_noise,
         tuning_.parity_alone * std::fabs(shown[most]));
     for (int i = 0; i < 6; ++i)
