@@ -3,7 +3,7 @@
 PYTHON := .venv/bin/python
 CORE := $(shell find core -name '*.hpp' -o -name '*.cpp' -o -name 'CMakeLists.txt')
 
-.PHONY: demo test test-live sanitize check accept format docs wheels acceptance clean
+.PHONY: demo test test-live sanitize valgrind coverage check accept format docs wheels acceptance clean
 
 demo: .venv/demo
 	.venv/bin/touchline demo $(ARGS)
@@ -19,6 +19,16 @@ test-live: .venv/live
 SANITIZED := $(patsubst %,tests/core/test_%.py,cpp_example replay_example robot_file live_ring)
 sanitize: .venv/ready
 	$(PYTHON) -m pytest -n 2 $(SANITIZED) $(ARGS)
+
+# Programs of the core under Valgrind, but for those with sanitizers, which do not run under it.
+PROGRAMS := $(patsubst %,tests/core/test_%.py,cpp_example replay_example start_lanes mesh_around)
+valgrind: .venv/ready
+	RUN_UNDER="valgrind --quiet --leak-check=full --error-exitcode=1" $(PYTHON) -m pytest \
+	  $(PROGRAMS) -k "not sanitized and not per_thread" $(ARGS)
+
+# The lines of Python and of the core that tests reach: make coverage ARGS="tests/observer".
+coverage: .venv/ready
+	scripts/coverage.sh $(ARGS)
 
 check: .venv/ready
 	.venv/bin/ruff check .

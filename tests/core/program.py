@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Programs compiled against the headers alone."""
 
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -19,6 +20,7 @@ def compile_program(source, target, *flags):
 
 
 def run_program(program, *arguments):
+    under = os.environ.get("RUN_UNDER", "").split()  # `make valgrind`
     return subprocess.run(
-        [str(program), *map(str, arguments)], capture_output=True, text=True, check=True
+        [*under, str(program), *map(str, arguments)], capture_output=True, text=True, check=True
     )

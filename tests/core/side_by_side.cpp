@@ -96,11 +96,12 @@ Recording make_recording(int sensors, int faults, Chance& chance) {
     if (faults == 0 || chance() > 0.01) continue;
     const double bad = kBad[chance.below(4)];
     const int j = kJoints * i + chance.below(kJoints);
-    switch (chance.below(5)) {
+    switch (chance.below(6)) {
       case 0: r.q[j] = bad; break;
       case 1: r.qd[j] = bad; break;
       case 2: r.tau[j] = bad; break;
       case 3: r.time[i] = bad; break;
+      case 4: std::fill_n(r.tau.end() - kJoints, kJoints, bad); break;  // no joint is left
       default: if (sensors > 0) r.wrench[6 * sensors * i + chance.below(6 * sensors)] = bad;
     }
   }

@@ -176,7 +176,12 @@ not the touched one, and is not what the healthy recording says either.
 {text}
 ```
 
-What a layout cannot tell, `touchline check ROBOT` lists as its parity space. Scale, delay, bias and
+*Recovery* lasts from the fault's last sample until health is as without the fault. After 5/K, 50 ms,
+the estimates have forgotten what was left out. A wild channel counts again after 10 usual samples;
+these 10 ms come on top.
+
+What a layout cannot tell, `touchline check ROBOT` lists as its parity space. Two swapped axes of a
+sensor are told where a sensor inboard contradicts them. Scale, delay, bias and
 drift of one channel are told where they make it jump or stand still. They are also told where that
 channel alone explains what a force-torque sensor's segment feels (`suspect`): a contact does so at
 one place in thousands. Then it is named, and nothing that it explains is a sure contact or a

@@ -163,8 +163,8 @@ class ParityWatch {
     return most;
   }
 
-  // The axis that shows as much as the largest one, of the same kind, where no other shows anything:
-  // what each of two swapped axes is wrong by is what the other one lacks. -1: it is not so.
+  // The axis of the same kind that shows as much as the largest one, where no other shows anything.
+  // One of two swapped axes has too much of what the other one lacks. -1: it is not so.
   int swapped_axis(int segment, const double* shown) const {
     const int sensor = observer_.layout().segments[segment].sensor, most = largest(shown);
     if (observer_.sensors()[sensor].turned) return -1;
