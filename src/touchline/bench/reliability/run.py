@@ -176,9 +176,9 @@ not the touched one, and is not what the healthy recording says either.
 {text}
 ```
 
-*Recovery* lasts from the fault's last sample until health is as without the fault. After 5/K, 50 ms,
-the estimates have forgotten what was left out. A wild channel counts again after 10 usual samples;
-these 10 ms come on top.
+*Recovery* lasts from the fault's last sample until health is as without the fault. After 5/K, 50
+ms, the estimates have forgotten what was left out. A wild channel counts again after 10 usual
+samples; these 10 ms come on top.
 
 What a layout cannot tell, `touchline check ROBOT` lists as its parity space. Two swapped axes of a
 sensor are told where a sensor inboard contradicts them. Scale, delay, bias and
