@@ -59,6 +59,13 @@ def test_faces_that_the_line_just_misses_are_looked_at(arm, tier, run):
     assert trial.found and trial.statuses == ("located",)
 
 
+@pytest.mark.parametrize("run", [74, 104, 219])
+def test_a_third_contact_in_noise_is_no_faulty_channel(run):
+    """With the forces of the other two free, one channel explains what it does as well."""
+    panda()
+    assert run_trial(Cell("panda", 3, tier=3), run).found
+
+
 def test_statics_are_pinocchios():
     """Weight and touches at rest, against rnea and Jacobians of a tree with free joints."""
     robot = panda()

@@ -67,7 +67,8 @@ class Arrivals {
     if (!suspect_.any()) {
       if (!placed(a) && changed(s, read)) return;
       if (lets_go(s, a)) return;
-      suspect_ = suspect_beside_free_forces(s, read);
+      // A contact beside forces that are held has fewer unknowns than a channel beside free ones.
+      if (!placed(a)) suspect_ = suspect_beside_free_forces(s, read);
     }
     if (suspect_.any()) {  // what has come is no contact, as far as is felt
       for (int c = 0; c < s.known.contacts.count; ++c) reports_.add(before.contacts.known[c]);
