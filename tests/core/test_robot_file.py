@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Exported robots: read back as they were, and refused with a clear line where they are damaged."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from program import COMPILER, compile_program, run_program
+from robots import load_example
 
 import touchline as tl
 from touchline.cli import main
@@ -81,3 +85,16 @@ def test_no_damage_goes_unnoticed_or_breaks_the_reader(exported, tmp_path):
     assert counts["it is damaged: its check"] > 200
     assert sum(n for what, n in counts.items() if what.startswith("it is truncated")) > 200
     assert sum(n for what, n in counts.items() if what.startswith("robot: ")) > 50
+
+
+@pytest.mark.parametrize("name", ["sara", "panda_no_hand", "ur10e"])
+def test_no_kernel_of_linear_algebra_shows_in_what_the_core_knows(name, tmp_path):
+    """Of places that explain alike the last digit of a robot chooses: it is the same everywhere."""
+    robot = name if name == "sara" else str(load_example(name).description.path)
+    written = []
+    for kernel in ({}, {"OPENBLAS_CORETYPE": "Prescott"}):  # the processor's own; no fused sums
+        path = tmp_path / f"{len(written)}.touchline"
+        command = [sys.executable, "-m", "touchline", "export", robot, "--out", str(path)]
+        subprocess.run(command, env={**os.environ, **kernel}, capture_output=True, check=True)
+        written.append(path.read_bytes())
+    assert written[0] == written[1]

@@ -9,12 +9,11 @@ from the folder TOUCHLINE_DATA.
 import json
 import os
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -32,10 +31,6 @@ DATA = Path(os.environ.get("TOUCHLINE_DATA", FOLDER.parents[2] / "shared" / "dat
 DIGITS = 9  # that are kept
 ROUNDING = 1e-6  # of a number, by which it may differ: far above what processors differ by
 SMALLEST = 1e-6  # N, Nm, m, s, below which a difference is none
-# Where joint torques alone tell a place it can hang on the last digit of the model. Processors
-# round products of matrices in their own ways: one event of this recording is placed 3 mm apart.
-# In it these may differ by so much (m, and as a share of one).
-HANGING = {"real_kuka": {"position": 5e-3, "probability": 0.02}}
 PERCENTILES = (0, 5, 50, 95, 100)
 REAL_SECONDS = 6.0  # of a real recording, from its beginning: twelve of them take some 20 s
 
@@ -156,7 +151,7 @@ RECORDINGS = {**SIMULATED, **REAL}
 
 def changed(name: str, answer: dict[str, Any]) -> list[str]:
     """What of a recording's outputs is not as accepted."""
-    return differences(accepted(name), answer, hanging=HANGING.get(name, {}))
+    return differences(accepted(name), answer)
 
 
 def outputs(recording: Recording) -> dict[str, Any]:
@@ -207,30 +202,20 @@ def shortened(value: Any) -> Any:
     return value
 
 
-def differences(
-    old: Any, new: Any, at: str = "", hanging: Mapping[str, float] = MappingProxyType({})
-) -> list[str]:
-    """What has changed by more than rounding, each with its place.
-
-    Args:
-        old: as accepted.
-        new: as it is now.
-        at: where that stands.
-        hanging: by key, how far numbers may differ that hang on rounding.
-    """
+def differences(old: Any, new: Any, at: str = "") -> list[str]:
+    """What has changed by more than rounding, each with its place."""
     if isinstance(old, dict) and isinstance(new, dict):
         keys = [*old, *(key for key in new if key not in old)]
         return [
             line
             for key in keys
-            for line in differences(old.get(key), new.get(key), f"{at}.{key}".lstrip("."), hanging)
+            for line in differences(old.get(key), new.get(key), f"{at}.{key}".lstrip("."))
         ]
     if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
         pairs = enumerate(zip(old, new, strict=True))
-        return [line for i, (x, y) in pairs for line in differences(x, y, f"{at}[{i}]", hanging)]
+        return [line for i, (x, y) in pairs for line in differences(x, y, f"{at}[{i}]")]
     numbers = isinstance(old, float | int) and isinstance(new, float | int)
-    least = hanging.get(at.rpartition(".")[2].partition("[")[0], SMALLEST)
-    if numbers and abs(old - new) <= least + ROUNDING * max(abs(old), abs(new)):
+    if numbers and abs(old - new) <= SMALLEST + ROUNDING * max(abs(old), abs(new)):
         return []
     return [] if old == new and type(old) is type(new) else [f"{at}: {new}, accepted was {old}"]
 

@@ -7,7 +7,6 @@ import json
 import pytest
 from referenced import (
     FOLDER,
-    HANGING,
     REAL,
     RECORDINGS,
     SIMULATED,
@@ -80,18 +79,3 @@ def test_references_are_small():
     sizes = [path.stat().st_size for path in FOLDER.glob("*.json")]
     assert max(sizes) < 30_000 and sum(sizes) < 200_000
     assert all(json.loads(path.read_text()) for path in FOLDER.glob("*.json"))
-
-
-def test_only_places_of_one_recording_may_hang_on_rounding():
-    assert set(HANGING) == {"real_kuka"}
-    hanging = HANGING["real_kuka"]
-    event = {"position": [0.1, 0.2, 0.3], "force": [1.0, 2.0, 3.0], "probability": 0.9}
-    near = {"position": [0.104, 0.2, 0.3], "force": [1.0, 2.0, 3.0], "probability": 0.89}
-    assert len(differences(event, near)) == 2
-    assert differences(event, near, hanging=hanging) == []
-    for far in (
-        near | {"position": [0.106, 0.2, 0.3]},
-        near | {"force": [1.001, 2.0, 3.0]},
-        near | {"probability": 0.87},
-    ):
-        assert len(differences(event, far, hanging=hanging)) == 1

@@ -18,6 +18,9 @@ from touchline.tuning import DEFAULTS
 
 ARMS, POSES = 6, 32  # that are drawn
 WAY = DEFAULTS["detector.drift_way"]  # rad
+# Digits after the point [N, Nm] that are kept. The draws are worth two figures; what processors
+# round differently is gone, so that no place hangs on it.
+DIGITS = 9
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ class LinkErrors:
         for g, name in enumerate(robot.segment_names):
             if name != "root":
                 wrenches[g] = self.wrenches[at[name], self.sensors.index(name)].sum(axis=0)
-        return np.sqrt(torques), np.sqrt(wrenches)
+        return np.sqrt(torques).round(DIGITS), np.sqrt(wrenches).round(DIGITS)
 
 
 @lru_cache(maxsize=4)

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from touchline.arrays import Array
 from touchline.model.robot import Body, Robot
 from touchline.model.surface import Surface, mechanism_surfaces
+from touchline.model.transforms import move_points
 from touchline.model.tree import invert
 from touchline.native import core
 
@@ -155,7 +156,7 @@ class Skin:
 def _patch(robot: Robot, link: str, surface: Surface, body: Body, segments: set[str]) -> Patch:
     place = robot.places[link]
     T = place.T_node_link
-    vertices = surface.vertices @ T[:3, :3].T + T[:3, 3]
+    vertices = move_points(surface.vertices, T)
     mesh = core.mesh(np.ascontiguousarray(vertices), np.ascontiguousarray(surface.faces, np.int64))
     felt = _felt(robot, body, place.node, segments)
     return Patch(link, body.name, place.node, felt, T, surface, mesh)

@@ -19,7 +19,7 @@ from touchline.model.mechanism import Array, Geometry, Inertia, Joint, Link, Mec
 from touchline.model.mjcf_file import LostMesh, compile_mjcf
 from touchline.model.plausibility import mechanism_warnings
 from touchline.model.topology import resolve_mimics
-from touchline.model.transforms import joint_motion, pose, rotation_quaternion
+from touchline.model.transforms import joint_motion, move_points, pose, rotation_quaternion
 
 REMEDIES = {
     "free": "the robot must stand on the world; take the <freejoint> out, and objects out of the "
@@ -221,7 +221,7 @@ class MjcfReader:
         start, faces = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
         vertices = model.mesh_vert[start : start + model.mesh_vertnum[mesh]].astype(float)
         triangles = model.mesh_face[faces : faces + model.mesh_facenum[mesh]].astype(np.int64)
-        vertices = vertices @ T[:3, :3].T + T[:3, 3]
+        vertices = move_points(vertices, T)
         return Geometry("triangles", np.eye(4), vertices=vertices, faces=triangles)
 
     def _reference(self, joint: int) -> float:

@@ -10,6 +10,7 @@ from touchline.arrays import Index
 from touchline.model.mechanism import Array, Geometry, Link, Mechanism
 from touchline.model.mesh_file import MeshError, Triangles, read_mesh
 from touchline.model.tessellation import tessellate
+from touchline.model.transforms import move_points
 
 # A mesh in millimetres that is read in metres is 1000 times too large. No link is longer than this
 # many times the whole robot, or than so many metres where the robot has no length of its own.
@@ -148,8 +149,8 @@ def _shape_triangles(shape: Geometry) -> tuple[Array, Index, list[str]]:
     doubts = _doubts(faces)
     if _signed_volume(vertices, faces) < 0:  # mirrored by its scale, or exported inside out
         faces = faces[:, ::-1]
-    T = shape.T_link_shape
-    return vertices @ T[:3, :3].T + T[:3, 3], faces, [f"{_name(shape)}: {line}" for line in doubts]
+    vertices = move_points(vertices, shape.T_link_shape)
+    return vertices, faces, [f"{_name(shape)}: {line}" for line in doubts]
 
 
 def _own_triangles(shape: Geometry) -> Triangles:

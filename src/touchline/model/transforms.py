@@ -108,10 +108,21 @@ def combine_inertias(bodies: Sequence[Inertia]) -> Inertia:
     return Inertia(mass, com, inertia)
 
 
+def move_points(points: Array, T: Array) -> Array:
+    """Return points (n, 3) [m], given in the axes of b, in the axes of a, with `T` = T_ab (4, 4).
+
+    Its sums have one order on every processor: libraries of linear algebra each round in their own
+    way, and of places that explain alike the last digit of a mesh chooses one.
+    """
+    x, y, z = points.T[:, :, np.newaxis]
+    return x * T[:3, 0] + y * T[:3, 1] + z * T[:3, 2] + T[:3, 3]
+
+
 def move_inertia(body: Inertia, T: Array) -> Inertia:
     """Return `body`, given in the axes of b, in the axes of a, with `T` = T_ab (4, 4)."""
     R = T[:3, :3]
-    return Inertia(body.mass, R @ body.com + T[:3, 3], R @ body.inertia @ R.T)
+    inertia = np.einsum("ij,jk,lk->il", R, body.inertia, R)  # in one order, as `move_points`
+    return Inertia(body.mass, move_points(body.com[np.newaxis], T)[0], inertia)
 
 
 def _steiner(mass: float, r: Array) -> Array:
