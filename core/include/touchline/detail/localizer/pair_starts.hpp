@@ -163,8 +163,8 @@ class PairStarts {
     return cost;
   }
 
-  // Takes out of the normal equations what unknown moments on both bodies may do, since their points
-  // stand for a neighbourhood: with `z` those moments, of variance m^2, N - N_z (N_zz + 1 / m^2)^-1 N_z.
+  // Takes out of the normal equations what unknown moments on both bodies may do. Points stand for a
+  // neighbourhood: with `z` those moments, of variance m^2, N - N_z (N_zz + 1 / m^2)^-1 N_z is left.
   bool soften(double* h) {
     constexpr int moments[6] = {3, 4, 5, 9, 10, 11};
     double K[36], X[6 * (kBoth + 1)];
