@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What one channel alone would show is named, and is no sure contact; touches are not suspected."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_parity import drifting, heard
 
 import touchline as tl
+from touchline.model.robot import Robot
 from touchline.result.kinds import Fault
 from touchline.simulation.contacts import Profile, ScriptedContact
 from touchline.simulation.noise import SensorNoise
@@ -14,12 +17,28 @@ from touchline.simulation.scene import Run
 from touchline.trials.recordings import record
 
 BEGIN = 0.6  # s
+HIT = 2.2  # s
 
 
 @pytest.fixture(scope="module")
 def arm():
     robot = tl.load_robot("sara")
     return robot, tl.Pipeline(robot), record(robot, 1, pushed=False, seconds=1.0).samples
+
+
+@pytest.fixture(scope="module")
+def torques_alone():
+    """An arm with joint torques alone; its link 6 is hit at HIT."""
+    described = tl.load_robot("sara-full")
+    noise = replace(described.description.noise, sensors={})
+    description = replace(described.description, sensors=(), noise=noise, bandwidth_sensors={})
+    robot = Robot(description, described.mechanism)
+    blow = ScriptedContact(
+        "link6", np.array([0.0, 0.0, 0.05]), np.array([9.0, 30.0, -40.0]),
+        Profile(HIT, 0.3, 0.01, 0.02),
+    )  # fmt: skip
+    settings = Run(seed=3, noise=SensorNoise(), model_error=0.02, physics=2000.0)
+    return tl.Pipeline(robot), scripted(robot, [blow], 3.0, 0.5, settings).samples
 
 
 @pytest.mark.parametrize("name", ["base.fx", "base.fz", "tau.joint4"])
@@ -89,3 +108,32 @@ def test_a_fault_elsewhere_is_no_reason_for_doubt(arm):
     event = next(e for e in events if e.segment == healthy.segment)
     assert (event.status, event.link, event.level) == ("located", "handle", healthy.level)
     assert event.body_probability == pytest.approx(healthy.body_probability, abs=0.05)
+
+
+@pytest.mark.parametrize("part", [-1.0, -0.5, 3.0])
+def test_a_joint_torque_that_steps_alone_is_no_collision_then_or_later(torques_alone, part):
+    """Of joint torques alone a push may load one, but no blow does so within one sample."""
+    pipeline, samples = torques_alone
+    wrong = scaled(samples, "joint2", part, BEGIN, HIT - 0.2)
+    _, _, events = heard(pipeline, wrong)
+    phantoms = [event for event in events if event.detected < HIT - 0.2]
+    assert phantoms != [] and abs(phantoms[0].detected - BEGIN) < 0.02
+    assert {event.level for event in phantoms} == {"contact"}
+
+
+def test_a_blow_after_a_step_is_a_collision(torques_alone):
+    pipeline, samples = torques_alone
+    _, _, (healthy,) = heard(pipeline, samples)
+    assert healthy.level == "collision"
+    wrong = scaled(samples, "joint2", -1.0, BEGIN, BEGIN + 0.3)
+    _, _, events = heard(pipeline, wrong)
+    (found,) = [event for event in events if event.level == "collision"]
+    assert found.detected == pytest.approx(healthy.detected, abs=0.02)
+
+
+def scaled(samples, joint, part, begin, end):
+    """A copy in which a joint's torque is this part of itself for a while."""
+    tau = samples.tau.copy()
+    during = (samples.time >= begin) & (samples.time < end)
+    tau[during, int(joint[-1]) - 1] *= part
+    return replace(samples, tau=tau)

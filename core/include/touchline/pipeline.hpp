@@ -183,7 +183,8 @@ class Pipeline {
           Contact& contact = contacts_[count_++];
           const LastingEvent* event = recorder_.of(reports[k].serial);
           const double began = event != nullptr ? event->detected : sample.time;
-          const bool unsure = suspicions_[segment].lasts(sample.time);
+          const bool unsure = suspicions_[segment].lasts(sample.time) ||
+                              suspicions_[segment].covers(classifier_.blow(g));
           const bool doubted = reports[k].doubted || suspicions_[segment].meets(sample.time, began);
           const bool known = event != nullptr && event->level == ContactLevel::collision;
           const bool later = began > classifier_.blow(g) + tuning_.classifier.decide_within;

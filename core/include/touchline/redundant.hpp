@@ -17,6 +17,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <utility>
@@ -254,16 +255,19 @@ class RedundantPipeline {
     changing_ = false;
     for (std::size_t c = 0; c < told.size(); ++c) {
       const bool news = told[c] != before_[c] && (is_wrong(told[c]) || is_wrong(before_[c]));
-      if (gates_.take_moved(c) || news) doubt_where_felt(c, time);
+      const Moved moved = gates_.take_moved(c);
+      if (moved == Moved::wrongly || news) doubt_where_felt(c, time, time - kUntold);
+      else if (moved == Moved::alone) doubt_where_felt(c, time, kNever);  // it is no collision
       before_[c] = told[c];
       changing_ = changing_ || told[c] != Fault::none;
     }
   }
 
-  void doubt_where_felt(std::size_t channel, double time) {
+  // What has begun since then [s] where a channel is felt is doubted, and none of it is a collision.
+  void doubt_where_felt(std::size_t channel, double time, double since) {
     for (std::size_t g = 0; g < suspicions_.size(); ++g) {
       if (!feels(g, channel)) continue;
-      const double since = time - kUntold, until = time + kDoubtful;
+      const double until = time + kDoubtful;
       suspicions_[g].extend(time, since, until);
       whole_.doubt(g, since, until);
       for (const std::unique_ptr<Second>& second : stand_ins_) {
@@ -313,6 +317,7 @@ class RedundantPipeline {
     result.resets = resets();
   }
 
+  static constexpr double kNever = std::numeric_limits<double>::infinity();  // [s]
   static constexpr double kUntold = 0.06;   // [s] for which a channel may be wrong before it is told
   static constexpr double kDoubtful = 1.0;  // [s] in which more of it may come
 

@@ -47,8 +47,8 @@ class Outcome:
         harmless: events are those of the healthy recording.
         phantoms: events that the healthy recording does not have.
         again: of those, events that began during the push: it was told twice, late or otherwise.
-        collisions: of the phantoms, collisions that began while nothing touched the arm, or where
-            the healthy recording has no collision.
+        collisions: of the phantoms, those that became a collision while nothing touched the arm, or
+            where the healthy recording has no collision.
         wrong: events with a sure body that is neither the touched one nor what the healthy
             recording says as surely.
         lost: events of the healthy recording that are missing.
@@ -132,7 +132,7 @@ def judge(
         phantoms=len(phantoms),
         again=sum(map(_in_push, phantoms)),
         collisions=sum(
-            e.level == ContactLevel.COLLISION and not (hard and _in_push(e)) for e in phantoms
+            e.level == ContactLevel.COLLISION and not (hard and _hits_in_push(e)) for e in phantoms
         ),
         wrong=sum(e.body not in bodies for e in sure),
         lost=len(lost),
@@ -156,6 +156,10 @@ def _sure(event: Event) -> bool:
 
 def _in_push(event: Event) -> bool:
     return PUSHED <= event.detected <= RELEASED
+
+
+def _hits_in_push(event: Event) -> bool:
+    return PUSHED <= (event.decided or event.detected) <= RELEASED
 
 
 def _same(event: Event, other: Event) -> bool:

@@ -168,9 +168,9 @@ types, channels and phases {count} were drawn at random.
 *In time* is the same sample for spikes and what is absent, 50 ms for what is stuck or wild, 1 s for
 signs, scales and delays, 2 s for biases. *Harmless*: events are those without the fault. A
 *phantom* is an event that is not among those. *Again*: phantoms that began during the push, which
-was told twice, late or otherwise. A phantom *collision* began while nothing touched the arm, or
-where the healthy recording has no collision. A *wrong* link is one that is at least 90 % sure, is
-not the touched one, and is not what the healthy recording says either.
+was told twice, late or otherwise. A phantom *collision* became one while nothing touched the arm,
+or where the healthy recording has no collision. A *wrong* link is one that is at least 90 % sure,
+is not the touched one, and is not what the healthy recording says either.
 
 ```
 {text}
@@ -186,5 +186,6 @@ drift of one channel are told where they make it jump or stand still. They are a
 channel alone explains what a force-torque sensor's segment feels (`suspect`): a contact does so at
 one place in thousands. Then it is named, and nothing that it explains is a sure contact or a
 collision. It is left out of what is estimated where a sensor inboard contradicts it. With joint
-torques alone nothing of this is told: a push on the first link loads one joint, too.
+torques alone nothing of this is told: a push on the first link loads one joint, too. But where
+one steps alone within a sample, nothing becomes a collision for a second.
 """

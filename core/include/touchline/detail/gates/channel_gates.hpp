@@ -36,6 +36,13 @@
 
 namespace touchline {
 
+// A channel is at another level, and no other one bears that out.
+enum class Moved {
+  no,
+  alone,   // a joint torque: a push may do that, but not within one sample as a blow
+  wrongly  // a contact would have moved others too
+};
+
 class ChannelGates {
  public:
   // Of a robot whose parts fit.
@@ -68,7 +75,7 @@ class ChannelGates {
         blind_(at_.joints),
         same_(2 * at_.joints),
         spiked_(at_.count(), -std::numeric_limits<double>::infinity()),
-        moved_(at_.count()),
+        moved_(at_.count(), Moved::no),
         far_(at_.joints),
         since_(at_.count()),
         calm_(at_.count()),
@@ -113,7 +120,7 @@ class ChannelGates {
   Health absent() const { return absent_; }
   // Has channel c jumped twice of late since the last call, or been taken at another level, which no
   // other one bears out?
-  bool take_moved(std::size_t c) { return std::exchange(moved_[c], 0) != 0; }
+  Moved take_moved(std::size_t c) { return std::exchange(moved_[c], Moved::no); }
   // Per channel; ratio: of its last step over what is believed at once.
   const std::vector<Fault>& faults() const { return fault_; }
   const std::vector<double>& ratios() const { return ratio_; }
@@ -260,7 +267,7 @@ class ChannelGates {
         if (borne_out(c, dt)) return;
         fault_[c] = Fault::spike;
         since_[c] = calm_[c] = 0;
-        if (comparable(c) && time_ - spiked_[c] < kAgain) moved_[c] = 1;
+        if (time_ - spiked_[c] < kAgain) moved_[c] = moved(c);
         spiked_[c] = time_;
         hold(c, dt);
         return;
@@ -351,7 +358,7 @@ class ChannelGates {
     calm_[c] = stays && lives(c, candidate_[c]) ? calm_[c] + 1 : 0;
     if (calm_[c] >= tuning_.sure && c >= at_.tau()) {  // a step that lasts
       if (!witnessed(c)) {
-        moved_[c] = comparable(c);
+        moved_[c] = moved(c);
         return take(c);
       }
       fault_[c] = Fault::step;
@@ -427,8 +434,8 @@ class ChannelGates {
 
   // Would a contact that moves it move others, too? Of joint torques alone a push may load one: its
   // line meets the axes of the others.
-  bool comparable(std::size_t c) const {
-    return c < at_.tau() || c >= at_.wrench() || witness_[c] >= 0;
+  Moved moved(std::size_t c) const {
+    return c < at_.tau() || c >= at_.wrench() || witness_[c] >= 0 ? Moved::wrongly : Moved::alone;
   }
 
   // Has a position gone on after a whole turn?
@@ -658,7 +665,7 @@ class ChannelGates {
   std::vector<double> same_;   // samples for which a position or velocity has been the same
   double follows_[3] = {}, tracked_at_ = kNever;
   std::vector<double> spiked_;  // when it jumped last [s]
-  std::vector<char> moved_;     // see `take_moved`
+  std::vector<Moved> moved_;    // see `take_moved`
   std::vector<int> far_;
   std::vector<int> since_, calm_;  // samples, of what a fault waits for
   std::vector<Fault> fault_;
