@@ -29,8 +29,11 @@ def arm():
     return robot, Skin(robot)
 
 
-def follow(arm, links, duration=0.2):
-    """The contacts after every sample, of pushes on links that all begin at `ONSET`."""
+def follow(arm, links, duration=0.2, work=None):
+    """The contacts after every sample, of pushes on links that all begin at `ONSET`.
+
+    `work`: units of the search in each sample.
+    """
     robot, skin = arm
     touches = []
     for link in links:
@@ -40,7 +43,8 @@ def follow(arm, links, duration=0.2):
         position = T[:3, :3] @ place + T[:3, 3]
         touches.append(Touch(Q, patch, position, np.zeros(3), T[:3, :3] @ force))
     s = resting_signals(robot, Q, [(touch, ONSET) for touch in touches], duration, None)
-    pipeline = Pipeline(robot, skin=skin, torque_error=0.0)
+    tuning = {} if work is None else {"localizer.pair_work": work}
+    pipeline = Pipeline(robot, skin=skin, torque_error=0.0, tuning=tuning)
     said = [
         pipeline.update(*x).contacts for x in zip(s.time, s.q, s.qd, s.tau, s.wrench, strict=True)
     ]
@@ -93,6 +97,30 @@ def test_the_set_of_a_pair_is_narrowed_while_it_lasts(arm, links):
     assert last.unknowns == 10 and 6 < (last.rank or 0) < 10
     assert all(named(last, touches))
     assert area(last) < 0.6 * area(first)
+
+
+def test_an_answer_says_while_a_search_still_runs(arm):
+    _, said = follow(arm, ["link2", "link4"])
+    course = [contacts[0].searching for contacts in said if contacts]
+    done = course.index(False)
+    assert done > 1 and not any(course[done:])
+    narrow = [contacts[0].candidates for contacts in said if contacts]
+    assert narrow[0] == () and len(narrow[done]) > 0
+
+
+def test_less_work_in_a_sample_gives_the_same_places_later(arm):
+    begun, places = [], []
+    for work in (100, 100_000):
+        _, said = follow(arm, ["link2", "link6"], work=work)
+        begun.append(next(i for i, contacts in enumerate(said) if len(contacts) == 2))
+        places.append(np.array([contact.position for contact in said[-1]]))
+    assert begun[0] > begun[1] + 2
+    np.testing.assert_allclose(*places, atol=1e-4)
+
+
+def test_a_pair_that_is_told_apart_is_searched_no_more(arm):
+    _, said = follow(arm, ["link1", "link6"])
+    assert not any(contact.searching for contact in said[-1])
 
 
 def test_what_no_two_contacts_explain_are_three_at_least(arm):

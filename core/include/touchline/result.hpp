@@ -103,6 +103,7 @@ struct Contact {
   double covariance[9];               // [m2] of the position, row by row
   Candidates candidates;
   bool decided = false;               // is the level more than a default?
+  bool searching = false;             // does a search for places still run, that will say more?
   Zone zone = Zone::open;
   Clamped clamped = Clamped::no;      // do forces on two sides oppose each other?
   double rate = kUnknown;             // at which the segment's force grows [N/s]
@@ -201,6 +202,7 @@ void visit_fields(const Contact& c, Visit&& visit) {
   visit(Field{"covariance", FieldKind::vector, "pxx pxy pxz - pyy pyz - - pzz"}, c.covariance);
   visit(Field{"level", FieldKind::level}, c.level);
   visit(Field{"decided", FieldKind::flag}, c.decided);
+  visit(Field{"searching", FieldKind::flag}, c.searching);
   visit(Field{"zone", FieldKind::zone}, c.zone);
   visit(Field{"clamped", FieldKind::flag}, c.clamped);
   visit(Field{"rate", FieldKind::number}, c.rate);

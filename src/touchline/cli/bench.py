@@ -72,6 +72,7 @@ def localization(
     model_error: tuple[float, ...] = (0.0,),
     calibrated: bool = True,
     hands: tuple[Literal["steady", "trembling", "sliding"], ...] = ("steady",),
+    lasts: float = 0.1,
     runs: int = 1000,
     baselines: tuple[Literal["first", "nearest", "particles"], ...] = (
         "first",
@@ -102,6 +103,7 @@ def localization(
         hands: Trembling ones change their forces by 2 N rms at 1 to 10 Hz, for 2 s. Sliding: the
             last contact slides at 0.15 m/s over 6 cm of its link, the others are held. The arm is
             at rest.
+        lasts: How long steady hands touch after the last onset [s].
         runs: Random poses and places per line of the tables.
         baselines: What runs along: the first entry of the line of force action, the surface
             nearest to the line, a contact particle filter (on 100 runs a line).
@@ -122,6 +124,7 @@ def localization(
         model_error,
         calibrated,
         hands,
+        lasts,
     )
     main(plan, out)
     return 0

@@ -55,6 +55,8 @@ class Contact(Value):
         covariance: (3, 3) [m2] covariance of the position.
         candidates: other explanations, best first.
         decided: whether the level is more than a default.
+        searching: whether a search for places still runs, that will say more: some hundredths of a
+            second after contacts have begun together.
         zone: "structure", "end_effector" or "handle"; None while that is open.
         clamped: whether forces on two sides oppose each other; None where that is not known.
         rate: how fast the force grows [N/s].
@@ -78,6 +80,7 @@ class Contact(Value):
     covariance: Array | None = None
     candidates: tuple[Candidate, ...] = field(default=())
     decided: bool = False
+    searching: bool = False
     zone: str | None = None
     clamped: bool | None = False
     rate: float | None = None

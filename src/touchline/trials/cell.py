@@ -26,6 +26,7 @@ class Cell:
         calibrated: is it calibrated on motion of the same arm without contact?
         hands: "steady" ones keep place and force; "trembling" ones change their force all the time;
             "sliding": the last contact slides, the others are held.
+        lasts: how long steady hands touch an arm at rest after the last onset [s].
     """
 
     arm: str
@@ -37,6 +38,7 @@ class Cell:
     model_error: float = 0.0
     calibrated: bool = True
     hands: Hands = "steady"
+    lasts: float = 0.1
 
     @property
     def turning(self) -> bool:

@@ -84,7 +84,7 @@ def make_scene(cell: Cell, run: int, seed: int = 0) -> Scene:
     chance = np.random.default_rng([seed, run, cell.contacts, *cell.arm.encode()])
     touches = _sample(cell, robot, skin, chance)
     step = APART if cell.begin == "apart" else 0.0
-    first, last, swing = (LATER, LONGER, SWING) if cell.model_error else (FIRST, APART, 0.0)
+    first, last, swing = (LATER, LONGER, SWING) if cell.model_error else (FIRST, cell.lasts, 0.0)
     onsets = [(touch, first + i * step) for i, touch in enumerate(touches)]
     duration = onsets[-1][1] + last
     if cell.alone:

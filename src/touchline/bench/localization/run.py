@@ -62,6 +62,7 @@ class Plan:
         calibrated: is the pipeline calibrated on motion of the same arms, if they are not as
             modelled?
         hands: what they do, as of a `Cell`.
+        lasts: how long touches last after the last onset [s].
     """
 
     robots: tuple[str, ...] = ARMS
@@ -75,6 +76,7 @@ class Plan:
     model_error: tuple[float, ...] = (0.0,)
     calibrated: bool = True
     hands: tuple[Hands, ...] = ("steady",)
+    lasts: float = 0.1
 
     def cells(self) -> list[Cell]:
         """Every combination that there is.
@@ -100,7 +102,7 @@ class Plan:
         ]
 
     def _of(self, arm: str, tier: int, speed: float, error: float, hands: Hands) -> list[Cell]:
-        base = Cell(arm, 1, tier, "apart", speed, "", error, self.calibrated, hands)
+        base = Cell(arm, 1, tier, "apart", speed, "", error, self.calibrated, hands, self.lasts)
         cells: list[Cell] = []
         timings: list[Begin] = [begin for begin in self.begin if begin != "segments"]
         if 1 in self.contacts and timings:
@@ -172,6 +174,7 @@ def main(plan: Plan | None = None, out: Path | None = None, processes: int | Non
 
     plan = plan or Plan()
     check_least(1, runs=plan.runs)
+    check_least(0.01, lasts=plan.lasts)
     check_least(0, seed=plan.seed, speeds=min(plan.speeds, default=0.0))
     check_least(0, **{"model-error": min(plan.model_error, default=0.0)})
     cells = plan.cells()

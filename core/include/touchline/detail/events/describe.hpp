@@ -30,6 +30,7 @@ inline void describe(const Answer& answer, int g, Contact& c) {
   }
   c.rank = answer.rank > 0 ? answer.rank : -1;
   c.unknowns = answer.unknowns > 0 ? answer.unknowns : -1;
+  c.searching = answer.searching;
   const bool explained = answer.count > 0;
   c.pitch = explained ? answer.pitch : kUnknown;
   c.chi2 = explained ? answer.chi2 : kUnknown;

@@ -53,6 +53,7 @@ class BodyStarts {
   int surface(int i) const { return surface_[i]; }
   // In the frame of the node.
   const Vec3& own_point(int i) const { return own_[i].point; }
+  const Vec3& own_normal(int i) const { return own_[i].normal; }
   // The triangle's place in the mesh.
   int place(int i) const { return own_[i].place; }
   const Vec3* points() const { return points_.data(); }

@@ -15,19 +15,26 @@ class PairDescent {
  public:
   PairDescent(const PairView& view, PairFit& fit) : view_(view), fit_(fit) {}
 
-  // From where, and at most so many steps, a third of them where the cost is `hopeless` by then.
-  // `bound`: do the friction cones guide it too, or do they only judge where it ends? `held`: the end
-  // that is to move as little as it can.
-  void begin(const Pair& from, int most, double hopeless, bool bound, int held = -1) {
+  // When it ends: after so many steps. After a third of them where the cost is `hopeless`, at once where
+  // all that a step can better leaves it twice as large. And where that, or what a step has bettered, is
+  // `little`.
+  struct Ends {
+    int most;
+    double hopeless, little;
+  };
+
+  // From where. `bound`: do the friction cones guide it too, or do they only judge where it ends?
+  // `held`: the end that is to move as little as it can.
+  void begin(const Pair& from, const Ends& ends, bool bound, int held = -1) {
     pair_ = from;
-    most_ = most;
-    hopeless_ = hopeless;
+    ends_ = ends;
     bound_ = bound;
     held_ = held;
     steps_ = 0;
     damping_ = 1e-3;
-    moved_ = working_ = true;
+    working_ = true;
     fit_.solve_forces(pair_, bound_);
+    fit_.information_at_hand(pair_, H_, g_, bound_);
   }
   void drop() { working_ = false; }
   bool working() const { return working_; }
@@ -47,26 +54,27 @@ class PairDescent {
 
   // One step more; false if it was the last one.
   bool improve() {
-    if (moved_) fit_.information(pair_, H_, g_, bound_);
     Pair next = pair_;
     const double length = step(next);
     if (length < 1e-5) return false;
     fit_.solve_forces(next, bound_);
-    moved_ = next.cost < pair_.cost;
-    if (moved_) {
+    const bool moved = next.cost < pair_.cost;
+    if (moved) {
       const double better = pair_.cost - next.cost;
       const bool flat = better < 1e-3 * pair_.cost && length < 1e-3;
       pair_ = next;
       damping_ = std::max(1e-6, 0.2 * damping_);
-      if (flat) return false;
+      if (flat || better < ends_.little) return false;
     } else {
       damping_ *= 8.0;
     }
-    const bool hopeless = steps_ == most_ / 3 && pair_.cost > hopeless_;
-    return !hopeless && ++steps_ < most_ && damping_ < 1e6;
+    const bool hopeless = steps_ == ends_.most / 3 && pair_.cost > ends_.hopeless;
+    if (hopeless || ++steps_ == ends_.most || !(damping_ < 1e6)) return false;
+    if (moved) fit_.information_at_hand(pair_, H_, g_, bound_);
+    return true;
   }
 
-  // One damped Gauss-Newton step of the points; its length [m].
+  // One damped Gauss-Newton step of the points; its length [m], 0 where it is not worth it.
   double step(Pair& s) const {
     constexpr int n = PairFit::kUnknowns;
     double H[n * n], x[n];
@@ -77,6 +85,9 @@ class PairDescent {
       H[i * (n + 1)] += 1.0 / (kHold * kHold);
     if (!cholesky<n>(H)) return 0.0;
     solve_cholesky<n>(H, x);
+    double gain = 0.0;  // at most
+    for (int i = 0; i < n; ++i) gain += 2.0 * g_[i] * x[i];
+    if (gain < ends_.little || (steps_ > 0 && pair_.cost - gain > 2.0 * ends_.hopeless)) return 0.0;
     double length = 0.0;
     for (int k = 0; k < 2; ++k) {
       PairEnd& e = s.ends[k];
@@ -99,10 +110,10 @@ class PairDescent {
   const PairView& view_;
   PairFit& fit_;
   Pair pair_;
-  int most_ = 0, held_ = -1, steps_ = 0;
-  double hopeless_ = 0.0, damping_ = 0.0;
-  // `moved_`: since the information was taken?
-  bool bound_ = false, moved_ = false, working_ = false;
+  Ends ends_{};
+  int held_ = -1, steps_ = 0;
+  double damping_ = 0.0;
+  bool bound_ = false, working_ = false;
   // Of the pair that is left: its information and the gradient, as `PairFit` has them.
   double H_[PairFit::kUnknowns * PairFit::kUnknowns], g_[PairFit::kUnknowns];
 };

@@ -54,8 +54,13 @@ class PairFit {
   // points, with what is assumed where nothing is measured; and the gradient (10) of -chi2 / 2. Of
   // the cones too, where forces are `bound`.
   void information(const Pair& s, double* H, double* g, bool bound) {
-    constexpr int n = kUnknowns;
     set_forces(s.ends);
+    information_at_hand(s, H, g, bound);
+  }
+
+  // The same of the points whose forces have been solved last.
+  void information_at_hand(const Pair& s, double* H, double* g, bool bound) const {
+    constexpr int n = kUnknowns;
     const Vec3 &f = s.ends[0].force, &h = s.ends[1].force;
     const double forces[6] = {f.x, f.y, f.z, h.x, h.y, h.z};
     for (int i = 0; i < 6; ++i) {

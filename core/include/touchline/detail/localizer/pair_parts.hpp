@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where two contacts may be that cannot be told apart: a walk over the pairs of points that explain,
-// from wherever a search began, some steps in each sample. It works on the view of that search, so
-// that its outcome does not depend on how it is spread over samples. No allocation.
+// from wherever a search began. It works on the view of one sample, by parts: its outcome does not
+// depend on how it is spread over samples. No allocation.
 // Theory: docs/theory.md, section 6.5.
 #pragma once
 
@@ -32,36 +32,42 @@ class PairParts {
   PairParts(const PairParts&) = delete;
   PairParts& operator=(const PairParts&) = delete;
 
-  // Begins from the outcome of a search.
-  void begin(const PairSearch& search) {
-    view_ = search.view();
+  // Begins from the outcome of a search, with what `measurement` has read in the sample of `now`. The
+  // search stays as it is while this works.
+  void begin(const PairSearch& search, const SegmentSample& now, const Measurement& measurement) {
+    drop();
+    if (!view_.take(now.lag, measurement)) return;
+    search_ = &search;
     limit_ = chi2_limit(view_.rows(), settings_.pitch_limit);
     rank_ = search.count() > 0 ? search[0].rank : 0;
     best_ = cone_ = std::numeric_limits<double>::infinity();
     apart_ = kApart;
-    count_ = steps_ = 0;
-    drop();
-    for (int i = 0; i < search.count(); ++i) wait(search[i], -1);
-    Pair pair;
-    for (int place = 0, end; search.starts().plausible(place, pair, end);) wait(pair, end);
+    count_ = next_solution_ = next_start_ = 0;
+    stage_ = Stage::walks;
   }
 
-  void drop() { head_ = waits_ = 0; }
-  bool working() const { return waits_ > 0; }
+  void drop() {
+    stage_ = Stage::none;
+    head_ = waits_ = 0;
+    descent_.drop();
+  }
+  bool working() const { return stage_ == Stage::walks; }
+  // Is there an outcome?
+  bool done() const { return stage_ == Stage::done; }
 
-  // Goes on for about so many steps.
-  void work(int steps) {
-    for (const int until = steps_ + steps; waits_ > 0 && steps_ < until;) {
-      const Task& task = waiting_[head_];
-      head_ = (head_ + 1) % kWaiting;
-      --waits_;
-      descent_.begin(task.pair, kSteps, kHopeless, true, task.held);
-      while (descent_.working()) steps_ += descent_.work(kSteps);
-      take(descent_.pair());
+  // Goes on for about so many units of work (`LocalizerTuning::pair_work`).
+  void work(int units) {
+    while (working() && units > 0) {
+      if (descent_.working()) {
+        units -= kStep * descent_.work((units + kStep - 1) / kStep);
+        if (!descent_.working()) take(descent_.pair());
+      } else {
+        units -= kBegin;
+        begin_next();
+      }
     }
   }
 
-  int steps() const { return steps_; }  // since it began
   int rank() const { return rank_; }    // of the best pair
   // What the walk has met, and how far around each there may be more [m].
   int count() const { return count_; }
@@ -74,13 +80,18 @@ class PairParts {
 
  private:
   static constexpr int kWaiting = 4096, kSteps = 12;  // room: pairs that wait; steps of each
-  static constexpr double kHopeless = 100.0;  // cost after a third of the steps
+  // Units of work: a step, and the beginning of a descent.
+  static constexpr int kStep = 3, kBegin = 1;
+  static constexpr double kHopeless = 100.0;  // cost from which nothing is brought to where it explains
   static constexpr double kWindow = 13.0;     // of cost: 99 % of chi2 with four degrees of freedom
   // Cost of the cones through which a walk goes on, and which still tells: faces are flat where
   // links are round.
   static constexpr double kPassed = 16.0, kTold = 4.0;
   static constexpr double kApart = 0.012;   // parts nearer than this are one [m]
   static constexpr double kStride = 0.022;  // from one to the next [m]
+  // So near to a part, in parts of what they are apart, a walk need not go: what else goes with it is
+  // met by way of its other end.
+  static constexpr double kBeside = 0.83;
   static constexpr double kReach = 0.03;
   static constexpr double kWider = 1.5;  // each time there are too many parts
   static constexpr double kWide = 1.5;   // times what parts are apart: between them there are more
@@ -89,6 +100,49 @@ class PairParts {
     Pair pair;
     int held;  // the end that is to stay where it is; -1: neither
   };
+
+  enum class Stage { none, walks, done };
+
+  // The next pair to descend from: solutions, then starts, then what is beside those that explain.
+  void begin_next() {
+    Task task;
+    task.held = -1;
+    if (next_solution_ < search_->count()) {
+      task.pair = moved((*search_)[next_solution_++]);
+    } else if (search_->starts().plausible(next_start_, task.pair, task.held)) {
+      task.pair = moved(task.pair);
+    } else if (waits_ > 0) {
+      task = waiting_[head_];
+      head_ = (head_ + 1) % kWaiting;
+      --waits_;
+      if (is_known(task.pair.ends[task.held], kBeside * apart_)) return;
+    } else {
+      stage_ = Stage::done;
+      return;
+    }
+    descent_.begin(task.pair, {kSteps, kHopeless, 0.0}, true, task.held);
+  }
+
+  // Has a pair been met that explains, one end of which is so near [m]?
+  bool is_known(const PairEnd& e, double distance) const {
+    const Vec3 point = view_.to_body(e.point, e.body);
+    for (int i = 0; i < count_; ++i) {
+      const Vec3 way = parts_[i].point - point;
+      if (parts_[i].surface == e.surface && explains(parts_[i]) && dot(way, way) < distance * distance)
+        return true;
+    }
+    return false;
+  }
+
+  // To where its bodies are in this view.
+  Pair moved(Pair s) const {
+    const PairView& then = search_->view();
+    for (PairEnd& e : s.ends) {
+      e.point = view_.to_world(then.to_body(e.point, e.body), e.body);
+      e.normal = view_.turn_to_world(then.turn_to_body(e.normal, e.body), e.body);
+    }
+    return s;
+  }
 
   // What is beyond the room for it is left to the neighbours.
   void wait(const Pair& pair, int held) {
@@ -169,7 +223,10 @@ class PairParts {
   PairDescent descent_;
   std::vector<Task> waiting_;  // a ring
   Part parts_[kMost];
-  int head_ = 0, waits_ = 0, count_ = 0, steps_ = 0, rank_ = 0;
+  int head_ = 0, waits_ = 0, count_ = 0, rank_ = 0;
+  Stage stage_ = Stage::none;
+  const PairSearch* search_ = nullptr;  // from which it began, and what of it has not been used yet:
+  int next_solution_ = 0, next_start_ = 0;
   double limit_ = 0.0, best_ = 0.0, cone_ = 0.0, apart_ = kApart;
 };
 

@@ -13,6 +13,7 @@
 
 #include "touchline/detail/localizer/pair_descent.hpp"
 #include "touchline/detail/localizer/pair_starts.hpp"
+#include "touchline/detail/localizer/segment_contacts.hpp"
 #include "touchline/detail/place/approach.hpp"
 
 namespace touchline {
@@ -31,20 +32,33 @@ class PairSearch {
         descent_(view_, fit_),
         starts_(surfaces, settings, g) {}
 
-  // Searches what `measurement` has read of the segment, and whose rows are `lag` [s] old. The
-  // solutions are those that explain, the most probable first.
-  void search(double lag, const Measurement& measurement) {
-    count_ = 0;
+  // Begins with what `measurement` has read of the segment in the sample of `now`.
+  void begin(const SegmentSample& now, const Measurement& measurement) {
+    drop();
+    searched_ = view_.take(now.lag, measurement);
+    begun_ = seen_ = now.time;
+    stage_ = searched_ ? Stage::starts : Stage::done;
+    if (searched_) starts_.begin(view_);
+  }
+  void drop() {
+    stage_ = Stage::none;
+    count_ = next_ = 0;
+    descent_.drop();
     starts_.clear();
-    searched_ = view_.take(lag, measurement);
-    if (!searched_) return;
-    starts_.begin(view_);
-    while (starts_.working()) starts_.work(kAll);
-    for (int i = 0; i < starts_.count(); ++i) refine(starts_[i]);
-    for (int i = 0, n = count_; i < n; ++i) enter(solutions_[i]);
-    weigh();
+  }
+  bool working() const { return stage_ != Stage::none && stage_ != Stage::done; }
+  // Is there an outcome? The solutions are those that explain, the most probable first.
+  bool done() const { return stage_ == Stage::done; }
+
+  // Goes on for about so many units of work (`LocalizerTuning::pair_work`), in the sample of `now`.
+  void work(int units, const SegmentSample& now, const Measurement& measurement) {
+    while (working() && units > 0) units -= work_on_stage(units, now, measurement);
   }
 
+  // When it was that the outcome speaks of [s].
+  double seen() const { return seen_; }
+  // When it began [s].
+  double begun() const { return begun_; }
   int count() const { return count_; }
   const Pair& operator[](int i) const { return solutions_[i]; }
   // Would two contacts have been found, if there were any?
@@ -55,20 +69,109 @@ class PairSearch {
 
  private:
   static constexpr int kSteps = 24;        // of a refinement
-  static constexpr int kAll = std::numeric_limits<int>::max();  // of the work on starts
   static constexpr double kSame = 0.01;    // solutions nearer than this are one [m]
   static constexpr double kWindow = 25.0;  // of cost: beyond it a solution weighs nothing
-  static constexpr double kHopeless = 1e5;  // cost after a third of the steps
+  static constexpr double kHopeless = 100.0;  // cost from which nothing is brought to where it explains
+  static constexpr double kLittle = 0.02;     // of cost: not worth a step
 
-  void refine(const Pair& start) {
-    descent_.begin(start, kSteps, kHopeless, false);
-    while (descent_.working()) descent_.work(kSteps);
+  // Units of work: a step of a descent, its beginning, where a force enters its body, the evidence of
+  // a solution, another view.
+  static constexpr int kStep = 3, kBegin = 1, kEntries = 10, kWeight = 12, kView = 20;
+
+  // From points spread over the links, by descents, to solutions. What was measured in the meantime
+  // moves them a little; with other entries of their forces they are weighed by that.
+  enum class Stage { none, starts, descents, renewals, entries, weights, done };
+
+  void enter(Stage stage) {
+    stage_ = stage;
+    next_ = 0;
+  }
+
+  // One part of the stage at hand; its units of work.
+  int work_on_stage(int units, const SegmentSample& now, const Measurement& measurement) {
+    switch (stage_) {
+      case Stage::starts: {
+        const int done = starts_.work(units);
+        if (!starts_.working()) enter(Stage::descents);
+        return done;
+      }
+      case Stage::descents:
+        if (descent_.working() || next_ < starts_.count()) return descend(units, starts_);
+        if (now.time == seen_) {
+          begin_entries();
+          return 0;
+        }
+        renew(now, measurement);
+        return kView;
+      case Stage::renewals:
+        if (descent_.working() || next_ < renewed_) return descend(units, former_);
+        begin_entries();
+        return 0;
+      case Stage::entries:
+        if (next_ < entered_) {
+          enter_elsewhere(solutions_[next_++]);
+          return kEntries;
+        }
+        enter(Stage::weights);
+        return 0;
+      case Stage::weights:
+        if (next_ < count_) {
+          weigh(solutions_[next_++]);
+          return kWeight;
+        }
+        conclude();
+        enter(Stage::done);
+        return kWeight;
+      case Stage::none:
+      case Stage::done:
+        break;
+    }
+    return 0;
+  }
+
+  // Goes on from the pair at hand, or begins with the next one.
+  template <class Pairs>
+  int descend(int units, const Pairs& from) {
+    if (!descent_.working()) {
+      descent_.begin(from[next_++], {kSteps, kHopeless, kLittle}, false);
+      return kBegin;
+    }
+    const int steps = descent_.work((units + kStep - 1) / kStep);
     const Pair& s = descent_.pair();
-    if (s.cost < chi2_limit(view_.rows(), settings_.pitch_limit) + kWindow) add(s);
+    if (!descent_.working() && s.cost < chi2_limit(view_.rows(), settings_.pitch_limit) + kWindow)
+      add(s);
+    return kStep * steps;
+  }
+
+  // From now on by what is measured now.
+  void renew(const SegmentSample& now, const Measurement& measurement) {
+    renewed_ = count_;
+    for (int i = 0; i < count_; ++i) {
+      former_[i] = solutions_[i];
+      for (PairEnd& e : former_[i].ends) {
+        e.point = view_.to_body(e.point, e.body);
+        e.normal = view_.turn_to_body(e.normal, e.body);
+      }
+    }
+    count_ = 0;
+    searched_ = view_.take(now.lag, measurement);
+    seen_ = now.time;
+    enter(searched_ ? Stage::renewals : Stage::done);
+    for (int i = 0; i < renewed_; ++i) {
+      for (PairEnd& e : former_[i].ends) {
+        e.point = view_.to_world(e.point, e.body);
+        e.normal = view_.turn_to_world(e.normal, e.body);
+      }
+    }
+  }
+
+  void begin_entries() {
+    entered_ = count_;
+    enter(Stage::entries);
   }
 
   // Where the line of either force enters its body elsewhere, it explains as well.
-  void enter(const Pair& s) {
+  void enter_elsewhere(const Pair& s) {
     for (int k = 0; k < 2; ++k) {
       const PairEnd& e = s.ends[k];
       const double size = norm(e.force);
@@ -102,28 +205,27 @@ class PairSearch {
     if (count_ < kSolutions) solutions_[count_++] = s;
   }
 
-  // Evidence of each solution (Laplace), then probabilities. Where the equations do not suffice the
-  // solutions of two bodies are parts of one: only the best of them counts in full.
-  void weigh() {
-    double most = -std::numeric_limits<double>::infinity();
-    for (int i = 0; i < count_; ++i) {
-      Pair& s = solutions_[i];
-      double H[kUnknowns * kUnknowns], g[kUnknowns];
-      fit_.information(s, H, g, false);
-      s.weight = -std::numeric_limits<double>::infinity();
-      if (!cholesky(H, kUnknowns)) continue;
-      s.weight = -0.5 * (s.cost + log_determinant(H, kUnknowns));
-      for (int k = 0; k < 2; ++k) {
-        const PairEnd& e = s.ends[k];
-        const double cosine = -dot(e.normal, e.force) / std::max(norm(e.force), 1e-9);
-        s.weight += std::log(std::max(cosine, 0.02)) +
-                    approach(surfaces_, e.point, e.force, settings_);
-        spread_of(H, 6 + 2 * k, s.ends[k].along);
-      }
-      s.rank = view_.rank(s.ends[0].body, s.ends[1].body);
-      most = std::max(most, s.weight);
+  // Log of the evidence of a solution (Laplace).
+  void weigh(Pair& s) {
+    double H[kUnknowns * kUnknowns], g[kUnknowns];
+    fit_.information(s, H, g, false);
+    s.weight = -std::numeric_limits<double>::infinity();
+    if (!cholesky(H, kUnknowns)) return;
+    s.weight = -0.5 * (s.cost + log_determinant(H, kUnknowns));
+    for (int k = 0; k < 2; ++k) {
+      const PairEnd& e = s.ends[k];
+      const double cosine = -dot(e.normal, e.force) / std::max(norm(e.force), 1e-9);
+      s.weight += std::log(std::max(cosine, 0.02)) +
+                  approach(surfaces_, e.point, e.force, settings_);
+      spread_of(H, 6 + 2 * k, s.ends[k].along);
     }
-    double sum = 0.0;
+    s.rank = view_.rank(s.ends[0].body, s.ends[1].body);
+  }
+
+  // From the evidence to probabilities, the most probable first.
+  void conclude() {
+    double most = -std::numeric_limits<double>::infinity(), sum = 0.0;
+    for (int i = 0; i < count_; ++i) most = std::max(most, solutions_[i].weight);
     for (int i = 0; i < count_; ++i) sum += solutions_[i].weight = std::exp(solutions_[i].weight - most);
     for (int i = 0; i < count_; ++i) solutions_[i].weight /= sum;
     std::sort(solutions_, solutions_ + count_,
@@ -146,8 +248,12 @@ class PairSearch {
   PairFit fit_;
   PairDescent descent_;
   PairStarts starts_;
-  Pair solutions_[kSolutions];
+  Pair solutions_[kSolutions], former_[kSolutions];
   int count_ = 0;
+  // Where the work is: which of that stage's, and how many solutions it began with.
+  Stage stage_ = Stage::none;
+  int next_ = 0, renewed_ = 0, entered_ = 0;
+  double begun_ = 0.0, seen_ = 0.0;
   bool searched_ = false;
 };
 

@@ -54,13 +54,13 @@ class PairStarts {
     while (working() && done < units) {
       const int a = bodies_at_[0], b = bodies_at_[1];
       if (!prepared_) {
-        done += kPrepared;
         prepared_ = prepare(a, b);
+        done += prepared_ ? kPrepared : kGivenUp;
         if (!prepared_) next_bodies();
         continue;
       }
       try_start(a, start_, b);
-      done += kTried;
+      done += 1 + lanes_[1].count() / kTried;
       if (++start_ < bodies_[a].count()) continue;
       for (int k = 0; k < kPerBodies; ++k) {
         if (!std::isfinite(best_[k].cost)) continue;
@@ -115,8 +115,9 @@ class PairStarts {
   static constexpr int kStarts = BodyStarts::kMost, kBlocks = (kStarts + kLanes - 1) / kLanes;
   static constexpr int kPerBodies = 4;         // pairs that are kept of two bodies
   static constexpr int kFollowed = 24;         // and of all
-  // Units of work: to prepare a pair of bodies, and for a point of one beside all of the other.
-  static constexpr int kPrepared = 10, kTried = 1;
+  // Units of work: a pair of bodies that is given up, or prepared; and how many points of one body are
+  // a unit more beside a point of the other. Not blocks: how wide they are depends on the processor.
+  static constexpr int kGivenUp = 2, kPrepared = 12, kTried = 24;
   static constexpr double kSpacing = 0.02;     // of what a point stands for [m], one sigma
   static constexpr double kSoft = 0.3;         // of the friction cone of such a point [rad]
   static constexpr double kApart = 0.03;       // pairs nearer than this are one [m]
@@ -252,8 +253,8 @@ class PairStarts {
       end.body = bodies[e];
       end.node = view_->node(bodies[e]);
       end.place = of.place(starts[e]);
-      end.point = of.points()[starts[e]];
-      end.normal = of.normals()[starts[e]];
+      end.point = view_->to_world(of.own_point(starts[e]), bodies[e]);
+      end.normal = view_->turn_to_world(of.own_normal(starts[e]), bodies[e]);
     }
     return pair;
   }

@@ -52,7 +52,8 @@ struct Suspected {
 // Two that began at the same instant, until they count as known.
 struct Together {
   double since = 0.0;                         // one contact has not explained all since [s]
-  double searched = 0.0, next_search = 0.0;   // [s]
+  double seen = 0.0, next_search = 0.0;       // of which time the last outcome speaks, the next search [s]
+  bool taken = false, walking = false;        // has the outcome been taken over, and walked on from?
   std::optional<int> second;                  // its number, once it is reported
   bool separable = false;                     // can two places be told apart? Then they are:
   JointEstimate contacts;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -30,40 +31,39 @@ class Twins {
   }
 
   // One contact explains nothing, from the beginning: looks for two, again and again while their
-  // forces rise, then ever more rarely.
+  // forces rise, then ever more rarely. All of that takes many samples.
   void follow(SegmentContacts& s, const Answer& one, const SegmentSample& now) {
-    const double time = now.time;
     Together& two = s.together;
     Work& work = *work_[now.segment];
     if (!s.state.is(Tracking::pair)) {
       s.state.enter(Tracking::pair);
       s.suspected.explained.reset();
       two = Together{};
-      two.since = two.next_search = time;
+      two.since = two.next_search = now.time;
+      two.inseparable = one;
+      two.inseparable.count = 0;
+      work.search.drop();
       work.parts.drop();
     }
-    if (time >= two.next_search) {
-      work.search.search(now.lag, measurement_);
-      take(s, work, one, now);
-      two.searched = time;
-      const double least = settings_.refit * now.brief();
-      two.next_search = time + std::max(least, settings_.search_growth * (time - two.since));
-    } else if (two.separable) {
-      if (known_.explain_freely(two.contacts)) fit_.accept(two.contacts, known_.change(), 0.0);
-    } else {
-      walk(two, work);
-    }
+    go_on(s, work, one, now);
     if (!two.separable) {
       end_second(two);
       two.inseparable.force = one.force;
+      two.inseparable.searching = !two.walked;
       reports_.add(s.touched.first, two.inseparable);
       return;
     }
+    if (two.seen < now.time && known_.explain_freely(two.contacts))
+      fit_.accept(two.contacts, known_.change(), 0.0);
     if (!two.second) two.second = reports_.next();
     two.contacts.known[0].serial = s.touched.first;
     two.contacts.known[1].serial = *two.second;
-    for (int k = 0; k < 2; ++k) reports_.add(two.contacts.known[k]);
-    if (two.searched - two.since < settings_.young * now.brief()) return;
+    const bool settled = two.seen - two.since >= settings_.young * now.brief();
+    for (int k = 0; k < 2; ++k) {
+      reports_.add(two.contacts.known[k]);
+      reports_.answer(reports_.count() - 1).searching = !settled;
+    }
+    if (!settled) return;
     s.known.contacts = two.contacts;
     s.know(now);
     s.state.enter(Tracking::several);
@@ -81,7 +81,7 @@ class Twins {
     two.second.reset();
   }
 
-  // The search for pairs on a segment, and the walk from where one has ended.
+  // The search for pairs on a segment, and the walk from where one has begun.
   struct Work {
     Work(const Posture& posture, const LinkSurfaces& surfaces, const LocalizerSettings& settings,
          std::size_t rows, int g)
@@ -90,23 +90,44 @@ class Twins {
     PairParts parts;
   };
 
+  // One sample's part of it: what is done is taken over in a sample of its own.
+  void go_on(SegmentContacts& s, Work& work, const Answer& one, const SegmentSample& now) {
+    Together& two = s.together;
+    if (work.parts.done()) {
+      conclude(two, work);
+      work.parts.drop();
+    } else if (work.search.done() && !two.taken) {
+      take(s, work, one, now);
+    } else if (work.parts.working()) {
+      work.parts.work(share(now.time));
+    } else if (work.search.working()) {
+      work.search.work(share(now.time), now, measurement_);
+    } else if (two.taken && !two.separable && !two.walking &&
+               work.search.begun() - two.since >= settings_.risen * now.brief()) {
+      two.walking = true;
+      work.parts.begin(work.search, now, measurement_);
+    } else if (now.time >= two.next_search) {
+      two.taken = two.walking = false;
+      two.next_search = std::max(two.since + settings_.risen * now.brief(),
+                                 now.time + settings_.search_growth * (now.time - two.since));
+      work.search.begin(now, measurement_);
+    }
+  }
+
   // Takes the outcome of a search over.
   void take(SegmentContacts& s, Work& work, const Answer& one, const SegmentSample& now) {
     Together& two = s.together;
+    two.taken = true;
+    two.seen = work.search.seen();
     two.separable = said_.separable(work.search);
     if (!two.separable) {
       if (!two.walked) {
         two.inseparable = one;
         said_.name_all(work.search, two.inseparable);
       }
-      if (!work.parts.working() && now.time - two.since >= settings_.risen * now.brief()) {
-        work.parts.begin(work.search);
-        conclude(two, work);
-      }
       return;
     }
     two.walked = false;
-    work.parts.drop();
     two.contacts.count = 0;
     for (int k = 0; k < 2; ++k) {
       said_.name(work.search, k, answer_);
@@ -116,22 +137,29 @@ class Twins {
     fit_.judge(two.contacts);
   }
 
-  // Goes on with what explains as well; what was said before stands until all is met.
-  void walk(Together& two, Work& work) {
-    if (!work.parts.working()) return;
-    work.parts.work(settings_.pair_steps);
-    conclude(two, work);
-  }
-
-  void conclude(Together& two, const Work& work) {
-    if (work.parts.working()) return;
+  // All that explains has been met.
+  void conclude(Together& two, Work& work) {
+    two.walked = true;
     if (work.parts.count() > 0) {
       said_.name_all(work.parts, two.inseparable);
-      two.walked = true;
     } else if (work.search.exhaustive()) {
       said_.name_none(work.search, two.inseparable);
-      two.walked = true;
+    } else {
+      two.walked = false;
     }
+  }
+
+  // Units of work for a segment in a sample: those that are searched share them.
+  int share(double time) {
+    if (time != time_) {
+      before_ = working_;
+      working_ = 0;
+      left_ = settings_.pair_work;
+      time_ = time;
+    }
+    const int own = std::min(left_, settings_.pair_work / std::max(before_, ++working_));
+    left_ -= own;
+    return own;
   }
 
   const LinkSurfaces& surfaces_;
@@ -142,6 +170,10 @@ class Twins {
   Reports& reports_;
   std::vector<std::unique_ptr<Work>> work_;  // per segment
   PairAnswer said_;
+  // How many segments are searched in the sample of this time [s], so far, and in the one before; units
+  // of work that are left in it.
+  double time_ = -std::numeric_limits<double>::infinity();
+  int working_ = 0, before_ = 0, left_ = 0;
   Answer answer_;
 };
 

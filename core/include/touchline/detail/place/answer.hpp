@@ -25,6 +25,7 @@ struct Answer {
   // Where no equation is left over, for one contact or for several that began together: how many
   // there are, and unknowns, five of each contact.
   int rank = 0, unknowns = 0;
+  bool searching = false;  // does a search for places still run, that will say more?
 };
 
 }  // namespace touchline
