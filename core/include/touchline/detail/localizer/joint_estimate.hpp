@@ -55,6 +55,11 @@ struct JointEstimate {
     }
   }
 
+  // Cosine of 25 degrees. Less: each face of a mesh that a place creeps over tells of it what is not
+  // so. More: curved links are taken for flat.
+  static constexpr double kOnePlane = 0.906;
+  static constexpr double kEitherSide = 4.0;  // variances within which a place may be on either face
+
   // Those of all contacts but one.
   void copy_without(int c, JointEstimate& out) const {
     out = *this;
@@ -141,6 +146,29 @@ struct JointEstimate {
     double sum = 0.0;
     for (int i = kEach * c; i < kEach * c + 3; ++i) sum += covariance[i * (n + 1)];
     return std::sqrt(sum);
+  }
+
+  // Moves the place of a contact along its surface, to `p`. The tangents stay on faces that are nearly
+  // normal to them, and for as long as it may be on the face before: what is known of forces and places
+  // together lies in one plane. In another one it would contradict the next samples, and the place
+  // would seem to be known. So what they share is forgotten there.
+  void follow(int c, const SurfacePoint& p) {
+    KnownContact& k = known[c];
+    const bool alike = dot(p.normal, k.normal) > kOnePlane;
+    if (alike) k.alike = p.point;
+    const Vec3 beyond = p.point - k.alike;
+    if (alike || dot(beyond, beyond) < kEitherSide * k.place.trace()) {
+      k.point = p.point;
+      return;
+    }
+    move(c, p);
+    k.alike = p.point;
+    const int n = size(), first = kEach * c + 3;
+    for (int i = first; i < first + 2; ++i) {
+      for (int j = 0; j < n; ++j) {
+        if (j < first || j >= first + 2) covariance[i * n + j] = covariance[j * n + i] = 0.0;
+      }
+    }
   }
 
   // Moves the place of a contact to `p`, whose tangents are turned with the normal, the shortest

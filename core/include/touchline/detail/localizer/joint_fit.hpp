@@ -303,7 +303,7 @@ class JointFit {
     const SurfacePoint p =
         surfaces_[k.surface].mesh.nearest_to_point(k.point + along * s + across * t,
             settings_.surface_reach);
-    if (p.face >= 0) estimate.move(c, p);
+    if (p.face >= 0) estimate.follow(c, p);
   }
 
   const Posture& posture_;

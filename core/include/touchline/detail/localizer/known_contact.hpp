@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "touchline/detail/localizer/settings.hpp"
@@ -80,7 +81,9 @@ class Unrest {
       take(dot(corrected_, corrected_), block_, passed, t.unrest_memory);
       const double ratio = t.unrest_lasts * moved_ / std::max(expected_, 1e-12);
       if (ratio > t.unrest_more) rate_ *= std::min(ratio, t.unrest_step);
-      if (ratio < 1.0) rate_ *= std::max(ratio, 1.0 / t.unrest_step);
+      // Few looks may have met a moment of calm: it falls to what they still allow.
+      const double most = ratio * calm(seen_ / passed / t.unrest_lasts);
+      if (most < 1.0) rate_ *= std::max(most, 1.0 / t.unrest_step);
     } else {
       forget();
     }
@@ -92,6 +95,15 @@ class Unrest {
  private:
   static constexpr double kLost = 4.0;  // times 1 / K: after a longer break it begins anew
   static constexpr int kFew = 2;        // looks
+
+  // How many times as large as its mean over so many independent looks a variance may be (chi-squared
+  // by Wilson and Hilferty 1931). Each look tells of two axes at least.
+  static double calm(double looks) {
+    const double off = 2.0 / (9.0 * 2.0 * std::max(looks, 0.1));
+    const double least = 1.0 - off - kCalm * std::sqrt(off);
+    return least > 0.0 ? 1.0 / (least * least * least) : std::numeric_limits<double>::infinity();
+  }
+  static constexpr double kCalm = 1.64;  // sigmas: one mean in twenty is smaller
 
   void take(double square, double expected, double passed, double memory) {
     seen_ = std::min(seen_ + passed, memory);
@@ -124,7 +136,8 @@ inline Spread operator+(const Spread& x, const Spread& y) {
 
 struct KnownContact {
   int serial = -1, surface = -1, node = -1;
-  Vec3 point, normal;  // in the frame of the node
+  Vec3 point, normal;  // in the frame of the node; the normal is that of the tangents in use
+  Vec3 alike;          // where it was last on a face that is nearly normal to that
   Vec3 force;          // in world [N]
   Spread place;        // in the tangents of `normal`
   Spread lasting;      // of it, by errors that all samples have in common: it gets no smaller
@@ -165,6 +178,7 @@ inline void keep(const Answer& answer, const LinkSurfaces& surfaces, KnownContac
   known.node = surfaces[best.surface].node;
   known.point = surfaces.to_node(best.point, known.node);
   known.normal = surfaces.turn_to_node(best.normal, known.node);
+  known.alike = known.point;
   known.force = best.fit.force;
   known.status = answer.status;
   known.body_probability = answer.body_probability;
