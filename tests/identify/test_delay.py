@@ -8,7 +8,7 @@ import pytest
 
 import touchline as tl
 from touchline.check import injected
-from touchline.identify.delay import Delay, find_delays, with_delays
+from touchline.identify.delay import Delay, find_delays, refined, with_delays
 from touchline.identify.evidence import gather
 
 
@@ -49,6 +49,16 @@ def test_a_late_sensor_is_found_by_itself(robot, samples):
     base, *others = with_delays(robot, [found]).description.sensors
     assert base.delay == pytest.approx(found.value, abs=1e-6)
     assert all(sensor.delay == 0.0 for sensor in others)
+
+
+def test_what_is_left_of_a_delay_is_found_as_closely(robot, samples):
+    wrench, time = samples.wrench.copy(), samples.time
+    for axis in range(6):  # of 10 ms, of which 9.4 were found
+        wrench[:, 0, axis] = np.interp(time - 6e-4, time, samples.wrench[:, 0, axis])
+    found = [Delay("base", 0.0094, 1e-4), Delay("wrist", -0.002, 1e-4)]
+    base, wrist = refined(found, gather(robot, [[replace(samples, wrench=wrench)]]))
+    assert base.value == pytest.approx(0.010, abs=5e-5)
+    assert wrist == found[1]
 
 
 def test_delays_add_to_those_of_the_description(robot):

@@ -28,7 +28,7 @@ from touchline.detector.calibration import (
 from touchline.detector.tail import Tail
 from touchline.errors import InputError
 from touchline.folder import check_file
-from touchline.identify.delay import Delay, find_delays, with_delays
+from touchline.identify.delay import Delay, find_delays, refined, with_delays
 from touchline.identify.described import description_changes, identified_robot
 from touchline.identify.evidence import filtered, gather
 from touchline.identify.frame import FrameError, find_frames, joined, with_frames
@@ -170,6 +170,9 @@ def calibrate(
             refuse_one_pose(evidence)
             delays = find_delays(evidence)
             if delays:
+                prompt = with_delays(model, delays)
+                evidence = gather(prompt, Recordings(prompt, logs).all("equations"))
+                delays = refined(delays, evidence)
                 model = with_delays(model, delays)
                 recordings = Recordings(model, logs)
                 evidence = gather(model, recordings.all("equations"))

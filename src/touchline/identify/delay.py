@@ -6,6 +6,7 @@ shared by all torques, and one by the axes of each sensor. Biases, friction and 
 beside it (Frisch and Waugh, Econometrica 1(4), 1933), so that a wrong model is no delay.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,25 +39,36 @@ class Delay:
     error: float
 
 
-def find_delays(evidence: Evidence, use: Mask | None = None) -> list[Delay]:
+def find_delays(evidence: Evidence) -> list[Delay]:
     """Delays that the data are sure of, and that two halves of them agree on."""
-    use = np.ones(len(evidence), dtype=bool) if use is None else use
-    chooser = Chooser(evidence, use)
-    problem = chooser.loaded()
-    order = np.cumsum(use) <= 0.5 * use.sum()
-    parts = [_Beside(chooser, problem, part) for part in (use, use & order, use & ~order)]
-    # What is expected with all that was fitted: a payload's weight changes as the model's does.
-    rates, found = _rates(evidence, evidence.reading + parts[0].left), []
-    for name, rows in _groups(evidence):
-        of_group = np.zeros_like(rates)
-        of_group[:, rows] = -rates[:, rows]
-        whole, *halves = (part.value(of_group) for part in parts)
-        if whole is None or not LEAST < abs(whole[0]) < LONGEST or abs(whole[0]) < SURE * whole[1]:
+    order = np.arange(len(evidence)) < 0.5 * len(evidence)
+    found = []
+    for delay, *halves in _delays(evidence, [order, ~order]):
+        size = abs(delay.value)
+        if not LEAST < size < LONGEST or size < SURE * delay.error or len(halves) < 2:
             continue
-        values = [half[0] for half in halves if half is not None]
-        if len(values) == 2 and abs(values[0] - values[1]) < AGREE * abs(whole[0]):
-            found.append(Delay(name, *whole))
+        if abs(halves[0].value - halves[1].value) < AGREE * size:
+            found.append(delay)
     return found
+
+
+def refined(delays: Sequence[Delay], evidence: Evidence) -> list[Delay]:
+    """The delays with what is left of them in readings from which they have been taken out.
+
+    A model that was fitted to late readings is a little late itself, so `find_delays` makes a delay
+    some percent too short.
+
+    Args:
+        delays: as found.
+        evidence: of the robot `with_delays`.
+    """
+    left = {own.name: own for (own,) in _delays(evidence, [])}
+    # A description has no delay of the positions, so that is still in the readings.
+    again = {x.name: left[x.name] for x in delays if x.value > 0.0 and x.name in left}
+    return [
+        Delay(x.name, x.value + again[x.name].value, again[x.name].error) if x.name in again else x
+        for x in delays
+    ]
 
 
 def with_delays(robot: Robot, delays: list[Delay]) -> Robot:
@@ -76,6 +88,25 @@ def with_delays(robot: Robot, delays: list[Delay]) -> Robot:
     sensors = tuple(replace(s, delay=added(s.delay, s.name)) for s in robot.description.sensors)
     description = replace(robot.description, joints=joints, sensors=sensors)
     return Robot(description, robot.mechanism)
+
+
+def _delays(evidence: Evidence, parts: Sequence[Mask]) -> Iterator[list[Delay]]:
+    """Of each group of rows from all instants, then from parts (N,) of them, as far as these tell.
+
+    Groups of which all instants tell nothing are left out.
+    """
+    whole = np.ones(len(evidence), dtype=bool)
+    chooser = Chooser(evidence, whole)
+    problem = chooser.loaded()
+    fits = [_Beside(chooser, problem, part) for part in (whole, *parts)]
+    # What is expected with all that was fitted: a payload's weight changes as the model's does.
+    rates = _rates(evidence, evidence.reading + fits[0].left)
+    for name, rows in _groups(evidence):
+        of_group = np.zeros_like(rates)
+        of_group[:, rows] = -rates[:, rows]
+        values = [fit.value(of_group) for fit in fits]
+        if values[0] is not None:
+            yield [Delay(name, *value) for value in values if value is not None]
 
 
 def _groups(evidence: Evidence) -> list[tuple[str, list[int]]]:
