@@ -83,6 +83,18 @@ def test_noise_is_not_learned():
     assert not rest.tables
 
 
+def test_nothing_is_learned_that_harms_a_part_of_the_workspace():
+    """Over the whole, a table of the ripple helps; in a quarter of it the ripple is another one."""
+    robot = arm()
+    s = free_motion(robot, 40.0, 100.0, seed=1, noise=0.02)
+    centred = s.q - s.q.mean(axis=0)
+    along = centred @ np.linalg.svd(centred, full_matrices=False)[2][0]
+    size = np.where(along > np.quantile(along, 0.75), -0.5 * RIPPLE, RIPPLE)
+    s.tau[:, 1] += size * np.sin(TEETH * s.q[:, 1])
+    _, _, rest = learned(robot, s)
+    assert robot.joint_names[1] not in rest.tables
+
+
 def test_regions_hold_every_instant_once_along_each_direction():
     robot = arm()
     evidence = gather(robot, [[rippled(robot, 1)]])

@@ -7,8 +7,9 @@ nodes. Their prior is a Gaussian process; the posterior at the nodes is the tabl
 (structured kernel interpolation: Wilson and Nickisch, ICML 2015). A node in whose cells nothing was
 seen is 0, so the table is off there.
 
-A joint gets a table only if that foretells parts of time that the fit has not seen, and is no worse
-in parts of the workspace that it has not seen.
+A joint gets a table only if that foretells parts of time and of the workspace that the fit has not
+seen. What it learned counts only as much as suits each of these parts: where a rest hangs on other
+joints as well, a table may foretell nine parts and harm the tenth.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,7 +22,7 @@ from touchline.arrays import Array, Mask
 from touchline.identify.choice import Fold, folds_of
 from touchline.identify.evidence import Evidence
 from touchline.identify.fit import applied
-from touchline.identify.identification import WORSE, Identification, rms
+from touchline.identify.identification import Identification, rms
 from touchline.identify.touches import usual_scatter
 from touchline.model.learned_rest import LearnedRest
 from touchline.model.robot import Robot
@@ -155,16 +156,17 @@ def learn(found: Identification, grids: Grids, columns: NDArray[np.floating]) ->
             continue
         hats = columns[:, grids.columns(j)].astype(float)
         joint = _Joint(evidence, grid, hats, whole[:, j])
-        elsewhere, later = joint.foretold(regions), joint.foretold(parts)
-        if elsewhere.share > 1.0 or (elsewhere + later).share > HELPS:
-            continue
         held = _Joint(evidence, grid, hats, trained[:, j])
+        elsewhere, later = joint.foretold(regions), joint.foretold(parts)
         told = held.foretold([Fold(found.train, found.test)])
-        if told.share > WORSE:
+        share = min(own.best for own in (*elsewhere, *later, *told))
+        if share <= 0.0 or _left([*elsewhere, *later], share) > HELPS:
             continue
         torque, doubt = joint.fit(use)
-        after[j], inside[j] = told.after, rms(whole[use, j, None] + hats[use] @ torque[:, None])[0]
-        unseen[:, j] = elsewhere.before, elsewhere.after
+        torque = share * torque
+        after[j] = _rms(told, share)
+        inside[j] = rms(whole[use, j, None] + hats[use] @ torque[:, None])[0]
+        unseen[:, j] = _rms(elsewhere, 0.0), _rms(elsewhere, share)
         tables[evidence.rows.names[j]] = grid.table(torque, doubt)
     return Rest(tables, before, after, inside, *unseen)
 
@@ -217,46 +219,49 @@ class _Joint:
         torque = -told * (covariance @ (hats.T @ (weight * left)))
         return torque, np.where(told > 0.0, np.sqrt(np.diag(covariance)), 0.0)
 
-    def foretold(self, folds: list[Fold]) -> "_Foretold":
-        """What is left at the instants of the folds that the fits have not seen."""
-        total = _Foretold(0, 0.0, 0.0)
+    def foretold(self, folds: list[Fold]) -> "list[_Foretold]":
+        """What is left at the instants of each fold, which the fit to the others has not seen."""
+        found = []
         for fold in folds:
             torque, _ = self.fit(fold.train)
-            without = self.residual[fold.test]
-            left = without + self.hats[fold.test] @ torque
-            total += _Foretold(len(left), float(without @ without), float(left @ left))
-        return total
+            without, table = self.residual[fold.test], self.hats[fold.test] @ torque
+            products = (
+                float(a @ b) for a, b in ((without, without), (without, table), (table, table))
+            )
+            found.append(_Foretold(len(without), *products))
+        return found
 
 
 @dataclass(frozen=True)
 class _Foretold:
-    """Sums of squares at some instants, without a table and with one."""
+    """Sums over some instants of products of what is left without a table and what that adds."""
 
     count: int
-    without: float
-    with_table: float
+    left: float
+    both: float
+    table: float
 
-    def __add__(self, other: "_Foretold") -> "_Foretold":
-        return _Foretold(
-            self.count + other.count,
-            self.without + other.without,
-            self.with_table + other.with_table,
-        )
+    def squares(self, share: float) -> float:
+        """Of what is left with so much of the table."""
+        return self.left + 2.0 * share * self.both + share**2 * self.table
 
     @property
-    def before(self) -> float:
-        """RMS without a table."""
-        return float(np.sqrt(self.without / max(self.count, 1)))
+    def best(self) -> float:
+        """How much of the table leaves least, from 0 to 1; 1 where the table is 0."""
+        if self.table <= 0.0:
+            return 1.0
+        return float(np.clip(-self.both / self.table, 0.0, 1.0))
 
-    @property
-    def after(self) -> float:
-        """RMS with a table."""
-        return float(np.sqrt(self.with_table / max(self.count, 1)))
 
-    @property
-    def share(self) -> float:
-        """How much of the RMS is left."""
-        return self.after / max(self.before, 1e-12)
+def _rms(parts: Sequence[_Foretold], share: float) -> float:
+    """Root mean square of what is left with so much of the table."""
+    total = sum(part.squares(share) for part in parts)
+    return float(np.sqrt(max(total, 0.0) / max(sum(part.count for part in parts), 1)))
+
+
+def _left(parts: Sequence[_Foretold], share: float) -> float:
+    """The same, of what it is without."""
+    return _rms(parts, share) / max(_rms(parts, 0.0), 1e-12)
 
 
 def _bend(speed: Array) -> Array:
