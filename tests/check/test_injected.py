@@ -102,6 +102,10 @@ def test_the_whole_trial_is_repeatable():
         ("positions in degrees", "a torque's sign"),
         ("torques in another unit", "hand missing in the model"),
         ("a position's sign", "sensor polarity"),
+        ("base tilted", "a torque's sign"),
+        ("hand missing in the model", "a torque's sign"),
+        ("external torques logged", "a position's sign"),
+        ("positions in degrees", "velocities in degrees"),
     ],
 )
 def test_one_error_does_not_hide_another(robot, names):

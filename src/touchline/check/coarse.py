@@ -15,6 +15,7 @@ from touchline.arrays import Array
 from touchline.check.findings import Findings
 from touchline.check.fit import MOMENT_FACTORS, factor_words, robust_line
 from touchline.check.joints import (
+    TAKEN_OUT,
     TELLING,
     TorqueFit,
     fit_torque,
@@ -40,6 +41,7 @@ LARGE = 5.0  # a factor beyond it, or below its inverse, is a unit, whatever els
 UNIT_NEAR = 0.4  # relative, of the common factor of all torques, which loads may change
 MOVED = 0.05  # rad or m; a joint that moved less tells nothing of the sense of its position
 FOLLOWS = 0.3  # of its own size may be left of a reading that is a multiple of what is expected
+MOST_BESIDE = 3  # changes that are tried beside wrong weights
 SHARED = 0.6  # of the joints must show a common factor
 
 
@@ -92,9 +94,12 @@ def _degrees(robot: Robot, seen: Seen, mending: Mending) -> Step:
     slope, qd = windows.slope[moving].ravel(), windows.qd[moving].ravel()
     known = np.isfinite(slope) & np.isfinite(qd)
     line = robust_line(slope[known, None], qd[known])
-    # Velocities that follow from the positions have the same unit; that is one error, not two.
+    # Velocities that follow from the positions have the same unit.
     if line is not None and abs(float(line.coefficients[0]) - 1.0) < 0.1:
         turned = turned.scaled("velocity", _revolute(robot), factor)
+        told.find(
+            "velocity of every revolute joint is in degrees per second, too: the same factor for qd"
+        )
     return Step(tuple(told.findings), turned)
 
 
@@ -118,7 +123,27 @@ def _torques(robot: Robot, seen: Seen, mending: Mending) -> Step | None:
         light = list(_weightless(robot, windows, telling, mending))
         if not light or left <= light[0].left:
             return units
-    rows = misfit(robot, windows, telling)
+    change = _change(robot, seen, mending, measured, telling)
+    heard = [j for j in telling if _heard(windows, j)]
+    if change is None and heard != telling:
+        # Torques that nothing is in are off whatever else is mended.
+        change = _change(robot, seen, mending, measured, heard)
+    return change
+
+
+def _heard(windows: Windows, j: int) -> bool:
+    """Is there anything in a torque, beside what is expected of it?"""
+    reading, expected = windows.torque[:, j], windows.expected_torque[:, j]
+    known = np.isfinite(reading) & np.isfinite(expected)
+    read, needed = (float((x[known] ** 2).sum()) for x in (reading, expected))
+    return read > TAKEN_OUT**2 * needed
+
+
+def _change(
+    robot: Robot, seen: Seen, mending: Mending, measured: list[int], telling: list[int]
+) -> Step | None:
+    """The change of order, of a sign or of a sensor's axes that explains most of what is off."""
+    rows = misfit(robot, seen.windows, telling)
     outside = {p[0] for p in seen.table.outside_limits(robot)}
     if max(rows, default=0.0) < OFF and not outside:
         return None
@@ -131,10 +156,22 @@ def _torques(robot: Robot, seen: Seen, mending: Mending) -> Step | None:
         steps.append(replace(wrenches, left=left))
     steps += _weightless(robot, before, telling, mending)
     steps += _positions(robot, seen, mending, telling)
-    best = min(steps, key=lambda step: step.left, default=None)
-    if best is None or best.left > min(BETTER * now, now - CLEARLY):
+    steps = sorted((step for step in steps if _mends(step.left, now)), key=lambda step: step.left)
+    if not steps:
         return None
-    return None if _weights_do(robot, seen, mending, telling, best.left) else best
+    # Would a missing body, a surplus one or a tilted base leave no more than the best change?
+    weights = _left_beside_weights(robot, seen, mending, telling)
+    if weights > steps[0].left:
+        return steps[0]
+    for step in steps[:MOST_BESIDE]:
+        if _mends(_left_beside_weights(robot, seen, step.mending, telling), weights):
+            return step
+    return None
+
+
+def _mends(left: float, now: float) -> bool:
+    """Does a change leave so much less that it explains something?"""
+    return left <= min(BETTER * now, now - CLEARLY)
 
 
 def misfit(robot: Robot, windows: Windows, measured: list[int]) -> list[float]:
@@ -316,14 +353,12 @@ def _joints(robot: Robot, seen: Seen, mending: Mending, telling: list[int]) -> S
     return best if best.left < min(others) else None
 
 
-def _weights_do(
-    robot: Robot, seen: Seen, mending: Mending, measured: list[int], left: float
-) -> bool:
-    """Would a missing body, a surplus one or a tilted base leave no more than a change of sign?"""
+def _left_beside_weights(robot: Robot, seen: Seen, mending: Mending, measured: list[int]) -> float:
+    """What is off once weights are explained; infinite where nothing explains them."""
     mended = explain_weights(robot, mending.apply(seen.first), Findings())
     if mended is robot:
-        return False
-    return total_misfit(robot, windows_of(mended, seen, mending), measured) < left
+        return np.inf
+    return total_misfit(robot, windows_of(mended, seen, mending), measured)
 
 
 def _wrenches(robot: Robot, seen: Seen, mending: Mending) -> Step | None:
