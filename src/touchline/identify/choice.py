@@ -19,7 +19,8 @@ from touchline.identify.fit import (
     column_of,
     main_links,
 )
-from touchline.identify.payload import SETTLED, guess_payload, seen_leaves
+from touchline.identify.payload import SETTLED, SIGMA, guess_payload, seen_leaves
+from touchline.identify.regressor import PARAMETERS
 from touchline.identify.touches import usual_scatter
 
 FOLDS = 5  # parts of each recording, one after the other
@@ -171,8 +172,25 @@ class Chooser:
         return self._equations(problem, self.use if use is None else use).solve()
 
     def with_errors(self, found: Solution) -> Solution:
-        """The solution with standard errors."""
+        """The solution with standard errors.
+
+        Those of a payload count that links may be off, although it was settled beside links as
+        modelled: without a sensor near it, a payload is known no better than the links are.
+        """
         left = self.start + applied(self.evidence, found)
+        told, bodies = self._errors(found, left), found.problem.bodies
+        loads = tuple(replace(body, sigma=SIGMA) for body in bodies if body.added)
+        if not loads:
+            return told
+        links = bodies[len(loads) :] or self._bodies(SIGMAS[0])
+        steps = np.zeros((len(loads) + len(links), PARAMETERS))
+        steps[: len(bodies)] = found.steps
+        beside = Solution(Problem(found.problem.columns, loads + links), found.values, steps)
+        errors = told.body_errors.copy()
+        errors[: len(loads)] = self._errors(beside, left).body_errors[: len(loads)]
+        return replace(told, body_errors=errors)
+
+    def _errors(self, found: Solution, left: Array) -> Solution:
         equations = self._equations(found.problem, self.use)
         return equations.with_errors(found, left, self.weight, self.use, self.blocks)
 
