@@ -11,12 +11,12 @@ from touchline.errors import InputError
 from touchline.identify.choice import Chooser
 from touchline.identify.evidence import Evidence
 from touchline.identify.fit import Problem, Solution, applied
-from touchline.identify.touches import QUIET, find_touches, stretches
+from touchline.identify.touches import find_touches, stretches
 
 LEAST_SECONDS = 2.0  # of settled, untouched data; less tells an offset at best
 HELD_OUT = 3  # every third recording, or the last third of each
 WORSE = 1.01  # a row that is left larger than this on data held out keeps what is described
-MOST_TOUCHED = 0.7  # of the time; beyond it whatever stands out is no touch
+MOST_TOUCHED = 0.7  # of the time; beyond it nobody can say which state is the usual one
 ROUNDS = 3  # of fitting and finding touches
 
 
@@ -83,7 +83,7 @@ def identify(evidence: Evidence, trust: bool = False) -> Identification:
             "a minute of motion of all joints is better"
         )
     touched = np.zeros(len(evidence), dtype=bool) if trust else touched_instants(evidence)
-    if touched.mean() > 1.0 - QUIET:  # too little is left to tell which state is the usual one
+    if touched.mean() > MOST_TOUCHED:
         raise InputError(
             f"something seems to touch the robot for {100 * touched.mean():.0f} % of the time: "
             "record a minute in which nothing touches it"

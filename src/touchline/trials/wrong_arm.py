@@ -51,7 +51,7 @@ def make_wrong_arm(robot: Robot, kind: str, rng: np.random.Generator) -> WrongAr
     """An arm with a payload that its model lacks, and one thing more."""
     description, k = robot.description, len(robot.sensor_names)
     mechanism = perturbed(robot.mechanism, UNKNOWN, rng)
-    node, link = _flange(robot)
+    node, link = flange(robot)
     mass = float(rng.uniform(*MASS))
     centre = robot.mechanism.links[link].inertia.com + _direction(rng) * rng.uniform(0.0, REACH)
     body = Inertia(mass, centre, mass * 0.04**2 * np.eye(3))
@@ -80,7 +80,7 @@ def make_wrong_arm(robot: Robot, kind: str, rng: np.random.Generator) -> WrongAr
     return WrongArm(robot, Robot(description, mechanism), node, bias, friction, late, turned)
 
 
-def _flange(robot: Robot) -> tuple[int, str]:
+def flange(robot: Robot) -> tuple[int, str]:
     """The node at the end of the arm that the most joints move, and its heaviest link."""
     moved = []
     for i, node in enumerate(robot.nodes):

@@ -18,6 +18,7 @@ from scipy.signal import butter, sosfiltfilt
 from tqdm import tqdm
 
 from touchline.arrays import Array
+from touchline.bench.identify.pushes import Detected, judged
 from touchline.bench.tables import Row, aligned
 from touchline.calibrate.plan import Plan, make_plan
 from touchline.calibrate.run import Calibration, calibrate
@@ -34,6 +35,7 @@ from touchline.trials.wrong_arm import KINDS, WrongArm, make_wrong_arm, record
 NOISE = 1  # tier of the localization benchmark: 0.05 N, 0.01 Nm, 0.05 Nm
 RATE = 200.0  # Hz
 OTHERS, SECONDS = 3, 30.0  # recordings of other motion that judge the wrench, and their length [s]
+FORCE = 10.0  # N, of pushes that are computed into one recording of other motion
 CUT = 2.0  # Hz; what is slower than that is the model's part of an error
 GOALS = {  # unit and what is required
     "force": ("N", 0.3),
@@ -73,8 +75,16 @@ class Figure:
     told: bool = True
 
 
-def judge(case: WrongArm, plan: Plan, rng: np.random.Generator, folder: Path) -> dict[str, Figure]:
-    """Errors of what `calibrate` wrote."""
+@dataclass(frozen=True)
+class Judgement:
+    """Of an arm: errors of what `calibrate` wrote, and what is felt without it and with it."""
+
+    figures: dict[str, Figure]
+    felt: dict[str, Detected]
+
+
+def judge(case: WrongArm, plan: Plan, rng: np.random.Generator, folder: Path) -> Judgement:
+    """Calibrates an arm, and judges what was written."""
     log, out = folder / "log.parquet", folder / "robot.yaml"
     samples = record(case, planned(plan), float(plan.time[-1]), RATE, rng)
     write_table(log, samples, case.robot.description)
@@ -106,7 +116,11 @@ def judge(case: WrongArm, plan: Plan, rng: np.random.Generator, folder: Path) ->
         delay = _delay(found.description.joints, found.description.sensors, name)
         errors["delay"] = 1e3 * abs(delay - late)
         told["delay"] = delay != 0.0
-    return {name: Figure(error, told.get(name, True)) for name, error in errors.items()}
+    figures = {name: Figure(error, told.get(name, True)) for name, error in errors.items()}
+    other = record(case, random_trajectory(case.robot, rng), SECONDS, RATE, rng)
+    kinds = {"before": case.robot, "after": found}
+    felt = {name: judged(case.real, kind, other, FORCE, 1) for name, kind in kinds.items()}
+    return Judgement(figures, felt)
 
 
 def _bias_error(case: WrongArm, bias: Array, result: Calibration) -> float:
@@ -171,28 +185,38 @@ def _noiseless(robot: Robot) -> Robot:
 def main(arms: Sequence[str], runs: int, seed: int) -> int:
     """Prints by arm how far off what was found is; 1 where a figure is missed."""
     lines: list[Row] = [("arm", "figure", "goal", "cases", "told", "median", "worst", "within")]
+    pushes: list[Row] = [("arm", "", "pushes found", "false events", "in contact untouched")]
     missed = False
     progress = tqdm(total=len(arms) * len(KINDS) * runs, file=sys.stderr, leave=False, disable=None)
     for arm in arms:
         robot = load_arm(arm, NOISE)
         plan = make_plan(robot)
         figures: dict[str, list[Figure]] = {name: [] for name in GOALS}
+        felt: dict[str, list[Detected]] = {"before": [], "after": []}
         for i, kind in enumerate(KINDS):
             for run in range(runs):
                 rng = np.random.default_rng((seed, i, run))
                 with TemporaryDirectory() as folder:
                     case = make_wrong_arm(robot, kind, rng)
-                    for name, figure in judge(case, plan, rng, Path(folder)).items():
-                        figures[name].append(figure)
+                    judgement = judge(case, plan, rng, Path(folder))
+                for name, figure in judgement.figures.items():
+                    figures[name].append(figure)
+                for name, one in judgement.felt.items():
+                    felt[name].append(one)
                 progress.update()
         for name, found in figures.items():
             if found:
                 lines.append((arm, name, *_row(name, found)))
                 missed |= any(figure.error > GOALS[name][1] for figure in found)
+        for name, of in felt.items():
+            pushes.append((arm, name, *_felt_row(of)))
+        missed |= _found(felt["after"]) < _found(felt["before"])
     progress.close()
     print(f"What calibrate finds after its planned motion, {runs} arms of each kind:")
     print(aligned(lines, (0, 1)))
     print("told: calibrate claims to know it. Biases that it calls mass or bias are left out.")
+    print(f"\nPushes of {FORCE:g} N, computed into other motion of these arms:")
+    print(aligned(pushes, (0, 1)))
     return int(missed)
 
 
@@ -202,3 +226,13 @@ def _row(name: str, found: Sequence[Figure]) -> tuple[str, ...]:
     within, told = int((values <= goal).sum()), sum(figure.told for figure in found)
     middle, worst = f"{np.median(values):.2g}", f"{values.max():.2g}"
     return f"{goal:g} {unit}", str(len(values)), str(told), middle, worst, str(within)
+
+
+def _found(felt: Sequence[Detected]) -> int:
+    return sum(one.found for one in felt)
+
+
+def _felt_row(felt: Sequence[Detected]) -> tuple[str, ...]:
+    pushes, false = sum(one.pushes for one in felt), sum(one.false for one in felt)
+    share = float(np.mean([one.share for one in felt]))
+    return f"{_found(felt)} of {pushes}", str(false), f"{100 * share:.1f} %"
