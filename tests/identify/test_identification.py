@@ -140,15 +140,6 @@ def test_a_bias_of_a_sensor_is_found_while_the_arm_moves():
     np.testing.assert_allclose(sensor.bias, bias, atol=0.1)
 
 
-def test_too_little_that_is_untouched_is_refused(monkeypatch):
-    robot = arm()
-    evidence = gather(robot, [[recorded(robot)]])
-    touched = np.arange(len(evidence)) < 0.65 * len(evidence)
-    monkeypatch.setattr("touchline.identify.identification.touched_instants", lambda _: touched)
-    with pytest.raises(tl.InputError, match="65 % of the time: record a minute in which nothing"):
-        identify(evidence)
-
-
 def test_touches_are_left_out():
     robot = arm()
     s = recorded(robot)
