@@ -72,8 +72,13 @@ def _read(robot: Robot, log: Path) -> Samples:
     """A whole log."""
     with open_log(log, robot.description) as recording:
         chunks = list(recording.chunks(1 << 15))
-    names = ("time", "q", "qd", "tau", "wrench")
-    return Samples(*(np.concatenate([getattr(c, name) for c in chunks]) for name in names))
+    return Samples(
+        np.concatenate([c.time for c in chunks]),
+        np.concatenate([c.q for c in chunks]),
+        np.concatenate([c.qd for c in chunks]),
+        np.concatenate([c.tau for c in chunks]),
+        np.concatenate([c.wrench for c in chunks]),
+    )
 
 
 def judged(
