@@ -92,7 +92,7 @@ class PairParts {
   // So near to a part, in parts of what they are apart, a walk need not go: what else goes with it is
   // met by way of its other end.
   static constexpr double kBeside = 0.83;
-  static constexpr double kReach = 0.03;
+  static constexpr double kReach = 0.03;  // around each part there may be more, at least so far [m]
   static constexpr double kWider = 1.5;  // each time there are too many parts
   static constexpr double kWide = 1.5;   // times what parts are apart: between them there are more
 
