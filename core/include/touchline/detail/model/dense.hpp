@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "touchline/detail/model/lanes.hpp"
+
 namespace touchline {
 
 // The lower Cholesky factor in place of the lower triangle of a (n, n) matrix; false if it is not
@@ -32,6 +34,24 @@ inline void solve_lower(const double* l, int n, double* x, int stride = 1) {
     double s = x[i * stride];
     for (int k = 0; k < i; ++k) s -= l[i * n + k] * x[k * stride];
     x[i * stride] = s / l[i * n + i];
+  }
+}
+
+// The same for `width` right sides that stand side by side, x[i * width] to x[i * width + width - 1],
+// whole registers of them: in each the operations of one alone, so that the last bits are the same.
+template <int width>
+inline void solve_lower_rows(const double* l, int n, double* x) {
+  constexpr int kCount = width / kLanes;  // registers of a row
+  for (int i = 0; i < n; ++i) {
+    double* own = x + i * width;
+    Lanes s[kCount];
+    for (int c = 0; c < kCount; ++c) s[c] = load_lanes(own + c * kLanes);
+    for (int k = 0; k < i; ++k) {
+      const Lanes factor = all_lanes(l[i * n + k]);
+      for (int c = 0; c < kCount; ++c) s[c] -= factor * load_lanes(x + k * width + c * kLanes);
+    }
+    const Lanes diagonal = all_lanes(l[i * n + i]);
+    for (int c = 0; c < kCount; ++c) store_lanes(s[c] / diagonal, own + c * kLanes);
   }
 }
 

@@ -42,8 +42,8 @@ class Measurement {
     covariance_.resize(size * size);
     lasting_covariance_.resize(size * size);
     factor_.resize(size * size);
-    design_.resize(size * 7);
-    column_.resize(size * 2);
+    design_.resize(size * kWide);
+    columns_.resize(size * kWide * 2);
   }
 
   // Of the sample: its configuration; `qd` may be null. `drift`: what the model's errors may have
@@ -209,17 +209,18 @@ class Measurement {
   // What all rows say of one contact on the body of `node`.
   Quadratic quadratic(int node) {
     const double* d = design(node);
+    Lanes sums[6][kRegisters] = {};
     Quadratic result{};
     for (int i = 0; i < size_; ++i) {
-      const double* line = d + 7 * i;
-      for (int a = 0; a < 6; ++a) {
-        for (int b = 0; b <= a; ++b) result.information[6 * a + b] += line[a] * line[b];
-        result.vector[a] += line[a] * line[6];
-      }
+      const double* line = d + kWide * i;
+      add_products(line, line, sums);
       result.constant += line[6] * line[6];
     }
     for (int a = 0; a < 6; ++a) {
-      for (int b = a + 1; b < 6; ++b) result.information[6 * a + b] = result.information[6 * b + a];
+      double row[kWide];
+      for (int c = 0; c < kRegisters; ++c) store_lanes(sums[a][c], row + c * kLanes);
+      std::copy_n(row, 6, result.information + 6 * a);
+      result.vector[a] = row[6];
     }
     return result;
   }
@@ -229,47 +230,65 @@ class Measurement {
   void lasting_information(int node, double* out) {
     const double* d = design(node);
     const double *F = factor_.data(), *L = lasting_covariance_.data();
-    double* x = column_.data();
-    std::fill(out, out + 36, 0.0);
-    double* y = x + size_;
-    for (int a = 0; a < 6; ++a) {  // L S^-1 D, column by column
-      for (int i = size_ - 1; i >= 0; --i) {
-        double sum = d[7 * i + a];
-        for (int k = i + 1; k < size_; ++k) sum -= F[k * size_ + i] * x[k];
-        x[i] = sum / F[i * size_ + i];
+    double *x = columns_.data(), *y = x + size_ * kWide;  // S^-1 D and L S^-1 D
+    for (int i = size_ - 1; i >= 0; --i) {
+      for (int c = 0; c < kWide; c += kLanes) {
+        Lanes sum = load_lanes(d + kWide * i + c);
+        for (int k = i + 1; k < size_; ++k)
+          sum -= all_lanes(F[k * size_ + i]) * load_lanes(x + kWide * k + c);
+        store_lanes(sum / all_lanes(F[i * size_ + i]), x + kWide * i + c);
       }
-      for (int i = 0; i < size_; ++i) {
-        y[i] = 0.0;
+    }
+    for (int i = 0; i < size_; ++i) {
+      for (int c = 0; c < kWide; c += kLanes) {
+        Lanes sum = all_lanes(0.0);
         for (int k = 0; k < size_; ++k)
-          y[i] += L[std::max(i, k) * size_ + std::min(i, k)] * x[k];
+          sum += all_lanes(L[std::max(i, k) * size_ + std::min(i, k)]) * load_lanes(x + kWide * k + c);
+        store_lanes(sum, y + kWide * i + c);
       }
-      solve_lower(F, size_, y);
-      for (int i = 0; i < size_; ++i) {
-        for (int b = 0; b < 6; ++b) out[6 * b + a] += d[7 * i + b] * y[i];
-      }
+    }
+    solve_lower_rows<kWide>(F, size_, y);
+    Lanes sums[6][kRegisters] = {};
+    for (int i = 0; i < size_; ++i) add_products(d + kWide * i, y + kWide * i, sums);
+    for (int b = 0; b < 6; ++b) {
+      double row[kWide];
+      for (int c = 0; c < kRegisters; ++c) store_lanes(sums[b][c], row + c * kLanes);
+      std::copy_n(row, 6, out + 6 * b);
     }
   }
 
  private:
-  // What a wrench on the body of `node` does to all rows, and what they read: rows of seven, to the
-  // scale of the noise.
+  // Numbers of a row of the design: six of a unit wrench, what is read, and one that makes them whole
+  // registers.
+  static constexpr int kWide = 8, kRegisters = kWide / kLanes;
+
+  // Adds each of the first six numbers of one row times all of another.
+  static void add_products(const double* one, const double* other, Lanes (&sums)[6][kRegisters]) {
+    for (int c = 0; c < kRegisters; ++c) {
+      const Lanes part = load_lanes(other + c * kLanes);
+      for (int a = 0; a < 6; ++a) sums[a][c] += all_lanes(one[a]) * part;
+    }
+  }
+
+  // What a wrench on the body of `node` does to all rows, and what they read, to the scale of the noise.
   const double* design(int node) {
     const int first = has_wrench_ ? 6 : 0;
     double* d = design_.data();
     for (int i = 0; i < first; ++i) {
-      for (int k = 0; k < 6; ++k) d[7 * i + k] = i == k ? 1.0 : 0.0;
-      d[7 * i + 6] = wrench_[i];
+      for (int k = 0; k < kWide; ++k) d[kWide * i + k] = i == k ? 1.0 : 0.0;
+      d[kWide * i + 6] = wrench_[i];
     }
     for (int i = 0; i < count_; ++i) {
-      double* line = d + 7 * (first + i);
+      double* line = d + kWide * (first + i);
       const bool loaded = rows_.subspace(*used_[i], node, line);
       line[6] = own_[i];
+      line[7] = 0.0;
       if (loaded && has_wrench_ && std::isfinite(outboard_[i])) {
         line[6] = outboard_[i];
         for (int k = 0; k < 6; ++k) line[6] += line[k] * raw_wrench_[k];
       }
     }
-    for (int k = 0; k < 7; ++k) solve_lower(factor_.data(), size_, d + k, 7);
+    solve_lower_rows<kWide>(factor_.data(), size_, d);
     return d;
   }
 
@@ -418,7 +437,7 @@ class Measurement {
   std::vector<const SegmentRow*> used_;
   std::vector<double> own_;       // if the contact is inboard of the joint
   std::vector<double> outboard_;  // if it is outboard, less what the wrench says
-  std::vector<double> covariance_, lasting_covariance_, factor_, design_, column_;
+  std::vector<double> covariance_, lasting_covariance_, factor_, design_, columns_;
 };
 
 }  // namespace touchline
