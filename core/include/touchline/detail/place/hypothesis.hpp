@@ -40,12 +40,7 @@ inline void tangents(const Vec3& n, Vec3& s, Vec3& t) {
 class ForceFitter {
  public:
   explicit ForceFitter(const PlaceSettings& settings)
-      : settings_(settings), cone_(std::atan(settings.friction)) {
-    for (int i = 0; i < kDirections; ++i) {
-      const double angle = kTurn * i / kDirections;
-      directions_[i] = {angle, std::cos(angle), std::sin(angle)};
-    }
-  }
+      : settings_(settings), cone_(std::atan(settings.friction)), turns_(turns()) {}
 
   // The force at `point` that explains best, in the friction cone of the outward `normal`, or, if
   // it may be `grasped`, in any direction. Beyond a chi2 of `limit` nothing is worked out, nor where
@@ -215,9 +210,35 @@ class ForceFitter {
   }
 
  private:
-  static constexpr int kDirections = 8;  // around the cone, from which halved steps go on
-  static constexpr double kFinestTurn = 0.05;  // [rad] of them
-  static constexpr double kTurn = 6.283185307179586;
+  // Directions around the cone, and those that lie half a step, a quarter and an eighth to either
+  // side of one: all that a force on its edge is looked for at.
+  struct Turns {
+    static constexpr int kFirst = 8, kHalvings = 3, kEach = 3;  // itself, before it, behind it
+    static constexpr int kAll = kFirst * (1 + kEach + kEach * kEach + kEach * kEach * kEach);
+
+    Turns() {
+      double angle[kAll], step = 0.5 * kTurn / kFirst;
+      for (int i = 0; i < kFirst; ++i) angle[i] = kTurn * i / kFirst;
+      for (int begin = 0, end = kFirst, made = kFirst; end < kAll; begin = end, end = made, step *= 0.5) {
+        for (int i = begin; i < end; ++i, made += kEach) {
+          halved[i] = made;
+          angle[made] = angle[i];
+          angle[made + 1] = angle[i] - step;
+          angle[made + 2] = angle[i] + step;
+        }
+      }
+      for (int i = 0; i < kAll; ++i) cosine[i] = std::cos(angle[i]), sine[i] = std::sin(angle[i]);
+    }
+
+    double cosine[kAll], sine[kAll];
+    int halved[kAll];  // where the three of it stand at the next half step
+
+    static constexpr double kTurn = 6.283185307179586;  // [rad]
+  };
+  static const Turns& turns() {
+    static const Turns all;
+    return all;
+  }
 
   double size_cost(double size) const {
     return size * size / (settings_.force_scale * settings_.force_scale);
@@ -225,24 +246,34 @@ class ForceFitter {
 
   static Vec3 unit(int i) { return {i == 0 ? 1.0 : 0.0, i == 1 ? 1.0 : 0.0, i == 2 ? 1.0 : 0.0}; }
 
+  // The moment (rows 3 to 5 of a wrench) that a unit force along axis c makes at `p`.
+  struct Lever {
+    int first, second;
+    double less, more;
+  };
+  static Lever lever(const double* p, int c) {
+    return c == 0 ? Lever{4, 5, p[2], -p[1]} : c == 1 ? Lever{3, 5, -p[2], p[0]}
+                                                      : Lever{3, 4, p[1], -p[0]};
+  }
+
   // chi2(f) = constant - 2 g . f + f^T A f for a force at `point`, plus the force's prior.
   void reduce(const Quadratic& q, const Vec3& point, double* A, double* g) const {
-    double J[3][6], LJ[3][6];
+    // Of the six numbers that a unit force along axis c makes, three are not zero: the force itself,
+    // and its moment about the two other axes.
+    const double p[3] = {point.x, point.y, point.z};
+    double LJ[3][6];
     for (int c = 0; c < 3; ++c) {
-      wrench_of(point, unit(c), J[c]);
-      g[c] = 0.0;
+      const Lever l = lever(p, c);
+      g[c] = q.vector[c] + l.less * q.vector[l.first] + l.more * q.vector[l.second];
       for (int r = 0; r < 6; ++r) {
-        g[c] += J[c][r] * q.vector[r];
-        LJ[c][r] = 0.0;
-        for (int k = 0; k < 6; ++k) LJ[c][r] += q.information[6 * r + k] * J[c][k];
+        const double* row = q.information + 6 * r;
+        LJ[c][r] = row[c] + l.less * row[l.first] + l.more * row[l.second];
       }
     }
     for (int a = 0; a < 3; ++a) {
-      for (int b = 0; b < 3; ++b) {
-        double sum = 0.0;
-        for (int r = 0; r < 6; ++r) sum += J[a][r] * LJ[b][r];
-        A[3 * a + b] = sum;
-      }
+      const Lever l = lever(p, a);
+      for (int b = 0; b < 3; ++b)
+        A[3 * a + b] = LJ[b][a] + l.less * LJ[b][l.first] + l.more * LJ[b][l.second];
       A[4 * a] += 1.0 / (settings_.force_scale * settings_.force_scale);
     }
   }
@@ -261,10 +292,11 @@ class ForceFitter {
               const double* g) const {
     Vec3 s, t;
     tangents(normal, s, t);
-    double best = 0.0, at = 0.0;
+    double best = 0.0;
+    int at = 0;
     Vec3 force;
-    const auto offer = [&](double angle, double cosine, double sine) {
-      const Vec3 u = settings_.friction * (cosine * s + sine * t) - normal;
+    const auto offer = [&](int direction) {
+      const Vec3 u = settings_.friction * (turns_.cosine[direction] * s + turns_.sine[direction] * t) - normal;
       const double x[3] = {u.x, u.y, u.z};
       double along = 0.0, curve = 0.0;
       for (int i = 0; i < 3; ++i) {
@@ -273,14 +305,14 @@ class ForceFitter {
       }
       if (along <= 0.0 || along * along / curve <= best) return;
       best = along * along / curve;
-      at = angle;
+      at = direction;
       force = (along / curve) * u;
     };
-    for (const Direction& d : directions_) offer(d.angle, d.cosine, d.sine);
-    for (double step = 0.5 * kTurn / kDirections; step > kFinestTurn; step *= 0.5) {
-      const double middle = at;
-      offer(middle - step, std::cos(middle - step), std::sin(middle - step));
-      offer(middle + step, std::cos(middle + step), std::sin(middle + step));
+    for (int i = 0; i < Turns::kFirst; ++i) offer(i);
+    for (int halving = 0; halving < Turns::kHalvings; ++halving) {
+      const int less = at = turns_.halved[at];
+      offer(less + 1);
+      offer(less + 2);
     }
     Fit fit;
     fit.force = force;
@@ -289,13 +321,9 @@ class ForceFitter {
     return fit;
   }
 
-  struct Direction {
-    double angle, cosine, sine;  // [rad]
-  };
-
   const PlaceSettings& settings_;
   double cone_;
-  Direction directions_[kDirections];  // around the edge of the cone, tried first
+  const Turns& turns_;
 };
 
 }  // namespace touchline

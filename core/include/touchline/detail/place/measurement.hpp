@@ -343,7 +343,7 @@ class Measurement {
 
   // The covariance of all rows by white noise, and its Cholesky factor.
   bool weigh() {
-    noise_.clear();
+    noise_.clear(size_);
     const int first = has_wrench_ ? 6 : 0;
     if (has_wrench_) noise_.add_wrench(0, observer_.layout().segments[segment_]);
     for (int i = 0; i < count_; ++i) {

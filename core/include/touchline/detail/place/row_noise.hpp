@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "touchline/detail/detector/noise_figures.hpp"
-#include "touchline/detail/model/dense.hpp"
+#include "touchline/detail/model/lanes.hpp"
 #include "touchline/detail/model/posture.hpp"
 #include "touchline/detail/observer/observer.hpp"
 
@@ -25,9 +25,14 @@ class RowNoise {
         sensors_(observer.row_layout().sensors),
         joints_(observer.row_layout().joints),
         sources_(6 * sensors_ + 2 * joints_),
-        coefficients_(rows * sources_) {}
+        room_((static_cast<int>(rows) + kLanes - 1) / kLanes * kLanes),
+        coefficients_(room_ * sources_) {}
 
-  void clear() { std::fill(coefficients_.begin(), coefficients_.end(), 0.0); }
+  // Of so many rows, all that the methods below add to them begins anew.
+  void clear(int rows) {
+    width_ = (rows + kLanes - 1) / kLanes * kLanes;
+    std::fill_n(coefficients_.begin(), width_ * sources_, 0.0);
+  }
 
   // Rows `at` to `at + 5`: the wrench of a segment [world].
   void add_wrench(int at, const Segment& segment) {
@@ -38,27 +43,25 @@ class RowNoise {
 
   // A row that is one axis of a sensor.
   void add_axis(int at, int sensor, int axis) {
-    double* out = row(at);
     const Gains g = gains(observer_.sensors()[sensor].bandwidth);
-    out[6 * sensor + axis] = g.reading * figures_.wrench[6 * sensor + axis];
+    of(at, 6 * sensor + axis) = g.reading * figures_.wrench[6 * sensor + axis];
     const int node = observer_.sensors()[sensor].node;
-    add_velocity(posture_.axis(node, axis), node, g.velocity, out);
+    add_velocity(at, posture_.axis(node, axis), node, g.velocity);
   }
 
   // A row that is a joint's torque, less what the sensors outboard of it say.
   void add_joint(int at, int j) {
-    double* out = row(at);
     const JointRow& joint = observer_.joints()[j];
     const Gains g = gains(joint.bandwidth);
-    out[6 * sensors_ + j] = g.reading * figures_.tau[j];
-    for (int node : joint.nodes) add_velocity(posture_.subspace(node), node, g.velocity, out);
+    of(at, 6 * sensors_ + j) = g.reading * figures_.tau[j];
+    for (int node : joint.nodes) add_velocity(at, posture_.subspace(node), node, g.velocity);
     for (const Projection& pair : observer_.layout().outboard_sensors[j]) {
       const Spatial& s = posture_.subspace(observer_.layout().lines[pair.line]);
       const int node = observer_.sensors()[pair.sensor].node;
       for (int a = 0; a < 6; ++a)
-        out[6 * pair.sensor + a] -=
+        of(at, 6 * pair.sensor + a) -=
             g.reading * figures_.wrench[6 * pair.sensor + a] * dot(s, unit_wrench(node, a));
-      add_velocity(s, node, -g.velocity, out);
+      add_velocity(at, s, node, -g.velocity);
     }
   }
 
@@ -67,12 +70,12 @@ class RowNoise {
   // joint turns at 1 rad/s, 7e-4 N at 3 rad/s. Where all swing at 2 Hz it is more (4e-3 N and Nm).
   void covariance(int size, int forces, double* out) const {
     for (int a = 0; a < size; ++a) {
-      for (int b = 0; b <= a; ++b) {
-        const double* x = coefficients_.data() + a * sources_;
-        const double* y = coefficients_.data() + b * sources_;
-        double sum = 0.0;
-        for (int k = 0; k < sources_; ++k) sum += x[k] * y[k];
-        out[a * size + b] = sum;
+      for (int b = 0; b <= a; b += kLanes) {
+        const double* of_source = coefficients_.data();
+        Lanes sum = all_lanes(0.0);
+        for (int k = 0; k < sources_; ++k, of_source += width_)
+          sum += all_lanes(of_source[a]) * load_lanes(of_source + b);
+        for (int c = 0; c < kLanes && b + c <= a; ++c) out[a * size + b + c] = lane(sum, c);
       }
       const double least = a < forces ? figures_.force : figures_.moment;
       out[a * size + a] += least * least;
@@ -104,14 +107,13 @@ class RowNoise {
   void add_column(int at, int source, const Spatial& w, double scale) {
     double values[6];
     store(w, values);
-    for (int i = 0; i < 6; ++i) row(at + i)[source] += scale * values[i];
+    for (int i = 0; i < 6; ++i) of(at + i, source) += scale * values[i];
   }
 
   // What the noise of velocities does to the momentum of a node along a twist.
-  void add_velocity(const Spatial& along, int node, double gain, double* out) const {
-    double* to = out + 6 * sensors_ + joints_;
+  void add_velocity(int at, const Spatial& along, int node, double gain) {
     for (int c = 0; c < joints_; ++c)
-      to[c] += gain * figures_.qd[c] * dot(along, posture_.momentum(node, c));
+      of(at, 6 * sensors_ + joints_ + c) += gain * figures_.qd[c] * dot(along, posture_.momentum(node, c));
   }
 
   Spatial unit_wrench(int node, int axis) const {
@@ -120,13 +122,14 @@ class RowNoise {
     return wrench_to_parent(posture_.pose(node), {{w[0], w[1], w[2]}, {w[3], w[4], w[5]}});
   }
 
-  double* row(int at) { return coefficients_.data() + at * sources_; }
+  double& of(int row, int source) { return coefficients_[source * width_ + row]; }
 
   const Observer& observer_;
   const Posture& posture_;
   NoiseFigures figures_;
   int sensors_, joints_, sources_;
-  std::vector<double> coefficients_;  // rows by sources
+  int room_, width_ = 0;  // for rows, and those in use: whole registers
+  std::vector<double> coefficients_;  // sources by rows
 };
 
 }  // namespace touchline
