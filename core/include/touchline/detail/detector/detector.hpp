@@ -105,14 +105,17 @@ class Detector {
       Segment& s = segments_[g];
       s.peak = s.slow = s.sum = s.collision = s.borne = s.borne_sum = s.borne_collision = 0.0;
       if (known(g)) s.age += dt;
-      for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) test_row(i);
+      for (std::size_t i = first_[g], end = first_[g + 1]; i < end; ++i) test_row(i, s);
       judge(g, dt);
       decide(g, dt);
     }
     offset_ = false;
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-      follow_offset(i, dt);
-      offset_ = offset_ || stands_off(i) || warmed(i);
+    for (std::size_t g = 0; g < segments_.size(); ++g) {
+      const Following following = following_of(g, dt);
+      for (std::size_t i = first_[g], end = first_[g + 1]; i < end; ++i) {
+        follow_offset(i, following, dt);
+        offset_ = offset_ || stands_off(i) || warmed(i);
+      }
     }
     if (dt > 0.0) {
       meters_.add(residuals_, known_, counts_, dt, tuning_);
@@ -220,6 +223,7 @@ class Detector {
     bool in_motion = false;  // did the present event begin while the arm moved?
     bool pending = false, pending_collision = false;
     bool off = false;  // has the arm shown that it is not as told?
+    bool learns = false;  // and moves: what is seen of its rows counts
   };
 
   void follow_motion(const double* q, const double* qd, double dt) {
@@ -263,31 +267,35 @@ class Detector {
   // The residuals and innovations of a segment's rows.
   void read_segment(std::size_t g) {
     const RowLayout& layout = observer_.row_layout();
+    const double *settled = row_ + layout.joint_settled(), *torque = row_ + layout.segment_torque(),
+                 *joint_gap = row_ + layout.joint_gap_std(),
+                 *gap = row_ + layout.segment_gap_std() + 2 * g;
     double wrench[6], load[6] = {};  // innovations that no test asks for
-    bool known = false;
-    segments_[g].off = false;
-    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+    bool known = false, off = false;
+    for (std::size_t i = first_[g], end = first_[g + 1]; i < end; ++i) {
       const DetectionRow& row = rows_[i];
       RowSample& s = samples_[i];
       if (row.component < 0) {
-        s.known = row_[layout.joint_settled() + row.joint] > 0.0;
-        s.residual = row_[layout.segment_torque() + row.joint];
+        s.known = settled[row.joint] > 0.0;
+        s.residual = torque[row.joint];
         s.innovation = observer_.own_innovation(row.joint);
-        s.gap_std = row_[layout.joint_gap_std() + row.joint];
+        s.gap_std = joint_gap[row.joint];
       } else {
         if (i == first_[g]) known = read_wrench(g, wrench, load);
         s.known = known;
         s.residual = wrench[row.component];
         s.innovation = load[row.component];
-        s.gap_std = row_[layout.segment_gap_std() + 2 * g + (row.component < 3 ? 0 : 1)];
+        s.gap_std = gap[row.component < 3 ? 0 : 1];
       }
       s.known = s.known && std::isfinite(s.residual);
       residuals_[i] = s.residual;
       known_[i] = s.known ? 1.0 : 0.0;
-      segments_[g].off |= fires_[g] &&
-          (states_[i].shown > row.contact || meters_.contradicts(i, tuning_));
+      off = off || states_[i].shown > row.contact || meters_.contradicts(i, tuning_);
       if (!std::isfinite(s.innovation)) s.innovation = s.residual;  // samples were lost
     }
+    Segment& segment = segments_[g];
+    segment.off = off && fires_[g];
+    segment.learns = segment.off && still_ < tuning_.pause;
   }
 
   bool read_wrench(std::size_t g, double* wrench, double* innovation) const {
@@ -319,7 +327,7 @@ class Detector {
     return observer_.sensors()[observer_.layout().segments[row.segment].sensor].bandwidth;
   }
 
-  void test_row(std::size_t i) {
+  void test_row(std::size_t i, Segment& segment) {
     const DetectionRow& row = rows_[i];
     RowState& s = states_[i];
     RowSample& sample = samples_[i];
@@ -329,35 +337,37 @@ class Detector {
       s.baseline = s.anchor = s.origin = s.reference = s.trend = sample.residual;
       s.started = true;
     }
-    sample.offset = s.baseline;
+    const double baseline = s.baseline;
+    sample.offset = baseline;
     sample.reference = s.reference;
     sample.referred = s.referred;
-    limits_[i] = largest_noise(i) / row.contact;
-    normalized_[i] = (sample.residual - s.baseline) / row.contact;
-    const double x = normalized_[i] / limits_[i];
+    // What motion alone shows of it, as far as that counts.
+    const double spread = segment.learns && row.seen > 0.0 ? spreads_[i].limit(tuning_) : 0.0;
+    const double limit = limits_[i] = largest_noise(i, spread) / row.contact;
+    const double normalized = normalized_[i] = (sample.residual - baseline) / row.contact;
+    const double x = normalized / limit;
     const double share = shares_[i] = std::fabs(x);
-    Segment& segment = segments_[row.segment];
     segment.peak = std::max(segment.peak, share);
-    segment.slow = std::max(segment.slow, slow_share(i));
-    const double borne = (borne_out_.value(i) - s.baseline) / (row.contact * limits_[i]);
-    segment.borne = std::max(segment.borne, std::fabs(borne));
-    if (!(learns(i) && spreads_[i].limit(tuning_) > row.contact)) {
+    if (still_ >= tuning_.pause) segment.slow = std::max(segment.slow, slow_share(i));
+    const double borne = (borne_out_.value(i) - baseline) / (row.contact * limit);
+    const double borne_share = std::fabs(borne);
+    segment.borne = std::max(segment.borne, borne_share);
+    if (!(spread > row.contact)) {
       segment.sum += x * x;
       segment.borne_sum += borne * borne;
     }
     const double least = collision_shares_[i];
     segment.collision = std::max(segment.collision, share * least);
-    segment.borne_collision = std::max(segment.borne_collision, std::fabs(borne) * least);
+    segment.borne_collision = std::max(segment.borne_collision, borne_share * least);
   }
 
   // What lasts of a row, in what the noise of its trend lets expect. Noise of velocities is nearly
-  // white in the residual and dies out in the trend, so that this finds weak loads that last. That
-  // holds for an arm that stands: of one that moves the model's errors are larger than noise.
+  // white in the residual and dies out in the trend, so that this finds weak loads that last. Of an
+  // arm that stands: of one that moves the model's errors are larger than noise.
   double slow_share(std::size_t i) const {
     const DetectionRow& row = rows_[i];
     const RowState& s = states_[i];
-    if (row.seen <= 0.0 || !fires_[row.segment] || still_ < tuning_.pause ||
-        samples_[i].gap_std > 0.0) return 0.0;
+    if (row.seen <= 0.0 || !fires_[row.segment] || samples_[i].gap_std > 0.0) return 0.0;
     const double now = samples_[i].residual - s.baseline, mean = s.trend - s.baseline;
     if (now * mean <= 0.0) return 0.0;
     const double limit = std::max(row.contact, trend_meters_.limit(i, row.seen,
@@ -368,7 +378,7 @@ class Detector {
   // What a row's load must exceed now [N or Nm]: the larger of its threshold and of what noise and
   // the model's errors bring. Noise is as told in this posture and as seen, errors as a calibration
   // has found them. It has met some postures and speeds; in others both are larger.
-  double largest_noise(std::size_t i) const {
+  double largest_noise(std::size_t i, double spread) const {
     const DetectionRow& row = rows_[i];
     double most = row.contact;
     if (row.seen > 0.0) {
@@ -377,14 +387,9 @@ class Detector {
       const double error = variance > 0.0 ? row.seen * std::sqrt(variance) : 0.0;
       most = std::max(most, error > 0.0 ? std::hypot(noise, error) : noise);
     }
-    if (learns(i)) most = std::max(most, spreads_[i].limit(tuning_));
+    most = std::max(most, spread);
     const double gap = samples_[i].gap_std;
     return gap > 0.0 ? std::hypot(most, tuning_.gap_sigmas * gap) : most;
-  }
-
-  // Does what is seen of a row in motion count: is the arm not as told, and moves?
-  bool learns(std::size_t i) const {
-    return rows_[i].seen > 0.0 && segments_[rows_[i].segment].off && still_ < tuning_.pause;
   }
 
   // May offsets be followed: is nothing felt, or only by what has been an offset since?
@@ -617,45 +622,49 @@ class Detector {
     return std::fabs(states_[i].anchor - states_[i].origin) > rows_[i].contact;
   }
 
-  void follow_offset(std::size_t i, double dt) {
+  // How the offsets of a segment's rows are followed in a sample.
+  struct Following {
+    bool adapts, felt, stopped;
+    bool learns;  // of motion
+  };
+  Following following_of(std::size_t g, double dt) const {
+    const bool felt = levels_[g] > 0;
+    return {adapts(g), felt, still_ >= tuning_.pause && still_ - dt < tuning_.pause,
+            segments_[g].learns && dt > 0.0 && (!felt || own_doing(g))};
+  }
+
+  void follow_offset(std::size_t i, const Following& how, double dt) {
     RowState& s = states_[i];
     const DetectionRow& row = rows_[i];
-    const double value = samples_[i].residual;
+    const double value = samples_[i].residual, bandwidth = bandwidths_[i];
     const bool resumed = samples_[i].known && !s.known;
     s.known = samples_[i].known;
     if (!s.known) return;
     if (resumed) s.trend = value;
-    s.trend += (value - s.trend) * std::min(1.0, dt * bandwidths_[i] * per_trend_);
+    s.trend += (value - s.trend) * std::min(1.0, dt * bandwidth * per_trend_);
     confirm_start(i, dt);
-    if (learns(i) && dt > 0.0) {
-      const bool touched = levels_[row.segment] > 0;
-      if (!touched ||
-          own_doing(row.segment)) spreads_[i].add(value - s.baseline, dt, touched, tuning_);
-    }
+    if (how.learns && row.seen > 0.0) spreads_[i].add(value - s.baseline, dt, how.felt, tuning_);
     // Running means first, low-passes once they have seen enough.
-    if (adapts(row.segment)) {
+    if (how.adapts) {
       s.referred = std::min(s.referred + dt, tuning_.reference);
       if (s.referred > 0.0) s.reference += (value - s.reference) * std::min(1.0, dt / s.referred);
     }
-    const bool stopped = still_ >= tuning_.pause && still_ - dt < tuning_.pause;
-    const bool felt = levels_[row.segment] > 0;
-    meter_noise(i, felt || segments_[row.segment].pending, dt);
-    if (felt) return;
-    if (stopped && segments_[row.segment].off && row.seen > 0.0) rest(i);
+    const Segment& segment = segments_[row.segment];
+    meter_noise(i, how.felt || segment.pending, dt);
+    if (how.felt) return;
+    if (how.stopped && segment.off && row.seen > 0.0) rest(i);
     // In the first moments what noise beyond the told one can bring is averaged, too: one sample of
     // it is no baseline.
-    const Segment& segment = segments_[row.segment];
-    const bool noise = first_looks_[i].ratio() > 1.0 && young(row.segment) &&
-        segment.score < tuning_.unseen;
-    if (segment.pending && !noise) return;
+    if (segment.pending && !(first_looks_[i].ratio() > 1.0 && young(row.segment) &&
+                             segment.score < tuning_.unseen)) return;
     quiet_[row.segment] = s.age += dt;
     const double tau = std::min(s.age, settings_.times.baseline);
     if (tau <= 0.0) return;
     const double next = s.baseline + (value - s.baseline) * std::min(1.0, dt / tau);
-    const double most = learns(i)
+    const double most = segment.learns && row.seen > 0.0
         ? std::max(row.baseline_limit, spreads_[i].limit(tuning_)) : row.baseline_limit;
     s.baseline = std::clamp(next, s.anchor - most, s.anchor + most);
-    if (s.age < tuning_.trend / bandwidths_[i]) {
+    if (s.age < tuning_.trend / bandwidth) {
       s.anchor = s.origin = s.baseline;
     } else {  // no hand rises as slowly as a sensor warms up
       const double farthest = tuning_.warming_most * row.contact;
@@ -672,8 +681,10 @@ class Detector {
     const double off = samples_[i].residual - s.trend,
         most = tuning_.fro * limits_[i] * rows_[i].contact;
     s.turns *= std::max(0.0, 1.0 - dt * bandwidths_[i] * per_fro_memory_);
-    if (off * s.side < -most) s.turns += 1.0;
-    if (std::fabs(off) > most) s.side = off > 0.0 ? 1.0 : -1.0;
+    if (std::fabs(off) > most) {
+      if (off * s.side < -most) s.turns += 1.0;
+      s.side = off > 0.0 ? 1.0 : -1.0;
+    }
     first_looks_[i].add(samples_[i].residual, tuning_);
     trends_[i] = s.trend;
     counts_[i] = !felt || s.turns > tuning_.fro_turns ? 1.0 : 0.0;

@@ -37,17 +37,22 @@ class SuspectWatch {
   // A sample begins; `add` takes what is suspected of a segment; then `finish`.
   void begin() { std::fill(now_.begin(), now_.end(), 0); }
   void add(const Suspect& suspect) {
-    if (suspect.any() && std::fabs(suspect.error) > least_[suspect.channel]) now_[suspect.channel] = 1;
+    if (!suspect.any() || !(std::fabs(suspect.error) > least_[suspect.channel])) return;
+    now_[suspect.channel] = 1;
+    any_ = true;
   }
   // Calls `out(channel, until)` for each that tells nothing until then [s].
   template <class Out>
   void finish(double time, Out&& out) {
+    if (!any_) return;  // none is suspected or told, nor was it of late
+    any_ = false;
     for (std::size_t c = 0; c < now_.size(); ++c) {
       if (now_[c] != 0) seen_[c] = time;
       if (!(time - seen_[c] < kMissed)) since_[c] = kNever;
       else if (!(since_[c] <= time)) since_[c] = time;
       if (now_[c] != 0 && time - since_[c] >= kDwell) out(static_cast<int>(c), until_[c] = time + kOut);
       told_[c] = time < until_[c];
+      any_ = any_ || since_[c] < kNever || !(time >= until_[c]);
     }
   }
 
@@ -64,6 +69,7 @@ class SuspectWatch {
   ChannelLayout at_;
   std::vector<double> least_;  // [N, Nm]
   std::vector<char> now_, told_;
+  bool any_ = false;
   std::vector<double> since_, seen_, until_;  // [s]
 };
 
