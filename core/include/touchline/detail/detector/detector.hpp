@@ -19,6 +19,7 @@
 #include "touchline/detail/detector/motion_spread.hpp"
 #include "touchline/detail/detector/noise_meter.hpp"
 #include "touchline/detail/detector/row_covariance.hpp"
+#include "touchline/detail/detector/row_states.hpp"
 #include "touchline/detail/detector/segment_tests.hpp"
 #include "touchline/detail/detector/standing.hpp"
 #include "touchline/detail/detector/tuning.hpp"
@@ -46,9 +47,18 @@ class Detector {
         spreads_(rows_.size()),
         borne_out_(bandwidths_),
         residuals_(rows_.size()),
-        trends_(rows_.size()),
         known_(rows_.size()),
         counts_(rows_.size()),
+        adapts_(rows_.size()),
+        averages_(rows_.size()),
+        crossed_(rows_.size()),
+        shown_by_motion_(rows_.size()),
+        limits_(rows_.size(), 1.0),
+        contact_(rows_.size()),
+        baseline_limits_(rows_.size()),
+        bandwidth_lanes_(rows_.size()),
+        confirmed_at_(rows_.size()),
+        settled_at_(rows_.size()),
         samples_(rows_.size()),
         segments_(settings_.sum_limits.size()),
         first_(segments_.size() + 1, 0),
@@ -60,7 +70,6 @@ class Detector {
         collision_shares_(of_rows([](const DetectionRow& row) { return row.contact / row.collision; })),
         normalized_(rows_.size(), 0.0),
         shares_(rows_.size(), 0.0),
-        limits_(rows_.size(), 1.0),
         drift_(rows_.size(), 0.0),
         excess_(rows_.size(), 1.0),
         standing_(rows_.size()),
@@ -80,6 +89,13 @@ class Detector {
       first_[g + 1] = first_[g] + own.size();
       tests_.emplace_back(observer, own, settings_, tuning_);
       joint_tests_ = joint_tests_ || tests_.back().used();
+    }
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      contact_[i] = rows_[i].contact;
+      baseline_limits_[i] = rows_[i].baseline_limit;
+      bandwidth_lanes_[i] = bandwidths_[i];
+      confirmed_at_[i] = tuning_.confirm / bandwidths_[i];
+      settled_at_[i] = tuning_.trend / bandwidths_[i];
     }
     slowest_.assign(segments_.size(), kAbsurd);
     for (const DetectionRow& row : rows_)
@@ -109,17 +125,10 @@ class Detector {
       judge(g, dt);
       decide(g, dt);
     }
-    offset_ = false;
-    for (std::size_t g = 0; g < segments_.size(); ++g) {
-      const Following following = following_of(g, dt);
-      for (std::size_t i = first_[g], end = first_[g + 1]; i < end; ++i) {
-        follow_offset(i, following, dt);
-        offset_ = offset_ || stands_off(i) || warmed(i);
-      }
-    }
+    follow_offsets(dt);
     if (dt > 0.0) {
       meters_.add(residuals_, known_, counts_, dt, tuning_);
-      trend_meters_.add(trends_, known_, counts_, dt, tuning_);
+      trend_meters_.add(states_.trend, known_, counts_, dt, tuning_);
     }
     if (dt > 0.0 && sound_) follow_drift(q, dt);
   }
@@ -128,7 +137,7 @@ class Detector {
   // Per row: (residual - baseline) / contact threshold; 0 where there is no settled residual.
   const std::vector<double>& normalized() const { return normalized_; }
   // Per row: what `normalized` must exceed now, at least 1.
-  const std::vector<double>& limits() const { return limits_; }
+  const RowLanes& limits() const { return limits_; }
   // Per row: one sigma of what the model's errors may have added since the baseline [N or Nm].
   const std::vector<double>& drift() const { return drift_; }
   // Per row: how many times as large as told its noise is seen to be, at least 1.
@@ -143,63 +152,43 @@ class Detector {
   const SegmentTests& tests(int segment) const { return tests_[segment]; }
   std::size_t first_row(int segment) const { return first_[segment]; }
   const Activity& activity() const { return activity_.activity(); }
-  double baseline(int row) const { return states_[row].baseline; }
+  double baseline(int row) const { return states_.baseline[row]; }
   // What a row's load must exceed now, one sigma of its noise as seen, and what stood there when
   // observation began or rests there since a contact [N or Nm].
   double limit(int row) const { return limits_[row] * rows_[row].contact; }
   double noise(int row) const { return meters_.sigma(row); }
-  double offset(int row) const { return states_[row].anchor; }
+  double offset(int row) const { return states_.anchor[row]; }
   // How far the arm has shown that it is not as told, per row; does anything stand there now that
   // exceeds a threshold; is the noise of any row clearly larger than told?
   Standing standing(int row) const {
     Standing standing = standing_[row];
-    standing.now = stands_off(row) ? states_[row].anchor : 0.0;
-    standing.drift = warmed(row) ? states_[row].anchor - states_[row].origin : 0.0;
+    standing.now = stands_off(row) ? states_.anchor[row] : 0.0;
+    standing.drift = warmed(row) ? states_.anchor[row] - states_.origin[row] : 0.0;
     return standing;
   }
   bool stands_off() const { return offset_; }
   bool noisy() const { return noisy_; }
-  double reference(int row) const { return states_[row].reference; }
+  double reference(int row) const { return states_.reference[row]; }
   // Over how long a row's baseline has been averaged [s].
-  double known_for(int row) const { return states_[row].age; }
+  double known_for(int row) const { return states_.age[row]; }
   // What another detector of this arm has learned of a row, which here stands at `baseline` while
   // nothing touches: observation does not begin anew.
   void go_on_from(const Detector& other, int of, int row, double baseline) {
-    RowState& s = states_[row];
-    const double moved = baseline - other.states_[of].baseline;
-    s = other.states_[of];
-    for (double* value : {&s.baseline, &s.anchor, &s.origin, &s.reference, &s.other.baseline,
-                          &s.other.anchor})
-      *value += moved;
-    s.trend = baseline;
+    states_.go_on_from(other.states_, of, row, baseline);
     spreads_[row] = other.spreads_[of];
     meters_.go_on_from(other.meters_, of, row);
+    looks_over_ -= first_looks_[row].over();
     first_looks_[row] = other.first_looks_[of];
+    looks_over_ += first_looks_[row].over();
     trend_meters_.go_on_from(other.trend_meters_, of, row);
     Segment& segment = segments_[rows_[row].segment];
-    segment.age = std::max(segment.age, s.age);
+    segment.age = std::max(segment.age, states_.age[row]);
     segment.off = other.segments_[other.rows_[of].segment].off;
     still_ = other.still_;
   }
   const Observer& observer() const { return observer_; }
 
  private:
-  // What may stand on a row while nothing touches.
-  struct Calm {
-    double baseline = 0.0, anchor = 0.0, shown = 0.0;  // as of `RowState`
-  };
-  struct RowState {
-    double baseline = 0.0, reference = 0.0;
-    double origin = 0.0;  // what stood there at the start, or rests there since a contact
-    double anchor = 0.0;  // the same, with what it has drifted by since
-    double shown = 0.0;   // the largest of these so far
-    double seconds = 0.0;  // since the first settled sample
-    double trend = 0.0;   // mean of the last moments
-    double age = 0.0, referred = 0.0;  // over how long they have been averaged [s]
-    Calm other;  // what stood there before the last contact came to rest; the model's zero at first
-    double side = 1.0, turns = 0.0;  // of its trend it was last far off on, and how often of late
-    bool started = false, known = false;  // was there a settled residual ever; at the last sample
-  };
   enum class Origin {  // what an event began with
     start,     // of observation: an offset that has yet to be seen whole
     reversal,  // only of joints that hardly move, as friction does that changes its sign
@@ -290,7 +279,7 @@ class Detector {
       s.known = s.known && std::isfinite(s.residual);
       residuals_[i] = s.residual;
       known_[i] = s.known ? 1.0 : 0.0;
-      off = off || states_[i].shown > row.contact || meters_.contradicts(i, tuning_);
+      off = off || states_.shown[i] > row.contact || meters_.contradicts(i, tuning_);
       if (!std::isfinite(s.innovation)) s.innovation = s.residual;  // samples were lost
     }
     Segment& segment = segments_[g];
@@ -329,20 +318,16 @@ class Detector {
 
   void test_row(std::size_t i, Segment& segment) {
     const DetectionRow& row = rows_[i];
-    RowState& s = states_[i];
     RowSample& sample = samples_[i];
     normalized_[i] = shares_[i] = 0.0;
     if (!sample.known) return;
-    if (!s.started) {  // what stands there when observation begins is an offset
-      s.baseline = s.anchor = s.origin = s.reference = s.trend = sample.residual;
-      s.started = true;
-    }
-    const double baseline = s.baseline;
+    if (!states_.started[i]) states_.begin(i, sample.residual);
+    const double baseline = states_.baseline[i];
     sample.offset = baseline;
-    sample.reference = s.reference;
-    sample.referred = s.referred;
-    // What motion alone shows of it, as far as that counts.
-    const double spread = segment.learns && row.seen > 0.0 ? spreads_[i].limit(tuning_) : 0.0;
+    sample.reference = states_.reference[i];
+    sample.referred = states_.referred[i];
+    const double spread = shown_by_motion_[i] =
+        segment.learns && row.seen > 0.0 ? spreads_[i].limit(tuning_) : 0.0;
     const double limit = limits_[i] = largest_noise(i, spread) / row.contact;
     const double normalized = normalized_[i] = (sample.residual - baseline) / row.contact;
     const double x = normalized / limit;
@@ -366,9 +351,9 @@ class Detector {
   // arm that stands: of one that moves the model's errors are larger than noise.
   double slow_share(std::size_t i) const {
     const DetectionRow& row = rows_[i];
-    const RowState& s = states_[i];
     if (row.seen <= 0.0 || !fires_[row.segment] || samples_[i].gap_std > 0.0) return 0.0;
-    const double now = samples_[i].residual - s.baseline, mean = s.trend - s.baseline;
+    const double baseline = states_.baseline[i];
+    const double now = samples_[i].residual - baseline, mean = states_.trend[i] - baseline;
     if (now * mean <= 0.0) return 0.0;
     const double limit = std::max(row.contact, trend_meters_.limit(i, row.seen,
         first_looks_[i].ratio(), tuning_));
@@ -496,8 +481,8 @@ class Detector {
     bool slow = true, creeps = true;
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
       if (shares_[i] < std::min(1.0, segments_[g].peak)) continue;
-      const RowState& s = states_[i];
-      const double quick = samples_[i].residual - s.trend, before = s.trend - s.baseline;
+        const double trend = states_.trend[i];
+      const double quick = samples_[i].residual - trend, before = trend - states_.baseline[i];
       slow = slow && rows_[i].component < 0 &&
           std::fabs(qd_[rows_[i].joint]) < tuning_.reversal_speed;
       creeps = creeps && std::fabs(quick) < tuning_.creep_share * std::fabs(before);
@@ -510,8 +495,8 @@ class Detector {
   bool pushed(std::size_t g) const {
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
       if (rows_[i].component < 0 || std::fabs(normalized_[i]) < limits_[i]) continue;
-      const RowState& s = states_[i];
-      const double quick = samples_[i].residual - s.trend, before = s.trend - s.baseline;
+        const double trend = states_.trend[i];
+      const double quick = samples_[i].residual - trend, before = trend - states_.baseline[i];
       if (std::fabs(quick) >= tuning_.creep_share * std::fabs(before)) return true;
     }
     return false;
@@ -541,7 +526,7 @@ class Detector {
     double most = 0.0;
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
       if (!samples_[i].known) continue;
-      const double off = states_[i].trend - states_[i].baseline;
+      const double off = states_.trend[i] - states_.baseline[i];
       most = std::max(most, std::fabs(off) / (limits_[i] * rows_[i].contact));
     }
     return most;
@@ -551,17 +536,17 @@ class Detector {
   bool steady(std::size_t g) const {
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
       const double most = settings_.times.release * limits_[i] * rows_[i].contact;
-      if (samples_[i].known && std::fabs(samples_[i].residual - states_[i].trend) > most) return false;
+      if (samples_[i].known && std::fabs(samples_[i].residual - states_.trend[i]) > most) return false;
     }
     return true;
   }
 
   // What the last moments have of a row is an offset from now on.
   void rest(std::size_t i) {
-    RowState& s = states_[i];
-    s.baseline = s.anchor = s.origin = s.reference = s.trend;
-    s.shown = std::max(s.shown, std::fabs(s.anchor));
-    s.age = s.referred = tuning_.trend / bandwidths_[i];
+    const double trend = states_.trend[i];
+    states_.baseline[i] = states_.anchor[i] = states_.origin[i] = states_.reference[i] = trend;
+    states_.shown[i] = std::max(states_.shown[i], std::fabs(trend));
+    states_.age[i] = states_.referred[i] = tuning_.trend / bandwidths_[i];
   }
 
   // What is left of a contact and does not change rests there: an offset from now on. What stood
@@ -570,8 +555,7 @@ class Detector {
     const bool longer = quiet_[g] > segments_[g].other_quiet;
     if (longer) segments_[g].other_quiet = quiet_[g];
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
-      RowState& s = states_[i];
-      if (longer) s.other = {s.baseline, s.anchor, s.shown};
+      if (longer) states_.other[i] = {states_.baseline[i], states_.anchor[i], states_.shown[i]};
       rest(i);
     }
     end_event(g);
@@ -582,7 +566,7 @@ class Detector {
   bool is_back(std::size_t g) const {
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
       const double most = settings_.times.release * limits_[i] * rows_[i].contact;
-      if (!samples_[i].known || std::fabs(states_[i].trend - states_[i].other.baseline) > most)
+      if (!samples_[i].known || std::fabs(states_.trend[i] - states_.other[i].baseline) > most)
         return false;
     }
     return true;
@@ -590,10 +574,9 @@ class Detector {
 
   void go_back(std::size_t g) {
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
-      RowState& s = states_[i];
       rest(i);
-      s.anchor = s.origin = s.other.anchor;
-      s.shown = s.other.shown;
+      states_.anchor[i] = states_.origin[i] = states_.other[i].anchor;
+      states_.shown[i] = states_.other[i].shown;
     }
     end_event(g);
   }
@@ -614,94 +597,175 @@ class Detector {
 
   // Does more than a threshold stand on a row of an arm that has shown that it is not as told?
   bool stands_off(std::size_t i) const {
-    return std::min(std::fabs(states_[i].anchor), states_[i].shown) > rows_[i].contact;
+    return std::min(std::fabs(states_.anchor[i]), states_.shown[i]) > rows_[i].contact;
   }
 
   // Has what stands on a row drifted by more than a threshold?
   bool warmed(std::size_t i) const {
-    return std::fabs(states_[i].anchor - states_[i].origin) > rows_[i].contact;
+    return std::fabs(states_.anchor[i] - states_.origin[i]) > rows_[i].contact;
   }
 
-  // How the offsets of a segment's rows are followed in a sample.
-  struct Following {
-    bool adapts, felt, stopped;
-    bool learns;  // of motion
-  };
-  Following following_of(std::size_t g, double dt) const {
-    const bool felt = levels_[g] > 0;
-    return {adapts(g), felt, still_ >= tuning_.pause && still_ - dt < tuning_.pause,
-            segments_[g].learns && dt > 0.0 && (!felt || own_doing(g))};
-  }
-
-  void follow_offset(std::size_t i, const Following& how, double dt) {
-    RowState& s = states_[i];
-    const DetectionRow& row = rows_[i];
-    const double value = samples_[i].residual, bandwidth = bandwidths_[i];
-    const bool resumed = samples_[i].known && !s.known;
-    s.known = samples_[i].known;
-    if (!s.known) return;
-    if (resumed) s.trend = value;
-    s.trend += (value - s.trend) * std::min(1.0, dt * bandwidth * per_trend_);
-    confirm_start(i, dt);
-    if (how.learns && row.seen > 0.0) spreads_[i].add(value - s.baseline, dt, how.felt, tuning_);
-    // Running means first, low-passes once they have seen enough.
-    if (how.adapts) {
-      s.referred = std::min(s.referred + dt, tuning_.reference);
-      if (s.referred > 0.0) s.reference += (value - s.reference) * std::min(1.0, dt / s.referred);
+  // Follows what stands on all rows: side by side, but for what happens to few of them and rarely.
+  void follow_offsets(double dt) {
+    for (std::size_t g = 0; g < segments_.size(); ++g) {
+      const double adapts_now = adapts(g) ? 1.0 : 0.0, felt = levels_[g] > 0 ? 1.0 : 0.0,
+                   quiet = felt > 0.0 || segments_[g].pending ? 0.0 : 1.0;
+      for (std::size_t i = first_[g], end = first_[g + 1]; i < end; ++i) {
+        adapts_[i] = adapts_now;
+        counts_[i] = quiet;
+      }
     }
-    const Segment& segment = segments_[row.segment];
-    meter_noise(i, how.felt || segment.pending, dt);
-    if (how.felt) return;
-    if (how.stopped && segment.off && row.seen > 0.0) rest(i);
-    // In the first moments what noise beyond the told one can bring is averaged, too: one sample of
-    // it is no baseline.
-    if (segment.pending && !(first_looks_[i].ratio() > 1.0 && young(row.segment) &&
-                             segment.score < tuning_.unseen)) return;
-    quiet_[row.segment] = s.age += dt;
-    const double tau = std::min(s.age, settings_.times.baseline);
-    if (tau <= 0.0) return;
-    const double next = s.baseline + (value - s.baseline) * std::min(1.0, dt / tau);
-    const double most = segment.learns && row.seen > 0.0
-        ? std::max(row.baseline_limit, spreads_[i].limit(tuning_)) : row.baseline_limit;
-    s.baseline = std::clamp(next, s.anchor - most, s.anchor + most);
-    if (s.age < tuning_.trend / bandwidth) {
-      s.anchor = s.origin = s.baseline;
-    } else {  // no hand rises as slowly as a sensor warms up
-      const double farthest = tuning_.warming_most * row.contact;
-      s.anchor += (s.baseline - s.anchor) * std::min(1.0, dt / tuning_.warming);
-      s.anchor = std::clamp(s.anchor, s.origin - farthest, s.origin + farthest);
+    const bool confirmed = follow_trends(dt);
+    const bool looking = dt > 0.0 && looks_over_ < rows_.size();
+    const bool stopped = still_ >= tuning_.pause && still_ - dt < tuning_.pause;
+    for (std::size_t g = 0; g < segments_.size(); ++g) {
+      const Segment& segment = segments_[g];
+      const bool felt = levels_[g] > 0;
+      const bool learns = segment.learns && dt > 0.0 && (!felt || own_doing(g));
+      const bool rests = stopped && segment.off;
+      const bool usual = !(confirmed || looking || learns || felt || rests || segment.pending);
+      for (std::size_t i = first_[g], end = first_[g + 1]; i < end; ++i) {
+        averages_[i] = known_[i];
+        if (usual || !samples_[i].known) continue;
+        if (crossed_[i] > 0.0) confirm_start(i);
+        if (learns && rows_[i].seen > 0.0) {
+          spreads_[i].add(samples_[i].residual - states_.baseline[i], dt, felt, tuning_);
+          shown_by_motion_[i] = spreads_[i].limit(tuning_);
+        }
+        if (looking) look(i);
+        if (rests && !felt && rows_[i].seen > 0.0) rest(i);
+        // In the first moments what noise beyond the told one can bring is averaged, too: one sample of
+        // it is no baseline.
+        const bool noise = first_looks_[i].ratio() > 1.0 && young(g) && segment.score < tuning_.unseen;
+        if (felt || (segment.pending && !noise)) averages_[i] = 0.0;
+      }
+    }
+    offset_ = follow_baselines(dt);
+    for (std::size_t g = 0; g < segments_.size(); ++g) {
+      for (std::size_t i = first_[g + 1]; i-- > first_[g];) {
+        if (!(averages_[i] > 0.0)) continue;
+        quiet_[g] = states_.age[i];
+        break;
+      }
     }
   }
 
-  // Noise is measured while nothing is felt, and of what is felt where it goes to and fro more often
-  // within the filter's memory than a hand can.
-  void meter_noise(std::size_t i, bool felt, double dt) {
-    if (dt <= 0.0) return;
-    RowState& s = states_[i];
-    const double off = samples_[i].residual - s.trend,
-        most = tuning_.fro * limits_[i] * rows_[i].contact;
-    s.turns *= std::max(0.0, 1.0 - dt * bandwidths_[i] * per_fro_memory_);
-    if (std::fabs(off) > most) {
-      if (off * s.side < -most) s.turns += 1.0;
-      s.side = off > 0.0 ? 1.0 : -1.0;
+  // The means of the last moments and the references. Noise is measured while nothing is felt, and of
+  // what is felt where it goes to and fro more often within the filter's memory than a hand can.
+  // Returns whether what stood at the start of a row is to be confirmed: `crossed_` tells of which.
+  bool follow_trends(double dt) {
+    const Lanes zero = all_lanes(0.0), one = all_lanes(1.0);
+    Lanes any = zero;
+    for (std::size_t i = 0; i < known_.size(); i += kLanes) {
+      const Lanes known = known_.at(i), value = residuals_.at(i), bandwidth = bandwidth_lanes_.at(i);
+      const Lanes before = states_.trend.at(i);
+      const Lanes from = states_.known.at(i) > zero ? before : value;
+      const Lanes part = dt * bandwidth * per_trend_;
+      const Lanes trend = from + (value - from) * (part < one ? part : one);
+      states_.trend.put(i, known > zero ? trend : before);
+      states_.known.put(i, known);
+      const Lanes seconds = states_.seconds.at(i), later = seconds + dt, end = confirmed_at_.at(i);
+      Lanes crossed = seconds < end ? one : zero;
+      crossed = later < end ? zero : crossed;
+      crossed = known > zero ? crossed : zero;
+      crossed_.put(i, crossed);
+      any = any + crossed;
+      states_.seconds.put(i, known > zero ? later : seconds);
+      // Running means first, low-passes once they have seen enough.
+      const Lanes adapts = known * adapts_.at(i), most = all_lanes(tuning_.reference);
+      const Lanes referred = states_.referred.at(i), more = referred + dt;
+      const Lanes span = most < more ? most : more, share = dt / span;
+      const Lanes reference = states_.reference.at(i);
+      const Lanes moved = reference + (value - reference) * (share < one ? share : one);
+      states_.referred.put(i, adapts > zero ? span : referred);
+      const Lanes followed = span > zero ? moved : reference;
+      states_.reference.put(i, adapts > zero ? followed : reference);
+      if (dt > 0.0) meter_noise(i, value - trend, dt * bandwidth * per_fro_memory_);
     }
+    for (int k = 0; k < kLanes; ++k) {
+      if (lane(any, k) > 0.0) return true;
+    }
+    return false;
+  }
+
+  // Of rows from i on, that are off their trends by so much; `forgets`: what part of their turns.
+  void meter_noise(std::size_t i, const Lanes& off, const Lanes& forgets) {
+    const Lanes zero = all_lanes(0.0), one = all_lanes(1.0);
+    const Lanes known = known_.at(i), side = states_.side.at(i), turns = states_.turns.at(i);
+    const Lanes most = tuning_.fro * limits_.at(i) * contact_.at(i);
+    const Lanes keep = one - forgets, on = off * side;
+    const Lanes more = off > zero ? one : -one;
+    Lanes now = turns * (zero < keep ? keep : zero);
+    now = now + (on < -most ? one : zero);
+    Lanes next = off > most ? more : side;
+    next = off < -most ? more : next;
+    states_.turns.put(i, known > zero ? now : turns);
+    states_.side.put(i, known > zero ? next : side);
+    const Lanes counts = counts_.at(i);
+    counts_.put(i, now > all_lanes(tuning_.fro_turns) ? one : counts);
+  }
+
+  // The baselines of the rows that are averaged, and what stands there. Returns whether that is more
+  // than a threshold, or has drifted by more, on any row.
+  bool follow_baselines(double dt) {
+    const Lanes zero = all_lanes(0.0), one = all_lanes(1.0);
+    const Lanes longest = all_lanes(settings_.times.baseline);
+    const double warming = std::min(1.0, dt / tuning_.warming);
+    Lanes off = zero;
+    for (std::size_t i = 0; i < known_.size(); i += kLanes) {
+      const Lanes averages = averages_.at(i), value = residuals_.at(i), contact = contact_.at(i);
+      const Lanes age = states_.age.at(i), older = age + dt, tau = longest < older ? longest : older;
+      states_.age.put(i, averages > zero ? older : age);
+      const Lanes baseline = states_.baseline.at(i), anchor = states_.anchor.at(i),
+                  origin = states_.origin.at(i);
+      const Lanes part = dt / tau;
+      const Lanes next = baseline + (value - baseline) * (part < one ? part : one);
+      const Lanes told = baseline_limits_.at(i), shown = shown_by_motion_.at(i);
+      const Lanes most = told < shown ? shown : told;
+      const Lanes now = within(next, anchor - most, anchor + most);
+      // No hand rises as slowly as a sensor warms up.
+      const Lanes farthest = tuning_.warming_most * contact;
+      const Lanes warmed =
+          within(anchor + (now - anchor) * warming, origin - farthest, origin + farthest);
+      const Lanes settling = settled_at_.at(i);
+      const Lanes does = tau > zero ? averages : zero;
+      const Lanes next_anchor = older < settling ? now : warmed;
+      const Lanes next_origin = older < settling ? now : origin;
+      const Lanes stands = does > zero ? next_anchor : anchor;
+      const Lanes began = does > zero ? next_origin : origin;
+      states_.baseline.put(i, does > zero ? now : baseline);
+      states_.anchor.put(i, stands);
+      states_.origin.put(i, began);
+      const Lanes size = larger(stands, -stands), most_shown = states_.shown.at(i);
+      const Lanes least = most_shown < size ? most_shown : size, drift = stands - began;
+      off = off + (least > contact ? one : zero) + (larger(drift, -drift) > contact ? one : zero);
+    }
+    for (int k = 0; k < kLanes; ++k) {
+      if (lane(off, k) > 0.0) return true;
+    }
+    return false;
+  }
+  static Lanes within(const Lanes& x, const Lanes& low, const Lanes& high) {
+    const Lanes below = high < x ? high : x;
+    return x < low ? low : below;
+  }
+
+  // The first moments of a row's noise.
+  void look(std::size_t i) {
+    if (first_looks_[i].over()) return;
     first_looks_[i].add(samples_[i].residual, tuning_);
-    trends_[i] = s.trend;
-    counts_[i] = !felt || s.turns > tuning_.fro_turns ? 1.0 : 0.0;
+    if (first_looks_[i].over()) ++looks_over_;
   }
 
   // What stood there at the first sample may be a rest of settling, or of an arm that is set going.
   // It shows that the arm is not as told only if it still stands there a while later.
-  void confirm_start(std::size_t i, double dt) {
-    RowState& s = states_[i];
-    const double end = tuning_.confirm / bandwidths_[i], before = s.seconds;
-    s.seconds += dt;
-    if (before >= end || s.seconds < end) return;
-    const double least = std::min(std::fabs(s.trend), std::fabs(s.anchor));
-    const double most = std::max(std::fabs(s.trend), std::fabs(s.anchor));
-    if (!(s.trend * s.anchor > 0.0 && most < tuning_.alike * least)) return;
-    s.shown = std::max(s.shown, least);
-    if (least > rows_[i].contact) standing_[i].start = std::copysign(least, s.anchor);
+  void confirm_start(std::size_t i) {
+    const double trend = states_.trend[i], anchor = states_.anchor[i];
+    const double least = std::min(std::fabs(trend), std::fabs(anchor));
+    const double most = std::max(std::fabs(trend), std::fabs(anchor));
+    if (!(trend * anchor > 0.0 && most < tuning_.alike * least)) return;
+    states_.shown[i] = std::max(states_.shown[i], least);
+    if (least > rows_[i].contact) standing_[i].start = std::copysign(least, anchor);
   }
 
   // Drifts of the rows, from where the arm was while the baselines were averaged.
@@ -728,11 +792,18 @@ class Detector {
   ActivityMeter activity_;
   BaselinePosture baseline_posture_;
   std::vector<double> bandwidths_;  // per row: of its filter [rad/s]
-  std::vector<RowState> states_;
+  RowStates states_;
   std::vector<MotionSpread> spreads_;  // per row
   BorneOut borne_out_;
-  // Of the sample: residuals, means of the last moments, whether they are known and count as noise.
-  RowLanes residuals_, trends_, known_, counts_;
+  // Of the sample: residuals, whether they are known and count as noise.
+  RowLanes residuals_, known_, counts_;
+  // Of the sample: may references be followed; are baselines averaged; is the start to be confirmed;
+  // what motion alone shows [N or Nm]; what `normalized` must exceed.
+  RowLanes adapts_, averages_, crossed_, shown_by_motion_, limits_;
+  // Of the robot: thresholds, how far baselines may go [N or Nm]; bandwidths [rad/s]; when the start
+  // is confirmed, until when what stands there is averaged [s].
+  RowLanes contact_, baseline_limits_, bandwidth_lanes_, confirmed_at_, settled_at_;
+  std::size_t looks_over_ = 0;  // rows of which the first moments are over
   std::vector<RowSample> samples_;
   std::vector<Segment> segments_;
   std::vector<double> slowest_;     // per segment: the least bandwidth of its rows [rad/s]
@@ -741,7 +812,7 @@ class Detector {
   NoiseMeter meters_, trend_meters_;  // of the residuals, of their trends
   std::vector<double> collision_shares_;  // per row: its threshold, in those of a collision
   std::vector<double> normalized_, shares_;  // in thresholds; the size of that, in limits
-  std::vector<double> limits_, drift_, excess_;
+  std::vector<double> drift_, excess_;
   std::vector<Standing> standing_;  // per row
   std::vector<FirstLook> first_looks_;  // per row
   std::vector<int> levels_;

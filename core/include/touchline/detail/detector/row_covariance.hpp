@@ -24,6 +24,7 @@ class RowCovariance {
         readings_(joints_ + 6 * observer.row_layout().sensors),
         by_velocity_(rows_.size() * joints_),
         by_reading_(rows_.size() * readings_),
+        unit_forces_(3 * observer.sensors().size()),
         momentum_(rows_.size() * rows_.size()),
         reading_(rows_.size() * rows_.size()) {
     for (std::size_t j = 0; j < joints_; ++j) sigma_velocity_.push_back(noise.qd[j]);
@@ -55,6 +56,11 @@ class RowCovariance {
   void trace(const Posture& posture) {
     std::fill(by_velocity_.begin(), by_velocity_.end(), 0.0);
     std::fill(by_reading_.begin(), by_reading_.end(), 0.0);
+    for (std::size_t s = 0; s < observer_.sensors().size(); ++s) {
+      const Pose& X = posture.pose(observer_.sensors()[s].node);
+      const Vec3 axes[3] = {X.R.x, X.R.y, X.R.z};
+      for (int a = 0; a < 3; ++a) unit_forces_[3 * s + a] = {axes[a], cross(X.p, axes[a])};
+    }
     for (std::size_t i = 0; i < rows_.size(); ++i) {
       double *velocity = by_velocity_.data() + i * joints_,
              *reading = by_reading_.data() + i * readings_;
@@ -99,12 +105,11 @@ class RowCovariance {
     const int node = observer_.sensors()[s].node;
     for (std::size_t c = 0; c < joints_; ++c)
       velocity[c] += sign * dot(twist, posture.momentum(node, c));
-    const Pose& X = posture.pose(node);
-    const Vec3 axes[3] = {X.R.x, X.R.y, X.R.z};  // unit forces and moments of the sensor, in world
     double* of_sensor = reading + joints_ + 6 * s;
     for (int a = 0; a < 3; ++a) {
-      of_sensor[a] += sign * dot(twist, Spatial{axes[a], cross(X.p, axes[a])});
-      of_sensor[3 + a] += sign * dot(twist.angular, axes[a]);
+      const Spatial& force = unit_forces_[3 * s + a];  // a unit moment stands along the same axis
+      of_sensor[a] += sign * dot(twist, force);
+      of_sensor[3 + a] += sign * dot(twist.angular, force.linear);
     }
   }
 
@@ -126,6 +131,7 @@ class RowCovariance {
   std::size_t joints_, readings_;
   std::vector<double> sigma_velocity_, sigma_reading_;
   std::vector<double> by_velocity_, by_reading_;  // rows, sources
+  std::vector<Spatial> unit_forces_;  // per sensor: along its axes, in world
   std::vector<double> momentum_, reading_;
 };
 

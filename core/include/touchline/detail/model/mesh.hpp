@@ -396,16 +396,30 @@ class Mesh {
       distance = nearer ? way : distance;
       point = {nearer ? at.x : point.x, nearer ? at.y : point.y, nearer ? at.z : point.z};
     }
+    Lanes t;
+    const Lanes crossed = crosses(a, ab, ac, line, t);
     for (int k = 0; k < count; ++k) {
       const Triangle& tri = *some[k];
-      double t;
-      if (crosses(tri, line, t)) {
-        if (limit > 0.0) visit(SurfacePoint{0.0, tri.face, -1, line.at(t), tri.normal});
+      if (lane(crossed, k) > 0.0) {
+        if (limit > 0.0) visit(SurfacePoint{0.0, tri.face, -1, line.at(lane(t, k)), tri.normal});
       } else if (lane(distance, k) < limit) {
         visit(SurfacePoint{lane(distance, k), tri.face, -1,
                            {lane(point.x, k), lane(point.y, k), lane(point.z, k)}, tri.normal});
       }
     }
+  }
+  // As `crosses` of one triangle: 1 where the line does, else 0.
+  static Lanes crosses(const BasicVec3<Lanes>& a, const BasicVec3<Lanes>& ab,
+                       const BasicVec3<Lanes>& ac, const ForceLine& line, Lanes& t) {
+    const BasicVec3<Lanes> p = cross(line.direction, ac), s = many(line.origin) - a, q = cross(s, ab);
+    const Lanes det = dot(ab, p), u = dot(s, p) / det, v = dot(line.direction, q) / det;
+    t = dot(ac, q) / det;
+    const Lanes least = all_lanes(-kEdge), most = all_lanes(1.0 + kEdge), none = all_lanes(0.0);
+    Lanes yes = all_lanes(1.0);  // not of a line along the plane: dividing by zero fails one of these
+    yes = u >= least ? yes : none;
+    yes = u <= most ? yes : none;
+    yes = v >= least ? yes : none;
+    return u + v <= most ? yes : none;
   }
   static BasicVec3<Lanes> many(const Vec3& v) {
     return {all_lanes(v.x), all_lanes(v.y), all_lanes(v.z)};

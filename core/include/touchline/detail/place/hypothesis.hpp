@@ -296,7 +296,8 @@ class ForceFitter {
     int at = 0;
     Vec3 force;
     const auto offer = [&](int direction) {
-      const Vec3 u = settings_.friction * (turns_.cosine[direction] * s + turns_.sine[direction] * t) - normal;
+      const double cosine = turns_.cosine[direction], sine = turns_.sine[direction];
+      const Vec3 u = settings_.friction * (cosine * s + sine * t) - normal;
       const double x[3] = {u.x, u.y, u.z};
       double along = 0.0, curve = 0.0;
       for (int i = 0; i < 3; ++i) {
