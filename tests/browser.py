@@ -10,6 +10,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
@@ -146,9 +147,9 @@ class Browser:
             entry = params["entry"]
             self.complaints.append(f"{entry['text']} {entry.get('url', '')}")
 
-    def resize(self, width: int, height: int) -> None:
-        """Size of the window [pixels]."""
-        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+    def resize(self, width: int, height: int, drawn: float = 1.0) -> None:
+        """Size of the window [pixels], and how many pixels are drawn for each of its width."""
+        size = {"width": width, "height": height, "deviceScaleFactor": drawn, "mobile": False}
         self.call("Emulation.setDeviceMetricsOverride", **size)
 
     def open(self, url: str) -> None:
@@ -169,10 +170,10 @@ class Browser:
             uploadThroughput=0,
         )
 
-    def run(self, script: str) -> Any:
+    def run(self, script: str, patience: float = PATIENCE) -> Any:
         """The value of a JavaScript expression in the page; promises are awaited."""
         result = self.call(
-            "Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True
+            "Runtime.evaluate", patience, expression=script, returnByValue=True, awaitPromise=True
         )
         assert "exceptionDetails" not in result, result["exceptionDetails"]
         return result["result"].get("value")
@@ -247,9 +248,19 @@ class Browser:
 
     def draw(self, pictures: int = 2) -> None:
         """Waits until the page has been drawn that often."""
+        script = "new Promise(drawn => requestAnimationFrame(drawn)).then(() => 0)"
         for _ in range(pictures):
-            self.run("new Promise(drawn => requestAnimationFrame(drawn)).then(() => 0)")
+            self._insist(lambda patience: self.run(script, patience), "draws nothing")
         self.rest(0.03)
+
+    def _insist(self, ask: Callable[[float], Any], what: str) -> Any:
+        """What the page answers; now and then it waits for a frame that never comes."""
+        for _ in range(5):
+            try:
+                return ask(PATIENCE / 4)
+            except TimeoutError:
+                self.call("Page.bringToFront")
+        raise AssertionError(f"the browser {what}")
 
     def mouse(self, kind: str, x: float, y: float, buttons: int = 0) -> None:
         """One event of the mouse: "Moved", "Pressed" or "Released"."""
@@ -292,12 +303,8 @@ class Browser:
         return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
 
     def _screenshot(self) -> str:
-        for _ in range(5):
-            try:
-                return self.call("Page.captureScreenshot", PATIENCE / 4, format="png")["data"]
-            except TimeoutError:  # now and then it waits for a frame that never comes
-                self.call("Page.bringToFront")
-        raise AssertionError("the browser shows no picture")
+        call = partial(self.call, "Page.captureScreenshot", format="png")
+        return self._insist(lambda patience: call(patience)["data"], "shows no picture")
 
     def close(self) -> None:
         """Ends the browser."""

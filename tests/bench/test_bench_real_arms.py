@@ -18,5 +18,5 @@ def test_two_recordings_agree_in_the_mass_of_a_tool(data):
     (first, error), (second, other) = tool_masses(data)
     assert abs(first - second) <= 0.05
     assert 0.4 < first < 0.8
-    assert 0.0 < error < 0.2 and 0.0 < other < 0.2
+    assert 0.0 < error < 0.1 and 0.0 < other < 0.2
     assert abs(first - second) <= 2.0 * (error**2 + other**2) ** 0.5

@@ -112,7 +112,7 @@ def test_a_payload_is_found_and_the_written_robot_explains_the_motion():
     robot = arm()
     found = identify(gather(robot, [[recorded(loaded(robot, robot.mechanism))]]))
     mass, error = payload_mass(found.solution)
-    assert mass == pytest.approx(1.2, abs=0.02) and error < 0.1
+    assert mass == pytest.approx(1.2, abs=0.02) and error < 0.02
     new = identified_robot(found)
     left = found.evidence.residual(new)
     np.testing.assert_allclose(left, found.left(), atol=1e-3)

@@ -33,10 +33,10 @@ def torques_alone():
     noise = replace(described.description.noise, sensors={})
     description = replace(described.description, sensors=(), noise=noise, bandwidth_sensors={})
     robot = Robot(description, described.mechanism)
+    profile = Profile(HIT, 0.3, 0.01, 0.02)
     blow = ScriptedContact(
-        "link6", np.array([0.0, 0.0, 0.05]), np.array([9.0, 30.0, -40.0]),
-        Profile(HIT, 0.3, 0.01, 0.02),
-    )  # fmt: skip
+        "link6", np.array([0.0, 0.0, 0.05]), np.array([9.0, 30.0, -40.0]), profile
+    )
     settings = Run(seed=3, noise=SensorNoise(), model_error=0.02, physics=2000.0)
     return tl.Pipeline(robot), scripted(robot, [blow], 3.0, 0.5, settings).samples
 

@@ -2,7 +2,7 @@
 """The demo's interface in a browser: the mouse presses a button and writes on the arm."""
 
 import threading
-from itertools import pairwise
+from itertools import cycle, pairwise
 
 import numpy as np
 import pytest
@@ -15,8 +15,8 @@ from touchline.view.widgets import LIT
 
 SEVEN = np.array([(-0.02, 0.025), (0.02, 0.025), (-0.008, -0.025)])  # m, on the pad
 STEPS = 6  # of the mouse for each of its lines
-BETWEEN = 0.25  # s; waiting for pictures instead takes too long on a busy machine
-WINDOW = 1100, 640  # pixels; fewer are drawn sooner
+BETWEEN = 0.25  # s of the simulation, in which the finger gets from one step to the next
+WINDOW = 1100, 640, 0.3  # pixels, and how many are drawn for each; fewer are drawn sooner
 
 
 @pytest.fixture
@@ -41,9 +41,15 @@ def kinds(page, name):
     return [event.kind for event in tuple(page.touch.events) if event.widget == name]
 
 
+def lasts(window, duration):
+    """Waits for a time [s] of the simulation, which a busy machine makes slower."""
+    end = window.page.arm.time + duration
+    window.until(lambda: window.page.arm.time > end, "the simulation to go on")
+
+
 def stands(window):
     before = window.page.arm.q
-    window.browser.rest(0.3)
+    lasts(window, 0.3)
     return np.abs(window.page.arm.q - before).max() < 1e-4
 
 
@@ -58,6 +64,19 @@ def led(monkeypatch):
 
     monkeypatch.setattr(Finger, "lead", kept)
     return places
+
+
+def drag_begins(window, start, towards):
+    """Presses, and moves the mouse to and fro until the page leads a finger."""
+    window.browser.mouse("Pressed", *start, buttons=1)
+    places = cycle((towards, start))
+
+    def led():
+        window.browser.mouse("Moved", *next(places), buttons=1)
+        window.browser.rest(0.1)
+        return bool(window.page._led)
+
+    window.until(led, "the drag to begin")
 
 
 def test_the_mouse_presses_a_button_and_writes_a_seven(browser, demo, led):
@@ -84,14 +103,14 @@ def test_the_mouse_presses_a_button_and_writes_a_seven(browser, demo, led):
         for u, v in np.vstack(ways)
     ]
     browser.mouse("Moved", *places[0])
-    browser.rest(6 * BETWEEN)  # the page finds out in its next picture what lies below the mouse
-    browser.mouse("Pressed", *places[0], buttons=1)
+    browser.draw(4)  # the page finds out in its next pictures what lies below the mouse
+    drag_begins(window, places[0], places[2])  # a shorter way would be a click
     for last, place in pairwise(places):
-        before, began = len(led), bool(page._led)  # a drag begins with its second move
+        before = len(led)
         browser.mouse("Moved", *place, buttons=1)
-        browser.rest(BETWEEN)
-        if began and place != last:
+        if place != last:
             window.until(lambda known=before: len(led) > known, "the finger to be led on")
+        lasts(window, BETWEEN)
     window.until(lambda: page._areas._lit.get("page"), "the pad to light")
     assert tuple(page._areas.areas["page"].color) == LIT
     browser.mouse("Released", *places[-1])

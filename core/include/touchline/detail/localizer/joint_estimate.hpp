@@ -49,16 +49,12 @@ struct JointEstimate {
   // Forgets all that is known of a contact.
   void forget(int c, const LocalizerSettings& t) {
     const int n = size(), first = kEach * c;
+    part(first, kEach);
     for (int i = first; i < first + kEach; ++i) {
-      for (int j = 0; j < n; ++j) covariance[i * n + j] = covariance[j * n + i] = 0.0;
+      std::fill_n(covariance + i * n + first, kEach, 0.0);
       covariance[i * (n + 1)] = i < first + 3 ? t.force_scale * t.force_scale : t.anywhere;
     }
   }
-
-  // Cosine of 25 degrees. Less: each face of a mesh that a place creeps over tells of it what is not
-  // so. More: curved links are taken for flat.
-  static constexpr double kOnePlane = 0.906;
-  static constexpr double kEitherSide = 4.0;  // variances within which a place may be on either face
 
   // Those of all contacts but one.
   void copy_without(int c, JointEstimate& out) const {
@@ -148,6 +144,11 @@ struct JointEstimate {
     return std::sqrt(sum);
   }
 
+  // Cosine of 25 degrees. Larger: each face of a mesh that a place creeps over tells of it what is not
+  // so. Smaller: curved links are taken for flat.
+  static constexpr double kOnePlane = 0.906;
+  static constexpr double kEitherSide = 4.0;  // variances within which a place may be on either face
+
   // Moves the place of a contact along its surface, to `p`. The tangents stay on faces that are nearly
   // normal to them, and for as long as it may be on the face before: what is known of forces and places
   // together lies in one plane. In another one it would contradict the next samples, and the place
@@ -163,12 +164,7 @@ struct JointEstimate {
     }
     move(c, p);
     k.alike = p.point;
-    const int n = size(), first = kEach * c + 3;
-    for (int i = first; i < first + 2; ++i) {
-      for (int j = 0; j < n; ++j) {
-        if (j < first || j >= first + 2) covariance[i * n + j] = covariance[j * n + i] = 0.0;
-      }
-    }
+    part(kEach * c + 3, 2);
   }
 
   // Moves the place of a contact to `p`, whose tangents are turned with the normal, the shortest
@@ -191,6 +187,16 @@ struct JointEstimate {
   }
 
  private:
+  // Forgets what `count` unknowns share with all others.
+  void part(int first, int count) {
+    const int n = size();
+    for (int i = first; i < first + count; ++i) {
+      for (int j = 0; j < n; ++j) {
+        if (j < first || j >= first + count) covariance[i * n + j] = covariance[j * n + i] = 0.0;
+      }
+    }
+  }
+
   // `v` by the shortest turn that takes one unit vector to another (Rodrigues).
   static Vec3 turned(const Vec3& v, const Vec3& from, const Vec3& to) {
     const Vec3 w = cross(from, to);

@@ -136,11 +136,8 @@ class PairParts {
 
   // To where its bodies are in this view.
   Pair moved(Pair s) const {
-    const PairView& then = search_->view();
-    for (PairEnd& e : s.ends) {
-      e.point = view_.to_world(then.to_body(e.point, e.body), e.body);
-      e.normal = view_.turn_to_world(then.turn_to_body(e.normal, e.body), e.body);
-    }
+    search_->view().to_bodies(s);
+    view_.to_world(s);
     return s;
   }
 

@@ -148,21 +148,13 @@ class PairSearch {
     renewed_ = count_;
     for (int i = 0; i < count_; ++i) {
       former_[i] = solutions_[i];
-      for (PairEnd& e : former_[i].ends) {
-        e.point = view_.to_body(e.point, e.body);
-        e.normal = view_.turn_to_body(e.normal, e.body);
-      }
+      view_.to_bodies(former_[i]);
     }
     count_ = 0;
     searched_ = view_.take(now.lag, measurement);
     seen_ = now.time;
     enter(searched_ ? Stage::renewals : Stage::done);
-    for (int i = 0; i < renewed_; ++i) {
-      for (PairEnd& e : former_[i].ends) {
-        e.point = view_.to_world(e.point, e.body);
-        e.normal = view_.turn_to_world(e.normal, e.body);
-      }
-    }
+    for (int i = 0; i < renewed_; ++i) view_.to_world(former_[i]);
   }
 
   void begin_entries() {

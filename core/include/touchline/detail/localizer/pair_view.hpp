@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "touchline/detail/localizer/pair.hpp"
 #include "touchline/detail/model/posture.hpp"
 #include "touchline/detail/place/link_surfaces.hpp"
 #include "touchline/detail/place/measurement.hpp"
@@ -100,6 +101,19 @@ class PairView {
   }
   Vec3 turn_to_world(const Vec3& v, int body) const { return poses_[body].R * v; }
   Vec3 turn_to_body(const Vec3& v, int body) const { return transposed_times(poses_[body].R, v); }
+  // A pair in the frames of its bodies, and back: in another view they are elsewhere.
+  void to_bodies(Pair& s) const {
+    for (PairEnd& e : s.ends) {
+      e.point = to_body(e.point, e.body);
+      e.normal = turn_to_body(e.normal, e.body);
+    }
+  }
+  void to_world(Pair& s) const {
+    for (PairEnd& e : s.ends) {
+      e.point = to_world(e.point, e.body);
+      e.normal = turn_to_world(e.normal, e.body);
+    }
+  }
   // The point of a surface nearest to a point of the world, in world; `face` is -1 beyond `limit`.
   // `near`: the place of a triangle in the mesh that may be near, if known.
   SurfacePoint nearest(int surface, int body, const Vec3& target, double limit,
