@@ -124,10 +124,11 @@ def test_a_recording_has_no_say_in_what_it_is_judged_with():
     def scores(*values):
         return [Tried(Touched(), value) for value in values]
 
-    tried = [scores(0.0, 99.0, 0.0), scores(-1.0, -2.0, -0.5), scores(-1.0, -2.0, -3.0)]
-    assert chosen(tried, 0) == 0  # -2, -4, -3.5; it would have taken the second
-    assert chosen(tried, 1) == chosen(tried, 2) == 1
-    assert chosen([scores(5.0, 0.0), scores(1.0, 1.0)], 0) == 0  # of equal ones the default
+    tried = [scores(0.0, 9.0, 0.0), scores(-1.0, 5.0, -0.5), scores(-1.0, -2.0, -3.0)]
+    assert chosen(tried, 2) == 1
+    assert chosen(tried, 0) == 0  # gains of 6 and -1: 5 +- 7 is luck
+    assert chosen([scores(5.0, 0.0), scores(1.0, 1.0), scores(1.0, 1.0)], 0) == 0  # of equal ones
+    assert chosen([scores(5.0, 0.0), scores(1.0, 9.0)], 0) == 0  # one recording chooses nothing
 
 
 def test_what_is_tried_are_tuning_numbers_and_none_is_the_default():

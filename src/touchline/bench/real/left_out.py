@@ -46,9 +46,19 @@ def try_all(recording: Recording) -> list[Tried]:
 
 
 def chosen(tried: list[list[Tried]], left_out: int) -> int:
-    """Which choice has the best score on all recordings but one; the first where several have."""
+    """Which choice has the best score on all recordings but one.
+
+    The first choice stays unless the best one gains more than the standard error of that gain over
+    the recordings: one recording alone chooses nothing (Breiman et al., Classification and
+    Regression Trees, 1984, section 3.4.3).
+    """
     scores = [[t.score for t in of] for k, of in enumerate(tried) if k != left_out]
-    return int(np.argmax(np.sum(scores, axis=0)))
+    gains = np.array(scores) - np.array(scores)[:, :1]
+    best = int(np.argmax(gains.sum(axis=0)))
+    if len(gains) < 2:
+        return 0
+    error = gains[:, best].std(ddof=1) * len(gains) ** 0.5
+    return best if gains[:, best].sum() > error else 0
 
 
 def named(choice: Mapping[str, float]) -> str:
