@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings that nothing can be identified from, because their signals are not what they seem."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,23 @@ from touchline.errors import InputError
 from touchline.identify.choice import POSES
 from touchline.identify.evidence import Evidence
 from touchline.model.robot import Robot
+
+
+def named(logs: list[Path]) -> str:
+    """The recordings, as a message begins."""
+    return ", ".join(map(str, logs))
+
+
+@contextmanager
+def naming(logs: list[Path]) -> Iterator[None]:
+    """Has messages that name no recording begin with all of them."""
+    try:
+        yield
+    except InputError as error:
+        first, *more = error.problems
+        if any(str(log) in first for log in logs):
+            raise
+        raise InputError([f"{named(logs)}: {first}", *more]) from None
 
 
 def refuse_wrong_signals(robot: Robot, recordings: Recordings, logs: list[Path]) -> None:
@@ -38,7 +57,7 @@ def refuse_wrong_signals(robot: Robot, recordings: Recordings, logs: list[Path])
         )
 
 
-def refuse_one_pose(evidence: Evidence) -> None:
+def refuse_one_pose(evidence: Evidence, logs: list[Path]) -> None:
     """Refuses recordings of a single pose, in which an offset and a mass read the same.
 
     What has no joints stands in the one pose that it has: nothing else can be recorded.
@@ -50,7 +69,7 @@ def refuse_one_pose(evidence: Evidence) -> None:
     if evidence.q.shape[1] > 0 and moved < POSES:
         raise InputError(
             [
-                f"the recordings show one pose: no joint moves by more than {moved:.2g} rad, "
+                f"{named(logs)}: one pose alone: no joint moves by more than {moved:.2g} rad, "
                 f"{POSES:g} rad are needed. An offset of a sensor then reads the same as a mass",
                 "nothing written. Record a minute in which all joints move, or let the arm rest in "
                 "some ten poses for three seconds each: touchline calibrate --plan ROBOT proposes "

@@ -12,6 +12,7 @@ from touchline.detector.calibration import Statistics
 from touchline.detector.tail import Tail, alarm_levels
 from touchline.errors import InputError
 from touchline.figure import FAINT, INK, SHADES, new_figure, panel_label, rendered, styled
+from touchline.folder import check_file
 from touchline.model.values import METHODS
 
 ENDINGS = ".svg", ".png", ".pdf"
@@ -22,7 +23,7 @@ def check_figure(path: Path) -> None:
     """Sees that a figure can be drawn, before the work.
 
     Raises:
-        InputError: the ending is none of `ENDINGS`.
+        InputError: the ending is none of `ENDINGS`, or it cannot be written.
         ModuleNotFoundError: matplotlib is missing.
     """
     from importlib import import_module
@@ -30,6 +31,7 @@ def check_figure(path: Path) -> None:
     if path.suffix not in ENDINGS:
         raise InputError(f"--figure {path}: allowed endings: {', '.join(ENDINGS)}")
     import_module("matplotlib")
+    check_file(path, "--figure")
 
 
 def draw_calibration(result: Calibration, path: Path) -> None:

@@ -10,6 +10,7 @@ from touchline.detector.thresholds import PERIOD_RATIO
 from touchline.errors import InputError
 from touchline.logs import open_log
 from touchline.logs.period import typical_period
+from touchline.logs.presence import Presence
 from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
 
@@ -19,11 +20,18 @@ BESIDE = 0.3  # s on either side of a stretch that is left out
 
 
 class Recordings:
-    """The logs, to be read as often as needed."""
+    """The logs, to be read as often as needed.
+
+    Attributes:
+        seconds: of samples that are not left out.
+        period: of the samples [s].
+        losses: what is said of parts of the logs that cannot be read.
+    """
 
     def __init__(self, robot: Robot, logs: list[Path]) -> None:
         self._robot, self._logs = robot, logs
         self._left_out: list[tuple[int, float, float]] = []
+        self.losses: list[str] = []
         self.seconds = 0.0
         self.period = float("nan")
         seconds = 0.0
@@ -45,15 +53,15 @@ class Recordings:
             )
 
     def _look_at(self, log: Path) -> tuple[float, float]:
-        period, samples = float("nan"), 0
+        period, present = float("nan"), Presence()
         with open_log(log, self._robot.description) as recording:
             for part in recording.chunks(CHUNK):
                 if not np.isfinite(period):
                     period = typical_period(part.time)
-                samples += len(part.time)
-        if not samples:
-            raise InputError(f"{log}: holds no samples")
-        return period, samples * period
+                present.add(part)
+            self.losses += recording.losses
+        present.refuse_void(log)
+        return period, present.samples * period
 
     def all(self, what: str) -> Iterator[Iterator[Samples]]:
         """Every recording, in parts."""

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from touchline.calibrate.beforehand import refuse_one_pose, refuse_wrong_signals
+from touchline.calibrate.afterwards import refuse_touched, refuse_two_robots, refuse_unexplained
+from touchline.calibrate.beforehand import naming, refuse_one_pose, refuse_wrong_signals
 from touchline.calibrate.blame import find_blame, often_off
 from touchline.calibrate.held_out import HeldOut, judge, split
 from touchline.calibrate.noise import measure_noise, noise_keys
@@ -91,6 +92,7 @@ class Calibration:
         delays: that were found beside it.
         frames: of sensors that were found to be off.
         rest: what was learned of what is left; None if that was not asked for.
+        losses: what is said of parts of the recordings that cannot be read.
     """
 
     robot: Robot
@@ -107,6 +109,7 @@ class Calibration:
     delays: tuple[Delay, ...] = ()
     frames: tuple[FrameError, ...] = ()
     rest: Rest | None = None
+    losses: tuple[str, ...] = ()
 
     @property
     def share(self) -> float:
@@ -155,6 +158,7 @@ def calibrate(
     given = given_keys(source).get("detection") or {}
     hold = model.description.detection.min_duration if "min_duration" in given else 0.0
     recordings = Recordings(model, logs)
+    losses = recordings.losses
     if identification and not trust:
         refuse_wrong_signals(model, recordings, logs)
     changes: dict[str, Any] = {}
@@ -166,8 +170,9 @@ def calibrate(
     if identification:
         with threadpool_limits(1, "blas"):  # of small matrices: threads would wait for each other
             described = model
-            evidence = gather(model, recordings.all("equations"))
-            refuse_one_pose(evidence)
+            with naming(logs):
+                evidence = gather(model, recordings.all("equations"))
+            refuse_one_pose(evidence, logs)
             delays = find_delays(evidence)
             if delays:
                 prompt = with_delays(model, delays)
@@ -184,7 +189,12 @@ def calibrate(
                 model = with_frames(model, off)
                 recordings = Recordings(model, logs)
                 evidence = gather(model, recordings.all("equations"))
-            found = identify(evidence, trust)
+            with naming(logs):
+                found = identify(evidence, trust)
+            if not trust:
+                refuse_two_robots(found, logs)
+                refuse_unexplained(found, logs)
+                refuse_touched(found, logs)
             left_out = found.touches()
             if learn:
                 grids = grids_of(evidence)
@@ -209,7 +219,8 @@ def calibrate(
         left_out += more
     except NoThresholds as error:
         if found is None or not found.problem.columns + found.problem.bodies:
-            raise
+            with naming(logs):
+                raise
         lacking = str(error)
         if chosen == (METHOD,):
             short = short_thresholds(
@@ -245,6 +256,7 @@ def calibrate(
         tuple(delays),
         tuple(frames),
         rest,
+        tuple(losses),
     )
 
 
@@ -314,7 +326,7 @@ def _check(logs: list[Path], out: Path, false_alarms: float | None) -> None:
         raise InputError(f"--out {out}: a robot description ends in .yaml")
     if out.is_dir():
         raise InputError(f"--out {out}: is a folder")
-    check_file(out)
+    check_file(out, "--out")
     seen: set[Path] = set()
     for log in logs:
         if log.resolve() in seen:

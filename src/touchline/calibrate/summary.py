@@ -24,7 +24,7 @@ def summary_text(result: Calibration) -> str:
         f"{len(result.logs)} recording{'s' * (len(result.logs) > 1)}, "
         f"{result.seconds / 60:.1f} min at {1 / result.period:.0f} Hz"
     )
-    parts = [[head], _left_out_lines(result)]
+    parts = [[head, *(f"  {loss}" for loss in result.losses)], _left_out_lines(result)]
     if result.identification is not None:
         late = [
             f"  {x.name}: {1e3 * abs(x.value):.2f} +- {1e3 * x.error:.2g} ms "

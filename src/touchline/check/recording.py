@@ -16,8 +16,8 @@ from touchline.check.noise import check_noise
 from touchline.check.seen import Seen, look
 from touchline.check.wrenches import check_wrenches
 from touchline.detector.thresholds import make_thresholds
-from touchline.errors import InputError
 from touchline.logs import open_log
+from touchline.logs.presence import Presence
 from touchline.model.robot import Robot
 from touchline.observer.bandwidths import bandwidth_warnings, bandwidths
 from touchline.observer.samples import Samples
@@ -53,18 +53,21 @@ def check_recording(robot: Robot, path: Path, findings: Findings) -> None:
     would explain them (a hand, a link, a tilted base) is found, and the rest is judged without it.
 
     Raises:
-        InputError: the log cannot be read, or holds no samples.
+        InputError: the log cannot be read, or holds nothing that could be judged.
     """
 
     def read() -> Iterator[Samples]:
         with open_log(path, robot.description) as log:
             yield from log.chunks(CHUNK)
 
+    present = Presence()
     with open_log(path, robot.description) as log:
+        for part in log.chunks(CHUNK):
+            present.add(part)
         findings.note("recording", *(f"  {line}" for line in log.warnings))
+    present.refuse_void(path)
     mending, seen = _mend(robot, read, findings)
-    if seen is None:
-        raise InputError(f"{path}: holds no samples")
+    assert seen is not None  # there are samples
     plain = Findings()
     _judge(robot, seen, plain)
     # A weight that is wrong makes a light joint's torque look compensated, turned or scaled.

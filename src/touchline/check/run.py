@@ -9,6 +9,7 @@ from touchline.check.findings import Findings
 from touchline.check.interface import check_interface
 from touchline.check.model import check_model
 from touchline.errors import InputError
+from touchline.folder import check_file
 from touchline.model.robot import load_robot
 from touchline.model.robot_file import write_description
 from touchline.model.yaml_file import read_yaml
@@ -33,6 +34,17 @@ def check(robot: str | Path, log: str | Path | None = None) -> Findings:
     return findings
 
 
+def check_fix(out: Path) -> None:
+    """Makes sure, before the work begins, that a corrected description can be written.
+
+    Raises:
+        InputError: it cannot.
+    """
+    if out.suffix not in (".yaml", ".yml"):
+        raise InputError(f"--fix {out}: a robot description ends in .yaml")
+    check_file(out, "--fix")
+
+
 def write_fixes(robot: str | Path, found: Findings, out: Path) -> str:
     """Writes the description with what would mend findings; returns what was done.
 
@@ -40,8 +52,8 @@ def write_fixes(robot: str | Path, found: Findings, out: Path) -> str:
         InputError: the file cannot be written, or there is none to start from.
     """
     source = load_robot(robot).description.path
-    if source is None or out.suffix not in (".yaml", ".yml"):
-        raise InputError(f"--fix {out}: needs a robot.yaml to start from, and to end in .yaml")
+    if source is None:
+        raise InputError(f"--fix {out}: needs a robot.yaml to start from")
     if not found.fixes:
         return "nothing that could be mended by itself: nothing written"
     fixes = dict(found.fixes)

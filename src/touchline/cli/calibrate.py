@@ -66,6 +66,12 @@ def calibrate(
     from touchline.errors import InputError
 
     if plan is not None:
+        beside = {"LOG": logs, "--robot": robot, "--method": method, "--trust": trust}
+        beside |= {"--false-alarms": false_alarms, "--no-identify": not identify, "--learn": learn}
+        beside |= {"--figure": figure, "--pictures": pictures}
+        if any(beside.values()):
+            given = ", ".join(name for name, value in beside.items() if value)
+            raise InputError(f"--plan {plan}: proposes a motion and reads none: leave {given} out")
         return _plan(plan, out or Path("motion"))
     if robot is None or out is None:
         raise InputError("calibrate: --robot and --out are needed, or --plan ROBOT")
@@ -76,6 +82,12 @@ def calibrate(
         from touchline.calibrate.figure import check_figure
 
         check_figure(figure)
+    if pictures is not None:
+        from touchline.folder import make_folder
+
+        if not identify:
+            raise InputError("--pictures: draws what was identified: leave --no-identify out")
+        make_folder(pictures)
     with described(robot, logs[0] if logs else None, out) as source:
         result = run(list(logs), source, out, method, false_alarms, trust, identify, learn)
     print(summary_text(result))

@@ -36,6 +36,10 @@ def check(
     """
     from touchline.check.run import check as run
 
+    if fix is not None:
+        from touchline.check.run import check_fix
+
+        check_fix(fix)
     result = run(robot, log)
     print(result.text())
     if fix is not None:

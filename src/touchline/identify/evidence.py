@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.arrays import Array, Index, Mask
+from touchline.errors import InputError
 from touchline.identify.regressor import Rows, body_vector, momentum_regressors, rows_of
 from touchline.identify.smoothing import Steps, derivative, make_steps, mean, settled, smooth
 from touchline.model.description import Friction
@@ -122,7 +123,7 @@ def gather(
     """Filters recordings of contact-free motion.
 
     Raises:
-        ValueError: none of them has samples of which anything could be made.
+        InputError: none of them has samples of which anything could be made.
     """
     found: Evidence | None = None
     for recording in recordings:
@@ -131,7 +132,9 @@ def gather(
             one = _gather_one(robot, signals, bandwidth)
             found = one if found is None else found.joined(one)
     if found is None:
-        raise ValueError("no recording is long enough: a second of motion at least")
+        raise InputError(
+            "a second of samples is needed in which positions, velocities and readings have values"
+        )
     every = -(-len(found) // MOST)
     return found.part(np.arange(0, len(found), every))
 

@@ -11,6 +11,8 @@ FAR = 8.0  # usual sigmas; what a good fit leaves seldom lies so far out
 SHORTEST = 0.1  # s; shorter excursions are reversals, not touches
 STICTION = 2.5  # times Coulomb friction, that a slow joint may hold without anybody's help
 SLOW = 0.2  # rad/s; up to here, less and less of it
+WITHIN = 0.2  # s; a touch begins or ends faster, and the filter follows within that
+ENOUGH = 50  # changes before deciles of them mean something
 BESIDE = 2.0  # time constants of the filter on either side belong to a touch
 _QUANTILE = 0.524  # 40 % of normal values lie within so many sigmas of the middle
 
@@ -64,6 +66,34 @@ def find_touches(evidence: Evidence, left: Array, coulomb: Array) -> Mask:
         near = (evidence.time >= begin - beside) & (evidence.time <= end + beside)
         touched |= own & near
     return touched
+
+
+def jumps(evidence: Evidence, left: Array, use: Mask) -> tuple[int, float]:
+    """The row whose residual jumps most, and how: changes within `WITHIN`, large ones over usual.
+
+    Touches begin and end; errors of a model come and go with the motion.
+
+    Args:
+        evidence: the instants.
+        left: (N, R) residuals after a fit.
+        use: (N,) the instants; changes across others do not count.
+
+    Returns:
+        A row, and the ninth decile of its changes in units of their median: 2.4 for normal noise.
+    """
+    steps = np.diff(evidence.time)[np.diff(evidence.recording) == 0]
+    apart = max(1, round(WITHIN / float(np.median(steps)))) if len(steps) else 1
+    if len(left) <= apart:
+        return 0, 0.0
+    skipped = np.concatenate([[0], np.cumsum(~use)])
+    whole = skipped[apart + 1 :] == skipped[: -apart - 1]
+    whole &= evidence.recording[apart:] == evidence.recording[:-apart]
+    if whole.sum() < ENOUGH:
+        return 0, 0.0
+    change = np.abs(left[apart:] - left[:-apart])[whole]
+    usual, large = np.quantile(change, (0.5, 0.9), axis=0)
+    size = np.where(evidence.used, large / np.maximum(usual, 1e-12), 0.0)
+    return int(np.argmax(size)), float(size.max(initial=0.0))
 
 
 def stretches(evidence: Evidence, touched: Mask) -> list[tuple[int, float, float]]:
