@@ -481,7 +481,7 @@ class Detector {
     bool slow = true, creeps = true;
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
       if (shares_[i] < std::min(1.0, segments_[g].peak)) continue;
-        const double trend = states_.trend[i];
+      const double trend = states_.trend[i];
       const double quick = samples_[i].residual - trend, before = trend - states_.baseline[i];
       slow = slow && rows_[i].component < 0 &&
           std::fabs(qd_[rows_[i].joint]) < tuning_.reversal_speed;
@@ -495,7 +495,7 @@ class Detector {
   bool pushed(std::size_t g) const {
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
       if (rows_[i].component < 0 || std::fabs(normalized_[i]) < limits_[i]) continue;
-        const double trend = states_.trend[i];
+      const double trend = states_.trend[i];
       const double quick = samples_[i].residual - trend, before = trend - states_.baseline[i];
       if (std::fabs(quick) >= tuning_.creep_share * std::fabs(before)) return true;
     }
