@@ -255,9 +255,9 @@ class Browser:
 
     def _insist(self, ask: Callable[[float], Any], what: str) -> Any:
         """What the page answers; now and then it waits for a frame that never comes."""
-        for _ in range(5):
+        for patience in (PATIENCE / 4, PATIENCE / 2, PATIENCE, PATIENCE):
             try:
-                return ask(PATIENCE / 4)
+                return ask(patience)
             except TimeoutError:
                 self.call("Page.bringToFront")
         raise AssertionError(f"the browser {what}")

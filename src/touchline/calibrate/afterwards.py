@@ -15,7 +15,7 @@ from touchline.identify.touches import jumps
 # Jumps (see `jumps`) of what counts as untouched. Normal noise has 2.4. Free recordings of real
 # arms with friction have up to 10.2, and at most 1 % of them seem touched. Simulated arms that are
 # touched for more than 60 % of the time have at least 17 where little of that was found, at least 6
-# where much was; of those that are touched half of the time and found well none has more than 4.
+# where much was. Of those that are touched half of the time and found well none has more than 4.
 MUCH = 0.3  # of the time seems touched
 MOST_JUMPS, MOST_JUMPS_BESIDE_MUCH = 13.0, 5.0
 UNEXPLAINED = 0.3  # of what is read; of real arms 0.03 to 0.09 is left, of another robot's log 1.3

@@ -38,7 +38,7 @@ inline void solve_lower(const double* l, int n, double* x, int stride = 1) {
 }
 
 // The same for `width` right sides that stand side by side, x[i * width] to x[i * width + width - 1],
-// whole registers of them: in each the operations of one alone, so that the last bits are the same.
+// whole registers of them. Each goes through the operations of one alone: the last bits are the same.
 template <int width>
 inline void solve_lower_rows(const double* l, int n, double* x) {
   constexpr int kCount = width / kLanes;  // registers of a row
