@@ -255,7 +255,7 @@ class Browser:
 
     def _insist(self, ask: Callable[[float], Any], what: str) -> Any:
         """What the page answers; now and then it waits for a frame that never comes."""
-        for patience in (PATIENCE / 4, PATIENCE / 2, PATIENCE, PATIENCE):
+        for patience in (*[PATIENCE / 4] * 5, PATIENCE, PATIENCE):  # or it is slow to draw
             try:
                 return ask(patience)
             except TimeoutError:
