@@ -546,7 +546,7 @@ class Detector {
     const double trend = states_.trend[i];
     states_.baseline[i] = states_.anchor[i] = states_.origin[i] = states_.reference[i] = trend;
     states_.shown[i] = std::max(states_.shown[i], std::fabs(trend));
-    states_.age[i] = states_.referred[i] = tuning_.trend / bandwidths_[i];
+    states_.age[i] = states_.referred[i] = settled_at_[i];
   }
 
   // What is left of a contact and does not change rests there: an offset from now on. What stood
