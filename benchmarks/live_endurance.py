@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """A robot that is read for a long time: memory, and what a blocked Python costs.
 
-python benchmarks/live_endurance.py [MINUTES [STALLS]]
+python benchmarks/live_endurance.py [MINUTES [STALLS [WARM]]]
 
 An arm of its own process moves without a touch and sends 500 samples a second over RTDE. For
 MINUTES (default 4) `touchline live` reads it with page and recorder, and so does the node with a
-recorder, where ROS 2 is there: the slope of their resident memory, after the first minute. Before
-that Python is blocked STALLS times (default 20) for 0.3 s, and collects three million objects: the
+recorder, where ROS 2 is there: the slope of their resident memory, after WARM minutes more (default
+1), in which libraries take what they keep. Before that Python is blocked STALLS times (default 20) for 0.3 s, and collects three million objects: the
 longest time between two processed samples, beside that of an idle Python.
 """
 
@@ -27,7 +27,6 @@ from live_faults import Peer, write_motion
 STALL, RATE = 0.3, 500.0  # s, Hz
 OBJECTS = 3_000_000
 PAGE = 4096  # bytes
-WARM = 60.0  # s until memory counts
 
 
 def stalls(arm, address: str, aside: bool, count: int) -> None:
@@ -74,7 +73,7 @@ def _follow(news, seconds: float) -> None:
         next(news)
 
 
-def memory(folder: Path, address: str, minutes: float) -> None:
+def memory(folder: Path, address: str, minutes: float, warm_minutes: float) -> None:
     """Prints the slope of the resident memory of `touchline live` and of the node.
 
     All of it, and what the process has asked for itself. The rest are pages of files, libraries
@@ -99,7 +98,7 @@ def memory(folder: Path, address: str, minutes: float) -> None:
             running[name] = process.pid
         times: list[float] = []
         sizes: dict[str, list[tuple[float, float]]] = {name: [] for name in running}
-        end = time.monotonic() + 60.0 * minutes
+        end = time.monotonic() + 60.0 * (warm_minutes + minutes)
         while (now := time.monotonic()) < end:
             times.append(now)
             for name, pid in running.items():
@@ -112,7 +111,7 @@ def memory(folder: Path, address: str, minutes: float) -> None:
             ),
         }
     seconds = np.array(times) - times[0]
-    warm = seconds > min(WARM, 0.5 * seconds[-1])
+    warm = seconds > 60.0 * warm_minutes
     hours = seconds[warm] / 3600.0
     for name, values in sizes.items():
         print(f"{name}, over {60 * np.ptp(hours):.1f} min; {written[name] / 1e6:.1f} MB recorded")
@@ -139,6 +138,7 @@ def main() -> None:
 
     minutes = float(sys.argv[1]) if len(sys.argv) > 1 else 4.0
     count = int(sys.argv[2]) if len(sys.argv) > 2 else 20
+    warm_minutes = float(sys.argv[3]) if len(sys.argv) > 3 else 1.0
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         arm = make_arm(folder, 6)
@@ -150,7 +150,7 @@ def main() -> None:
                 stalls(arm, address, False, count)
                 stalls(arm, address, True, count)
             if minutes > 0.0:
-                memory(folder, address, minutes)
+                memory(folder, address, minutes, warm_minutes)
         finally:
             peer.kill()
     print(f"load of this machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")

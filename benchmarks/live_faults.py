@@ -105,26 +105,27 @@ def serve(port: int, path: str) -> None:
 
     controller = FakeController(Samples(**np.load(path)), port=port)
 
-    def tell(word: str, *counts: int) -> None:
-        print(word, repr(time.monotonic()), *counts, flush=True)
+    def tell(word: str, *counts: int, at: float | None = None) -> None:
+        print(word, repr(at or time.monotonic()), *counts, flush=True)
 
     print("port", controller.port, flush=True)
     tell("on", 0, 0)
     for line in sys.stdin:
         kind, argument = line.split()
+        before = time.monotonic()  # whoever sees the fault sees it later, whatever runs in between
         if kind == "pause":
             controller.paused.set()
-            tell("off")
+            tell("off", at=before)
             time.sleep(float(argument))
             controller.paused.clear()
             tell("on", 0, 0)
         elif kind == "clock":
-            tell("off")
+            tell("off", at=before)
             controller.clock += float(argument)
             tell("on", 0, 0)
         else:
             tamper = Tamper(argument)
-            tell("off")
+            tell("off", at=before)
             controller.tamper = tamper
             time.sleep(TAMPERED)
             kept = controller.tamper
