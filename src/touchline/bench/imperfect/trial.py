@@ -73,8 +73,12 @@ class Trials:
         loads[:, n:] -= contact.wrench.reshape(len(q), -1)
         s = fault.read(self._robot, maker.sensed(q, qd, loads, rng), rng)
         pipeline = Pipeline(self._robot, period=1.0 / RATE, skin=self._skin)
-        pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
-        return _judged(pipeline.events, maker.time, path)
+        first = round(BEGIN * RATE)
+        for part in (slice(0, first), slice(first, None)):
+            pipeline.run(s.time[part], s.q[part], s.qd[part], s.tau[part], s.wrench[part])
+            if part.start == 0:
+                before = any(e.status == Status.LOCATED for e in pipeline.events)
+        return _judged(pipeline.events, before, maker.time, path)
 
     def _touch(self, q: Array, rng: np.random.Generator) -> Touch:
         sampler = TouchSampler(self._skin, rng, self._segments, floor=-10.0)
@@ -104,12 +108,12 @@ def _scaled(trajectory: Trajectory, speed: float) -> Trajectory:
     return replace(trajectory, amplitude=trajectory.amplitude * speed / most)
 
 
-def _judged(events: list[Event], time: Array, path: Array) -> Outcome:
+def _judged(events: list[Event], before: bool, time: Array, path: Array) -> Outcome:
     end = END + RISE
     own = [e for e in events if BEGIN <= e.detected <= end]
     over = [e for e in events if e.detected < BEGIN and _ended(e) > end]
     return Outcome(
-        before=any(e.detected < BEGIN and e.status == Status.LOCATED for e in events),
+        before=before,
         found=bool(own or over),
         wrong=any(_wrong(e, time, path) for e in events),
         cleared=all(_ended(e) <= end + LATE for e in events if e.detected <= end),
@@ -126,7 +130,7 @@ def _wrong(event: Event, time: Array, path: Array) -> bool:
     if event.status != Status.LOCATED or event.position is None:
         return False
     at = event.time_of_position
-    if at is None or not BEGIN <= at <= END + 2 * RISE:
+    if at is None or at < BEGIN or event.detected > END + 2 * RISE:
         return True
     place = path[min(int(np.searchsorted(time, at)), len(path) - 1)]
     return float(np.linalg.norm(event.position - place)) > NEAR

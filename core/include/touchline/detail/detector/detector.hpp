@@ -71,6 +71,7 @@ class Detector {
         normalized_(rows_.size(), 0.0),
         shares_(rows_.size(), 0.0),
         drift_(rows_.size(), 0.0),
+        shown_before_(rows_.size(), 0.0),
         excess_(rows_.size(), 1.0),
         standing_(rows_.size()),
         first_looks_(rows_.size()),
@@ -206,6 +207,7 @@ class Detector {
     double score = 0.0, borne_score = 0.0;  // of all tests, in thresholds
     double highest = 0.0;  // of the score while a test holds
     double top = 0.0;    // the largest mean of the last moments since then, in limits
+    double top_wrench = 0.0;  // the same of the sensors' rows alone
     double rest = 0.0;   // for how long little has been left of it, and that has not changed [s]
     double back = 0.0;   // for how long all has been as before the offset that stands there now [s]
     double other_quiet = 0.0;  // over how long its rows' `other` has been averaged [s]
@@ -410,6 +412,12 @@ class Detector {
 
   void decide(std::size_t g, double dt) {
     Segment& s = segments_[g];
+    if (is_joined(g)) {  // what there was is an offset, and the push is its own event
+      come_to_rest(g);
+      s.lasted = 0.0;
+      s.in_motion = true;
+      return;
+    }
     const bool quiet = levels_[g] == 0 && !s.pending;
     const bool may_begin = s.score > 1.0 || s.collision > 1.0 || (s.off && still_ < tuning_.pause);
     if (quiet && may_begin) s.origin = origin(g, dt);
@@ -423,13 +431,14 @@ class Detector {
     if (lasts(g, s.pending, s.above, s.score, s.borne_score)) levels_[g] = std::max(levels_[g], 1);
     if (lasts(g, s.pending_collision, s.above_collision, s.collision, s.borne_collision)) levels_[g] = 2;
     if (levels_[g] == 0) {
-      s.top = s.rest = s.back = s.below = s.lasted = 0.0;
+      s.top = s.top_wrench = s.rest = s.back = s.below = s.lasted = 0.0;
       s.in_motion = still_ < tuning_.pause;
       return;
     }
     s.lasted += dt;
     s.top = std::max(s.top, lately(g));
-    s.rest = lasting(may_rest(g) && steady(g), dt, s.rest);
+    s.top_wrench = std::max(s.top_wrench, lately(g, Rows::wrench));
+    s.rest = lasting((may_rest(g) && steady(g)) || only_joints_left(g), dt, s.rest);
     if (s.below >= settings_.times.hold) levels_[g] = 0;
     const double least = tuning_.rest / slowest_[g];
     if (levels_[g] > 0 &&
@@ -502,6 +511,21 @@ class Detector {
     return false;
   }
 
+  // Does a push join what most likely is the arm's own doing, or what only joints have felt, of an arm
+  // in motion that is not as told? A sensor's wrench then steps by more than its limit. What lasts for
+  // less than the mean of the last moments has no before.
+  bool is_joined(std::size_t g) const {
+    const Segment& s = segments_[g];
+    if (levels_[g] == 0 || !moved_off(g)) return false;
+    if (s.top_wrench > 1.0 && (s.origin == Origin::push || !own_doing(g))) return false;
+    if (s.lasted < tuning_.trend / slowest_[g]) return false;
+    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+      const double quick = samples_[i].residual - states_.trend[i];
+      if (counts(i, Rows::wrench) && std::fabs(quick) > limits_[i] * rows_[i].contact) return true;
+    }
+    return false;
+  }
+
   // Is what is felt of a segment most likely the arm's own doing: an error of its model in motion?
   bool own_doing(std::size_t g) const {
     const Segment& s = segments_[g];
@@ -519,13 +543,32 @@ class Detector {
     return stands() ? s.off : lately(g) < std::max(tuning_.barely, tuning_.trace * s.top);
   }
 
+  // Has the arm shown that it is not as told, and does it move, or has it since the event began?
+  bool moved_off(std::size_t g) const {
+    const Segment& s = segments_[g];
+    return s.off && (s.in_motion || still_ < tuning_.pause);
+  }
+
+  // Does nothing of a contact load the segment's sensors any more, of such an arm? What its joints then have is friction that has changed meanwhile. One
+  // that is clamped does not lose its load on the sensors at once and keep that on the joints.
+  bool only_joints_left(std::size_t g) const {
+    return moved_off(g) && segments_[g].top_wrench > 1.0 &&
+           lately(g, Rows::wrench) < settings_.times.release && steady(g, Rows::wrench);
+  }
+
   bool stands() const { return activity().speed2 < tuning_.standing * tuning_.standing; }
 
+  // Which rows of a segment: all, or those that its sensor's wrench has.
+  enum class Rows { all, wrench };
+  bool counts(std::size_t i, Rows which) const {
+    return samples_[i].known && (which == Rows::all || rows_[i].component >= 0);
+  }
+
   // The mean of the last moments, in limits: the largest of a segment's rows.
-  double lately(std::size_t g) const {
+  double lately(std::size_t g, Rows which = Rows::all) const {
     double most = 0.0;
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
-      if (!samples_[i].known) continue;
+      if (!counts(i, which)) continue;
       const double off = states_.trend[i] - states_.baseline[i];
       most = std::max(most, std::fabs(off) / (limits_[i] * rows_[i].contact));
     }
@@ -533,10 +576,10 @@ class Detector {
   }
 
   // Has no row of the segment changed of late by what would matter?
-  bool steady(std::size_t g) const {
+  bool steady(std::size_t g, Rows which = Rows::all) const {
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
       const double most = settings_.times.release * limits_[i] * rows_[i].contact;
-      if (samples_[i].known && std::fabs(samples_[i].residual - states_.trend[i]) > most) return false;
+      if (counts(i, which) && std::fabs(samples_[i].residual - states_.trend[i]) > most) return false;
     }
     return true;
   }
@@ -586,7 +629,7 @@ class Detector {
     levels_[g] = 0;
     Segment& s = segments_[g];
     s.pending = s.pending_collision = false;
-    s.above = s.above_collision = s.below = s.top = s.rest = s.back = 0.0;
+    s.above = s.above_collision = s.below = s.top = s.top_wrench = s.rest = s.back = 0.0;
   }
 
   // For how long a test has held without a break.
@@ -768,7 +811,8 @@ class Detector {
     if (least > rows_[i].contact) standing_[i].start = std::copysign(least, anchor);
   }
 
-  // Drifts of the rows, from where the arm was while the baselines were averaged.
+  // Drifts of the rows, from where the arm was while the baselines were averaged. Of one that is not
+  // as told at least what motion had shown before the present event.
   void follow_drift(const double* q, double dt) {
     for (std::size_t g = 0; g < segments_.size(); ++g) {
       if (levels_[g] == 0 && !segments_[g].pending && quiet_[g] > 0.0) {
@@ -776,8 +820,13 @@ class Detector {
         baseline_posture_.average(g, q, std::min(1.0, dt / tau));
       }
       const DriftShares shares(activity(), baseline_posture_.distance2(g, q), tuning_);
-      for (std::size_t i = first_[g]; i < first_[g + 1]; ++i)
-        drift_[i] = std::sqrt(drifted(rows_[i], activity(), shares));
+      const bool moved = moved_off(g), shows = levels_[g] > 0 ? own_doing(g) : !segments_[g].pending;
+      const double sigmas2 = tuning_.drift_shown * tuning_.drift_shown;
+      for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+        if (shows) shown_before_[i] = spreads_[i].variance_beyond(meters_.sigma(i));
+        const double seen = moved && rows_[i].seen > 0.0 ? sigmas2 * shown_before_[i] : 0.0;
+        drift_[i] = std::sqrt(std::max(drifted(rows_[i], activity(), shares), seen));
+      }
     }
   }
 
@@ -813,6 +862,7 @@ class Detector {
   std::vector<double> collision_shares_;  // per row: its threshold, in those of a collision
   std::vector<double> normalized_, shares_;  // in thresholds; the size of that, in limits
   std::vector<double> drift_, excess_;
+  std::vector<double> shown_before_;  // per row: variance of what motion had shown before an event
   std::vector<Standing> standing_;  // per row
   std::vector<FirstLook> first_looks_;  // per row
   std::vector<int> levels_;

@@ -27,6 +27,12 @@ class MotionSpread {
     return tuning.motion_sigmas * std::sqrt(square_);
   }
 
+  // Mean square of what it has been off beyond noise of one sigma `noise` [N2 or N2 m2]. In the first
+  // moments that alone makes the mean of its squares up to twice as large as expected.
+  double variance_beyond(double noise) const {
+    return std::max(0.0, square_ - 2.0 * noise * noise);
+  }
+
  private:
   double time_ = 0.0, square_ = 0.0;
 };

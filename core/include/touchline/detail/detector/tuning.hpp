@@ -87,6 +87,10 @@ struct DetectorTuning {
   // In a joint's own torque there is friction, all of which comes with a motion so fast [rad/s].
   // Half: it comes with a joint that creeps. Double: with one that already turns.
   double drift_speed = 0.1;
+  // Root mean squares of what motion has shown that are one sigma of such an error, on an arm that
+  // nobody has calibrated. A friction that changes sign exceeds its own twofold. Half: what it leaves
+  // is placed as one more contact. Double: pushes on such arms are placed less often.
+  double drift_shown = 2.0;
 
   // ---- When an arm moves ----
   // Slower than this it stands [rad/s]; a hand that pushes an arm moves it, too. Half: trembling
@@ -193,6 +197,7 @@ struct DetectorTuning {
     v("drift_way", "rad", t.drift_way);
     v("drift_farthest", "rad", t.drift_farthest);
     v("drift_speed", "rad/s", t.drift_speed);
+    v("drift_shown", "1", t.drift_shown);
     v("standing", "rad/s", t.standing);
     v("moving", "rad/s", t.moving);
     v("pause", "s", t.pause);
