@@ -33,7 +33,7 @@ static double distance(const Triangle& t, const ForceLine& line) {
 int main() {
   std::mt19937 chance(1);
   const auto draw = [&] { return 2e-9 * static_cast<double>(chance() % 1000000000) - 1.0; };
-  int wrong = 0, found = 0, looked = 0;
+  int wrong = 0, found = 0, looked = 0, kept = 0;
   for (int round = 0; round < 12; ++round) {
     std::vector<Vec3> vertices;
     std::vector<std::array<int, 3>> faces;
@@ -52,13 +52,30 @@ int main() {
       const Vec3 way{draw(), draw(), draw()};
       const ForceLine line{{draw(), draw(), draw()}, (1.0 / norm(way)) * way};
       const double limit = 0.2 + 0.2 * draw(), steep = 0.5 * draw();
-      std::map<int, double> seen;
-      mesh.around(line, limit, steep, [&](const SurfacePoint& p) {
+      std::map<int, double> seen, weighed;
+      const Vec3 one = cross(line.direction, Vec3{draw(), draw(), draw()});
+      Beside beside{{(1.0 / norm(one)) * one, {}}, {0.0, 0.0}};
+      beside.axis[1] = cross(line.direction, beside.axis[0]);
+      const auto all = [] { return 1.0; };
+      mesh.around(line, beside, limit, steep, all, [&](const SurfacePoint& p) {
         const Vec3 off = p.point - line.origin;
         const double way = norm(off - dot(off, line.direction) * line.direction);
+        const double a = dot(beside.axis[0], off), b = dot(beside.axis[1], off);
         if (std::fabs(way - p.distance) > 1e-12 || seen.count(p.face)) ++wrong;
         seen[p.face] = p.distance;
+        weighed[p.face] = 4.0 * a * a + 90.0 * b * b;
       });
+      // Weighed, none is left out whose nearest point is less far; the bound shrinks as it may.
+      beside.weight[0] = 4.0, beside.weight[1] = 90.0;
+      double most = 0.5, least = 1e300;
+      mesh.around(line, beside, limit, steep, [&] { return most; }, [&](const SurfacePoint& p) {
+        if (seen[p.face] != p.distance) ++wrong;
+        least = std::min(least, weighed[p.face]);
+        weighed.erase(p.face);
+        most = std::min(most, least);
+        ++kept;
+      });
+      for (const auto& [face, square] : weighed) wrong += square < std::min(0.5, least) ? 1 : 0;
       for (const Triangle& t : mesh.triangles()) {
         const double true_one = distance(t, line), cosine = -dot(t.normal, line.direction);
         if (std::fabs(true_one - limit) < 1e-3 || std::fabs(cosine - steep) < 1e-9) continue;
@@ -70,6 +87,6 @@ int main() {
       }
     }
   }
-  std::printf("%d %d %d\n", wrong, found, looked);
+  std::printf("%d %d %d %d\n", wrong, found, looked, kept);
   return 0;
 }

@@ -31,6 +31,13 @@ struct Crossing {
   Vec3 normal;
 };
 
+// What ways beside a line weigh: the square along each of two unit axes across it, times a weight
+// [1/m2].
+struct Beside {
+  Vec3 axis[2];
+  double weight[2];
+};
+
 struct SurfacePoint {
   double distance = std::numeric_limits<double>::infinity();
   int face = -1;
@@ -83,19 +90,23 @@ class Mesh {
   }
 
   // Calls `visit(SurfacePoint)` for the point nearest to the line of each triangle that is nearer
-  // to it than `limit` and stands against it: at a cosine above `steep`.
-  template <class Visit>
-  void around(const ForceLine& line, double limit, double steep, Visit&& visit) const {
-    const Vec3 inverse = invert(line.direction);
+  // to it than `limit` and stands against it: at a cosine above `steep`. Triangles of which every
+  // point is at a weighed square of `most()` or more are left out; that may shrink meanwhile.
+  template <class Most, class Visit>
+  void around(const ForceLine& line, const Beside& beside, double limit, double steep, Most&& most,
+              Visit&& visit) const {
+    const Cutoff cutoff(line, beside);
+    const double square = limit * limit;
     const Triangle* some[kLanes];
     int count = 0;
     visit_triangles(
         [&](const Box& box, int index) {
-          return tree_->faces[index].may_stand_against(line.direction, steep) &&
-                 crosses(box, line.origin, inverse, limit);
+          return cutoff.may_hold(box, square, most()) &&
+                 tree_->faces[index].may_stand_against(line.direction, steep);
         },
         [&](const Triangle& tri) {
           if (!(-dot(tri.normal, line.direction) > steep)) return;
+          if (!cutoff.may_hold(tri, square, most())) return;
           some[count++] = &tri;
           if (count < kLanes) return;
           nearer_to_line(some, count, line, limit, visit);
@@ -154,6 +165,54 @@ class Mesh {
       return most > steep - kRounded;
     }
     static constexpr double kRounded = 1e-5;  // of the cosines, which are floats
+  };
+
+  // What is beside a line by less than a distance, and by less than a weighed square. If in doubt,
+  // it is.
+  class Cutoff {
+   public:
+    Cutoff(const ForceLine& line, const Beside& beside) {
+      for (int i = 0; i < 2; ++i) {
+        const Vec3& a = axis_[i] = beside.axis[i];
+        size_[i] = {std::fabs(a.x), std::fabs(a.y), std::fabs(a.z)};
+        from_[i] = dot(a, line.origin);
+        weight_[i] = beside.weight[i];
+      }
+    }
+
+    bool may_hold(const Box& box, double square, double most) const {
+      const Vec3 low = exact(box.low), high = exact(box.high);
+      const Vec3 twice = low + high, size = high - low;  // of the centre, of half the size
+      double way[2];
+      for (int i = 0; i < 2; ++i)
+        way[i] = std::fabs(0.5 * dot(axis_[i], twice) - from_[i]) - 0.5 * dot(size_[i], size);
+      return holds(way, square, most);
+    }
+
+    bool may_hold(const Triangle& tri, double square, double most) const {
+      double way[2];
+      for (int i = 0; i < 2; ++i) {
+        const double a = dot(axis_[i], tri.a) - from_[i];
+        const double b = a + dot(axis_[i], tri.ab), c = a + dot(axis_[i], tri.ac);
+        way[i] = std::max(std::min({a, b, c}), -std::max({a, b, c}));
+      }
+      return holds(way, square, most);
+    }
+
+   private:
+    static constexpr double kRounding = 1e-9;  // of ways [m], and a part of what they weigh
+
+    bool holds(const double* way, double square, double most) const {
+      double near[2];
+      for (int i = 0; i < 2; ++i) {
+        const double w = std::max(0.0, way[i] - kRounding);
+        near[i] = (1.0 - kRounding) * w * w;
+      }
+      return near[0] + near[1] < square && weight_[0] * near[0] + weight_[1] * near[1] < most;
+    }
+
+    Vec3 axis_[2], size_[2];
+    double from_[2], weight_[2];
   };
 
   // Triangles in the order of their boxes. Copies of a mesh share it: it never changes.
@@ -288,10 +347,9 @@ class Mesh {
     return {inverse(d.x), inverse(d.y), inverse(d.z)};
   }
 
-  // Does the line through `o` cross the box, or one that is wider by `pad`?
-  static bool crosses(const Box& box, const Vec3& o, const Vec3& inverse, double pad = 0.0) {
-    const Vec3 wide{pad, pad, pad};
-    const Vec3 low = exact(box.low) - wide - o, high = exact(box.high) + wide - o;
+  // Does the line through `o` cross the box?
+  static bool crosses(const Box& box, const Vec3& o, const Vec3& inverse) {
+    const Vec3 low = exact(box.low) - o, high = exact(box.high) - o;
     const double x0 = low.x * inverse.x, x1 = high.x * inverse.x;
     const double y0 = low.y * inverse.y, y1 = high.y * inverse.y;
     const double z0 = low.z * inverse.z, z1 = high.z * inverse.z;

@@ -109,6 +109,7 @@ class Explanations {
  private:
   // Room: for candidates, for starts on a surface, for faces beside a line.
   static constexpr int kMost = 192, kStarts = 3, kPassed = 4;
+  static constexpr double kRounding = 1e-9;  // a part of costs and weights, far above what they err by
 
   // Can any point explain, by the bounds that each body sets: the misfit of the best wrench at all,
   // and of the best one of a pure force?
@@ -184,21 +185,28 @@ class Explanations {
     if (!fitter_.place_metric(view.q, middle, view.wrench.linear, G)) return false;
     Candidate starts[kPassed];
     int found = 0;
-    const double limit =
-        std::min(settings_.farthest, settings_.face_sigmas * widest(G, line.direction));
+    Beside metric = across(G, line.direction);
+    const double limit = std::min(settings_.farthest, settings_.face_sigmas * widest(metric));
+    // Weights are as exact as the larger one.
+    for (double& weight : metric.weight)
+      weight = std::max(0.0, weight - kRounding * std::fabs(metric.weight[1]));
+    double worth = best_ + settings_.face_sigmas * settings_.face_sigmas;
+    const auto most = [&] { return (1.0 + kRounding) * worth - view.floor; };
     for (int s : *view.surfaces) {
-      surfaces_.around(s, line, limit, fitter_.steepest(), [&](const SurfacePoint& p) {
+      surfaces_.around(s, line, metric, limit, fitter_.steepest(), most, [&](const SurfacePoint& p) {
         const double chi2 = view.floor + squared(G, p.point - nearest(p.point));
-        if (!(chi2 < best_ + settings_.face_sigmas * settings_.face_sigmas)) return;
+        if (!(chi2 < worth)) return;
         Candidate k;
+        k.fit.chi2 = chi2;
+        k.fit.cone = fitter_.cone_cost(-dot(p.normal, line.direction));
+        if (!(k.fit.cost() < worth)) return;
         k.surface = s;
         k.view = index(view);
         k.point = p.point;
         k.normal = p.normal;
-        k.fit.cone = fitter_.cone_cost(-dot(p.normal, line.direction));
-        k.fit.chi2 = chi2;
-        if (k.fit.cost() < best_ + settings_.face_sigmas * settings_.face_sigmas && !entered(k))
-          found = insert(starts, kPassed, found, k, settings_.faces_apart);
+        if (entered(k)) return;
+        found = insert(starts, kPassed, found, k, settings_.faces_apart);
+        worth = std::min(worth, beaten(starts, kPassed, found));
       });
     }
     for (int i = 0; i < found && count_ < kMost; ++i) {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
 
 #include "touchline/detail/place/view.hpp"
 
@@ -30,6 +31,14 @@ inline int insert(Candidate* starts, int most, int found, const Candidate& k, do
   Candidate* last = worst(starts, found);
   if (k.fit.cost() < last->fit.cost()) *last = k;
   return found;
+}
+
+// From this cost on a candidate changes nothing in the best few.
+inline double beaten(const Candidate* starts, int most, int found) {
+  if (found < most) return std::numeric_limits<double>::infinity();
+  double cost = 0.0;
+  for (int i = 0; i < found; ++i) cost = std::max(cost, starts[i].fit.cost());
+  return cost;
 }
 
 }  // namespace touchline

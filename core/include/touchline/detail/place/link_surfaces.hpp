@@ -78,11 +78,15 @@ class LinkSurfaces {
   }
 
   // Calls `visit(SurfacePoint)`, in world, for the point nearest to a line of each triangle that is
-  // nearer to it than `limit` and stands against it: at a cosine above `steep`.
-  template <class Visit>
-  void around(int surface, const ForceLine& line, double limit, double steep, Visit&& visit) const {
+  // nearer to it than `limit` and stands against it: at a cosine above `steep`. Left out is what is
+  // beside it by a weighed square of `most()` or more.
+  template <class Most, class Visit>
+  void around(int surface, const ForceLine& line, const Beside& beside, double limit, double steep,
+              Most&& most, Visit&& visit) const {
     const int node = surfaces_[surface].node;
-    surfaces_[surface].mesh.around(to_node(line, node), limit, steep,
+    const Beside own{{turn_to_node(beside.axis[0], node), turn_to_node(beside.axis[1], node)},
+                     {beside.weight[0], beside.weight[1]}};
+    surfaces_[surface].mesh.around(to_node(line, node), own, limit, steep, most,
                                    [&](const SurfacePoint& p) { visit(in_world(p, node)); });
   }
 

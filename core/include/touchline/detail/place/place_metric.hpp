@@ -18,14 +18,23 @@ inline double squared(const double* G, const Vec3& d) {
   return std::max(0.0, sum);
 }
 
-// One sigma of a place across a direction, where it is least known [m].
-inline double widest(const double* G, const Vec3& direction) {
+// The metric across a direction, along the two axes of its ellipse: first where a place is known
+// least.
+inline Beside across(const double* G, const Vec3& direction) {
   Vec3 s, t;
   tangents(direction, s, t);
   const double a = squared(G, s), c = squared(G, t);
   const double b = 0.5 * (squared(G, s + t) - a - c);
-  const double least = 0.5 * (a + c - std::sqrt((a - c) * (a - c) + 4.0 * b * b));
-  return 1.0 / std::sqrt(std::max(least, 1e-12));
+  const double root = std::sqrt((a - c) * (a - c) + 4.0 * b * b);
+  const double turn = 0.5 * std::atan2(2.0 * b, a - c);
+  const double sine = std::sin(turn), cosine = std::cos(turn);
+  return {{cosine * t - sine * s, cosine * s + sine * t},
+          {0.5 * (a + c - root), 0.5 * (a + c + root)}};
+}
+
+// One sigma of a place where it is known least [m].
+inline double widest(const Beside& metric) {
+  return 1.0 / std::sqrt(std::max(metric.weight[0], 1e-12));
 }
 
 }  // namespace touchline
