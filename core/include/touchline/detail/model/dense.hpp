@@ -39,10 +39,11 @@ inline void solve_lower(const double* l, int n, double* x, int stride = 1) {
 
 // The same for `width` right sides that stand side by side, x[i * width] to x[i * width + width - 1],
 // whole registers of them. Each goes through the operations of one alone: the last bits are the same.
+// The first `done` rows are solved already.
 template <int width>
-inline void solve_lower_rows(const double* l, int n, double* x) {
+inline void solve_lower_rows(const double* l, int n, double* x, int done = 0) {
   constexpr int kCount = width / kLanes;  // registers of a row
-  for (int i = 0; i < n; ++i) {
+  for (int i = done; i < n; ++i) {
     double* own = x + i * width;
     Lanes s[kCount];
     for (int c = 0; c < kCount; ++c) s[c] = load_lanes(own + c * kLanes);

@@ -43,6 +43,7 @@ class Measurement {
     lasting_covariance_.resize(size * size);
     factor_.resize(size * size);
     design_.resize(size * kWide);
+    told_.resize(size * kWide);
     columns_.resize(size * kWide * 2);
   }
 
@@ -74,6 +75,7 @@ class Measurement {
     for (const SegmentRow& r : rows_.of(g)) take(r);
     size_ = (has_wrench_ ? 6 : 0) + count_;
     lasts_ = lasting_.find(g, drift_);
+    solved_ = 0;
     return size_ > 0 && weigh() && (normalized == nullptr || take_out_offsets()) && add_lasting();
   }
 
@@ -176,6 +178,7 @@ class Measurement {
   void take_out(int node, const Spatial& w, double lag) {
     double values[6];
     store(w, values);
+    solved_ = 0;
     for (int i = 0; i < 6; ++i) {
       wrench_[i] -= values[i];
       raw_wrench_[i] -= values[i];
@@ -270,16 +273,18 @@ class Measurement {
     }
   }
 
-  // What a wrench on the body of `node` does to all rows, and what they read, to the scale of the noise.
+  // What a wrench on the body of `node` does to all rows, and what they read, to the scale of the
+  // noise. Bodies have their first rows in common: those of the body before that are the same stay.
   const double* design(int node) {
     const int first = has_wrench_ ? 6 : 0;
-    double* d = design_.data();
-    for (int i = 0; i < first; ++i) {
-      for (int k = 0; k < kWide; ++k) d[kWide * i + k] = i == k ? 1.0 : 0.0;
-      d[kWide * i + 6] = wrench_[i];
+    double *d = design_.data(), *told = told_.data();
+    int same = solved_;
+    for (int i = solved_; i < first; ++i) {
+      for (int k = 0; k < kWide; ++k) told[kWide * i + k] = i == k ? 1.0 : 0.0;
+      told[kWide * i + 6] = wrench_[i];
     }
     for (int i = 0; i < count_; ++i) {
-      double* line = d + kWide * (first + i);
+      double line[kWide];
       const bool loaded = rows_.subspace(*used_[i], node, line);
       line[6] = own_[i];
       line[7] = 0.0;
@@ -287,8 +292,14 @@ class Measurement {
         line[6] = outboard_[i];
         for (int k = 0; k < 6; ++k) line[6] += line[k] * raw_wrench_[k];
       }
+      double* before = told + kWide * (first + i);
+      if (first + i < same && std::equal(line, line + kWide, before)) continue;
+      same = std::min(same, first + i);
+      std::copy_n(line, kWide, before);
     }
-    solve_lower_rows<kWide>(factor_.data(), size_, d);
+    std::copy(told + kWide * same, told + kWide * size_, d + kWide * same);
+    solve_lower_rows<kWide>(factor_.data(), size_, d, same);
+    solved_ = size_;
     return d;
   }
 
@@ -305,6 +316,7 @@ class Measurement {
     }
     for (int i = 0; i < size_ * size_; ++i) covariance_[i] *= 1.0 + rest;
     for (int i = 0; i < size_ * size_; ++i) factor_[i] *= std::sqrt(1.0 + rest);
+    solved_ = 0;
     return true;
   }
 
@@ -416,6 +428,7 @@ class Measurement {
   }
 
   bool factor() {
+    solved_ = 0;
     std::copy_n(covariance_.data(), size_ * size_, factor_.data());
     return cholesky(factor_.data(), size_, 1e-15);
   }
@@ -437,7 +450,10 @@ class Measurement {
   std::vector<const SegmentRow*> used_;
   std::vector<double> own_;       // if the contact is inboard of the joint
   std::vector<double> outboard_;  // if it is outboard, less what the wrench says
-  std::vector<double> covariance_, lasting_covariance_, factor_, design_, columns_;
+  std::vector<double> covariance_, lasting_covariance_, factor_, columns_;
+  // The rows of the design as told and to the scale of the noise; of the latter so many hold.
+  std::vector<double> told_, design_;
+  int solved_ = 0;
 };
 
 }  // namespace touchline

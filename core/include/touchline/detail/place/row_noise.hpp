@@ -69,12 +69,20 @@ class RowNoise {
   // forces. The floors cover what the trapezoid leaves of motion: on arms of 20 kg 1e-5 N where every
   // joint turns at 1 rad/s, 7e-4 N at 3 rad/s. Where all swing at 2 Hz it is more (4e-3 N and Nm).
   void covariance(int size, int forces, double* out) const {
+    // The noise of a torque reaches one row alone.
+    const int own = 6 * sensors_, shared = own + joints_;
     for (int a = 0; a < size; ++a) {
+      double alone = 0.0;
+      for (int k = own; k < shared; ++k) alone += coefficients_[k * width_ + a] * coefficients_[k * width_ + a];
       for (int b = 0; b <= a; b += kLanes) {
-        const double* of_source = coefficients_.data();
         Lanes sum = all_lanes(0.0);
-        for (int k = 0; k < sources_; ++k, of_source += width_)
+        const auto add = [&](int k) {
+          const double* of_source = coefficients_.data() + k * width_;
           sum += all_lanes(of_source[a]) * load_lanes(of_source + b);
+        };
+        for (int k = 0; k < own; ++k) add(k);
+        if (a < b + kLanes) set_lane(sum, a - b, lane(sum, a - b) + alone);
+        for (int k = shared; k < sources_; ++k) add(k);
         for (int c = 0; c < kLanes && b + c <= a; ++c) out[a * size + b + c] = lane(sum, c);
       }
       const double least = a < forces ? figures_.force : figures_.moment;
