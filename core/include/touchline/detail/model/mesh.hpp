@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstring>
 #include <limits>
 #include <memory>
 #include <numeric>
@@ -34,8 +36,8 @@ struct Crossing {
 // What ways beside a line weigh: the square along each of two unit axes across it, times a weight
 // [1/m2].
 struct Beside {
-  Vec3 axis[2];
-  double weight[2];
+  std::array<Vec3, 2> axis;
+  std::array<double, 2> weight;
 };
 
 struct SurfacePoint {
@@ -74,9 +76,18 @@ class Mesh {
                     });
   }
 
-  // The point of the surface nearest to the line, if nearer than `limit`.
+  // The point of the surface nearest to the line, if nearer than `limit`. `near`: the place of a
+  // triangle that may be near, or -1: then there is less to search. The answer is the same.
   SurfacePoint nearest_to_line(const ForceLine& line,
-                               double limit = std::numeric_limits<double>::infinity()) const {
+                               double limit = std::numeric_limits<double>::infinity(),
+                               int near = -1) const {
+    if (near >= 0) {
+      SurfacePoint there;
+      there.distance = limit;
+      nearer_to_line(triangles()[near], line, there);
+      limit = std::min(limit, (1.0 + kRounding) * there.distance + kRounding * kTouching);
+    }
+    const Cutoff cutoff(line, {across(line.direction), {0.0, 0.0}});
     return nearest(
         limit, -1,
         [&](const Box& b) {
@@ -86,7 +97,14 @@ class Mesh {
           return norm(beside) - 0.5 * norm(high - low);
         },
         [](double distance) { return distance; },
-        [&](const Triangle& tri, SurfacePoint& best) { nearer_to_line(tri, line, best); });
+        [&](const Box& b, double distance) {
+          return cutoff.may_hold(b, distance * distance, kFar);
+        },
+        [&](const Triangle& tri, SurfacePoint& best) {
+          const double before = best.distance;
+          nearer_to_line(tri, line, best);
+          if (best.distance < before) best.place = static_cast<int>(&tri - triangles().data());
+        });
   }
 
   // Calls `visit(SurfacePoint)` for the point nearest to the line of each triangle that is nearer
@@ -120,14 +138,11 @@ class Mesh {
   SurfacePoint nearest_to_point(const Vec3& p,
                                 double limit = std::numeric_limits<double>::infinity(),
                                 int near = -1) const {
+    const PointLanes lanes(p);
     return nearest(
-        limit, near,
-        [&](const Box& b) {
-          const Vec3 d{outside(p.x, b.low.x, b.high.x), outside(p.y, b.low.y, b.high.y),
-                       outside(p.z, b.low.z, b.high.z)};
-          return dot(d, d);
-        },
+        limit, near, [&](const Box& b) { return outside(lanes, b); },
         [](double distance) { return distance * distance; },
+        [](const Box&, double) { return true; },
         [&](const Triangle& tri, SurfacePoint& best) {
           if (std::fabs(dot(tri.normal, p - tri.a)) < best.distance &&
               offer(tri, nearest_on(tri, p), p, best))
@@ -139,6 +154,8 @@ class Mesh {
   static constexpr int kLeaf = 4, kDepth = 64;  // triangles of a leaf; room for the stack
   static constexpr float kInfinity = std::numeric_limits<float>::infinity();
   static constexpr double kTouching = 1e-9;  // nearer than this nothing nearer is looked for [m]
+  static constexpr double kFar = std::numeric_limits<double>::infinity();
+  static constexpr double kRounding = 1e-9;  // of ways [m], and a part of what they weigh
   static constexpr double kEdge = 1e-9;  // of barycentric coordinates: edges belong to both sides
 
   struct Bounds {
@@ -200,8 +217,6 @@ class Mesh {
     }
 
    private:
-    static constexpr double kRounding = 1e-9;  // of ways [m], and a part of what they weigh
-
     bool holds(const double* way, double square, double most) const {
       double near[2];
       for (int i = 0; i < 2; ++i) {
@@ -342,6 +357,14 @@ class Mesh {
     }
   }
 
+  // Two unit axes across a direction.
+  static std::array<Vec3, 2> across(const Vec3& n) {
+    const Vec3 helper = std::fabs(n.x) < 0.6 ? Vec3{1.0, 0.0, 0.0} : Vec3{0.0, 1.0, 0.0};
+    const Vec3 s = cross(n, helper);
+    const Vec3 unit = (1.0 / norm(s)) * s;
+    return {unit, cross(n, unit)};
+  }
+
   static Vec3 invert(const Vec3& d) {
     const auto inverse = [](double x) { return 1.0 / (std::fabs(x) > 1e-200 ? x : 1e-200); };
     return {inverse(d.x), inverse(d.y), inverse(d.z)};
@@ -372,15 +395,18 @@ class Mesh {
     return true;
   }
 
-  // `bound(box)`: what the `measure` of the distance of anything in a box is not less than.
-  template <class Bound, class Measure, class Offer>
-  SurfacePoint nearest(double limit, int near, Bound&& bound, Measure&& measure,
+  // `bound(box)`: what the `measure` of the distance of anything in a box is not less than; boxes are
+  // visited in its order. `may_hold(box, distance)`: may it hold something that is nearer?
+  template <class Bound, class Measure, class MayHold, class Offer>
+  SurfacePoint nearest(double limit, int near, Bound&& bound, Measure&& measure, MayHold&& may_hold,
                        Offer&& offer_triangle) const {
     SurfacePoint best;
     best.distance = limit;
     if (empty()) return best;
-    if (near >= 0) offer_triangle(triangles()[near], best);
-    if (best.distance < kTouching) return best;
+    if (near >= 0) {
+      offer_triangle(triangles()[near], best);
+      if (best.distance < kTouching) return best;
+    }
     const Box* const boxes = tree_->boxes.data();
     const Triangle* const triangles = tree_->triangles.data();
     struct Entry {
@@ -393,15 +419,18 @@ class Mesh {
       const Entry entry = stack[--size];
       if (entry.bound >= measure(best.distance)) continue;
       const Box& box = boxes[entry.box];
+      if (!may_hold(box, best.distance)) continue;
       if (box.count > 0) {
         for (int i = box.next; i < box.next + box.count; ++i) offer_triangle(triangles[i], best);
         continue;
       }
-      Entry nearer{bound(boxes[entry.box + 1]), entry.box + 1};
-      Entry farther{bound(boxes[box.next]), box.next};
-      if (nearer.bound > farther.bound) std::swap(nearer, farther);
-      stack[size++] = farther;
-      stack[size++] = nearer;
+      const double one = bound(boxes[entry.box + 1]), other = bound(boxes[box.next]);
+      const double far = measure(best.distance);
+      const bool swapped = one > other;  // the nearer one is visited first
+      const double more = swapped ? one : other, less = swapped ? other : one;
+      if (!(less < far)) continue;
+      if (more < far) stack[size++] = {more, swapped ? entry.box + 1 : box.next};
+      stack[size++] = {less, swapped ? box.next : entry.box + 1};
     }
     return best;
   }
@@ -418,6 +447,35 @@ class Mesh {
   // How far `v` is outside of a range; without a branch, which would be taken at random.
   static double outside(double v, double low, double high) {
     return std::max(0.0, std::max(low - v, v - high));
+  }
+
+  // A point, its three numbers side by side where there is room.
+  struct PointLanes {
+    explicit PointLanes(const Vec3& p) : point(p) {
+      if constexpr (kLanes == 4) set_lane(lanes, 0, p.x), set_lane(lanes, 1, p.y), set_lane(lanes, 2, p.z);
+    }
+    Vec3 point;
+    Lanes lanes{};
+  };
+
+  // The square of how far a point is outside of a box.
+  static double outside(const PointLanes& p, const Box& b) {
+#if defined(__AVX__) && (defined(__GNUC__) || defined(__clang__))
+    using Floats = float __attribute__((vector_size(16)));
+    static_assert(offsetof(Box, high) == 3 * sizeof(float) && sizeof(Box) == 8 * sizeof(float));
+    Floats low, high;  // the last number of the one, and the first of the other, are not used
+    std::memcpy(&low, &b.low.x, sizeof low);
+    std::memcpy(&high, &b.low.z, sizeof high);
+    high = __builtin_shufflevector(high, high, 1, 2, 3, 3);
+    const Lanes beyond = larger(__builtin_convertvector(low, Lanes) - p.lanes,
+                                p.lanes - __builtin_convertvector(high, Lanes));
+    const Lanes d = larger(beyond, Lanes{}), square = d * d;
+    return square[0] + square[1] + square[2];
+#else
+    const Vec3 d{outside(p.point.x, b.low.x, b.high.x), outside(p.point.y, b.low.y, b.high.y),
+                 outside(p.point.z, b.low.z, b.high.z)};
+    return dot(d, d);
+#endif
   }
 
   // The same for several triangles side by side, each of which is offered as far as `limit`.

@@ -35,6 +35,7 @@ class Explanations {
     starts_.resize(observer.row_layout().segments);
     for (std::vector<Start>& starts : starts_) starts.reserve(kMost);
     candidates_.resize(kMost);
+    missed_.resize(surfaces_.all().size(), -1);
   }
 
   Explanations(const Explanations&) = delete;
@@ -278,8 +279,9 @@ class Explanations {
   void miss(View& view) {
     const ForceLine line = view.later_line();
     for (int s : *view.surfaces) {
-      const SurfacePoint p = surfaces_.nearest(s, line, settings_.farthest);
+      const SurfacePoint p = surfaces_.nearest(s, line, settings_.farthest, missed_[s]);
       if (p.face < 0 || count_ == kMost) continue;
+      missed_[s] = p.place;
       // At an edge the normal is that of either side: what counts is the wrench alone.
       if (fitter_.free_chi2(view.q, view.earlier(p.point)) > best_ + settings_.relevant) continue;
       place(view, s, p.point, p.normal);
@@ -331,6 +333,7 @@ class Explanations {
   Refinement refinement_;
   std::vector<View> views_;
   std::vector<Candidate> candidates_;
+  std::vector<int> missed_;  // per surface: the triangle that a line has missed least, last; -1: none
   // Where searches on each segment have ended, in the frames of the nodes.
   struct Start {
     int surface;

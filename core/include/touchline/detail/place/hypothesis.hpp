@@ -58,7 +58,7 @@ class ForceFitter {
       if (free.chi2 + size_cost(norm(free.force)) >= worth) return free;
     }
     if (grasped || free.cone < 1.0 || free.chi2 > limit) return free;
-    const Fit bound = on_cone(q, point, normal, A, g);
+    const Fit bound = on_cone(q, point, normal, A, g, worth);
     return bound.cost() < free.cost() ? bound : free;
   }
 
@@ -210,6 +210,8 @@ class ForceFitter {
   }
 
  private:
+  static constexpr double kRounding = 1e-9;  // a part of chi2, far above what it errs by
+
   // Directions around the cone, and those that lie half a step, a quarter and an eighth to either
   // side of one: all that a force on its edge is looked for at.
   struct Turns {
@@ -287,9 +289,10 @@ class ForceFitter {
     return true;
   }
 
-  // The best force on the edge of the cone: for each direction the size follows in closed form.
+  // The best force on the edge of the cone: for each direction the size follows in closed form. It is
+  // not worked out where its chi2 and the cost of its size are `worth` or more.
   Fit on_cone(const Quadratic& q, const Vec3& point, const Vec3& normal, const double* A,
-              const double* g) const {
+              const double* g, double worth) const {
     Vec3 s, t;
     tangents(normal, s, t);
     double best = 0.0;
@@ -318,7 +321,9 @@ class ForceFitter {
     Fit fit;
     fit.force = force;
     fit.cone = std::numeric_limits<double>::infinity();
-    if (best > 0.0) judge(q, point, normal, false, fit);
+    const double least = q.constant - best;
+    if (best > 0.0 && least - kRounding * (1.0 + std::fabs(q.constant)) < worth)
+      judge(q, point, normal, false, fit);
     return fit;
   }
 

@@ -71,10 +71,10 @@ class LinkSurfaces {
     return in_world(surfaces_[surface].mesh.nearest_to_point(to_node(target, node), limit), node);
   }
 
-  // The same for a line.
-  SurfacePoint nearest(int surface, const ForceLine& line, double limit) const {
+  // The same for a line; `near`: the place of a triangle that may be near, or -1.
+  SurfacePoint nearest(int surface, const ForceLine& line, double limit, int near) const {
     const int node = surfaces_[surface].node;
-    return in_world(surfaces_[surface].mesh.nearest_to_line(to_node(line, node), limit), node);
+    return in_world(surfaces_[surface].mesh.nearest_to_line(to_node(line, node), limit, near), node);
   }
 
   // Calls `visit(SurfacePoint)`, in world, for the point nearest to a line of each triangle that is
@@ -85,7 +85,7 @@ class LinkSurfaces {
               Most&& most, Visit&& visit) const {
     const int node = surfaces_[surface].node;
     const Beside own{{turn_to_node(beside.axis[0], node), turn_to_node(beside.axis[1], node)},
-                     {beside.weight[0], beside.weight[1]}};
+                     beside.weight};
     surfaces_[surface].mesh.around(to_node(line, node), own, limit, steep, most,
                                    [&](const SurfacePoint& p) { visit(in_world(p, node)); });
   }

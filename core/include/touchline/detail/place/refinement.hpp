@@ -43,7 +43,7 @@ class Refinement {
       const double length = norm(step);
       if (length > settings_.farthest_step) step = (settings_.farthest_step / length) * step;
       arrived = length < settings_.arrived;
-      if (!arrived && !try_point(view, k, k.point + step)) break;
+      if (!arrived && !try_point(view, k, k.point + step, norm(step))) break;
     }
     return arrived && k.fit.cone < 1.0;
   }
@@ -69,14 +69,15 @@ class Refinement {
     constexpr double kHalf = 0.5, kSine = 0.8660254037844386;  // of 60 degrees
     for (const double side : {1.0, -1.0}) {
       for (const Vec3& way : {s, kHalf * s + kSine * t, kHalf * s - kSine * t})
-        better |= try_point(view, k, centre + (side * radius) * way);
+        better |= try_point(view, k, centre + (side * radius) * way, radius);
     }
     return better;
   }
 
-  bool try_point(const View& view, Candidate& k, const Vec3& target) const {
-    // The candidate is on the surface itself: nothing farther away than it is of interest.
-    const double limit = std::min(settings_.surface_reach, 1.000001 * norm(target - k.point));
+  // `beside` [m]: how far from the target there is a point of the surface.
+  bool try_point(const View& view, Candidate& k, const Vec3& target, double beside) const {
+    // Nothing farther away than that is of interest.
+    const double limit = std::min(settings_.surface_reach, 1.000001 * beside);
     const SurfacePoint p = surfaces_.nearest(k.surface, target, limit);
     if (p.face < 0) return false;
     const bool grasped = surfaces_[k.surface].graspable;
