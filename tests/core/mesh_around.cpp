@@ -56,7 +56,7 @@ int main() {
       const Vec3 one = cross(line.direction, Vec3{draw(), draw(), draw()});
       Beside beside{{(1.0 / norm(one)) * one, {}}, {0.0, 0.0}};
       beside.axis[1] = cross(line.direction, beside.axis[0]);
-      const auto all = [] { return 1.0; };
+      const auto all = [](double) { return 1.0; };
       mesh.around(line, beside, limit, steep, all, [&](const SurfacePoint& p) {
         const Vec3 off = p.point - line.origin;
         const double way = norm(off - dot(off, line.direction) * line.direction);
@@ -68,7 +68,7 @@ int main() {
       // Weighed, none is left out whose nearest point is less far; the bound shrinks as it may.
       beside.weight[0] = 4.0, beside.weight[1] = 90.0;
       double most = 0.5, least = 1e300;
-      mesh.around(line, beside, limit, steep, [&] { return most; }, [&](const SurfacePoint& p) {
+      mesh.around(line, beside, limit, steep, [&](double) { return most; }, [&](const SurfacePoint& p) {
         if (seen[p.face] != p.distance) ++wrong;
         least = std::min(least, weighed[p.face]);
         weighed.erase(p.face);

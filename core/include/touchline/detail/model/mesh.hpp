@@ -109,7 +109,8 @@ class Mesh {
 
   // Calls `visit(SurfacePoint)` for the point nearest to the line of each triangle that is nearer
   // to it than `limit` and stands against it: at a cosine above `steep`. Triangles of which every
-  // point is at a weighed square of `most()` or more are left out; that may shrink meanwhile.
+  // point is at a weighed square of `most(cosine)` or more are left out; that may shrink meanwhile, and
+  // is nowhere more than at cosine 1.
   template <class Most, class Visit>
   void around(const ForceLine& line, const Beside& beside, double limit, double steep, Most&& most,
               Visit&& visit) const {
@@ -119,12 +120,12 @@ class Mesh {
     int count = 0;
     visit_triangles(
         [&](const Box& box, int index) {
-          return cutoff.may_hold(box, square, most()) &&
+          return cutoff.may_hold(box, square, most(1.0)) &&
                  tree_->faces[index].may_stand_against(line.direction, steep);
         },
         [&](const Triangle& tri) {
-          if (!(-dot(tri.normal, line.direction) > steep)) return;
-          if (!cutoff.may_hold(tri, square, most())) return;
+          const double cosine = -dot(tri.normal, line.direction);
+          if (!(cosine > steep) || !cutoff.may_hold(tri, square, most(cosine))) return;
           some[count++] = &tri;
           if (count < kLanes) return;
           nearer_to_line(some, count, line, limit, visit);

@@ -192,7 +192,10 @@ class Explanations {
     for (double& weight : metric.weight)
       weight = std::max(0.0, weight - kRounding * std::fabs(metric.weight[1]));
     double worth = best_ + settings_.face_sigmas * settings_.face_sigmas;
-    const auto most = [&] { return (1.0 + kRounding) * worth - view.floor; };
+    const auto most = [&](double cosine) {
+      const double left = (1.0 + kRounding) * worth - view.floor;
+      return cosine < 1.0 ? left - (1.0 - kRounding) * fitter_.cone_cost(cosine + kRounding) : left;
+    };
     for (int s : *view.surfaces) {
       surfaces_.around(s, line, metric, limit, fitter_.steepest(), most, [&](const SurfacePoint& p) {
         const double chi2 = view.floor + squared(G, p.point - nearest(p.point));

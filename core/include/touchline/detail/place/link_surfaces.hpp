@@ -79,7 +79,7 @@ class LinkSurfaces {
 
   // Calls `visit(SurfacePoint)`, in world, for the point nearest to a line of each triangle that is
   // nearer to it than `limit` and stands against it: at a cosine above `steep`. Left out is what is
-  // beside it by a weighed square of `most()` or more.
+  // beside it by a weighed square of `most(cosine)` or more.
   template <class Most, class Visit>
   void around(int surface, const ForceLine& line, const Beside& beside, double limit, double steep,
               Most&& most, Visit&& visit) const {

@@ -26,12 +26,16 @@ class RowNoise {
         joints_(observer.row_layout().joints),
         sources_(6 * sensors_ + 2 * joints_),
         room_((static_cast<int>(rows) + kLanes - 1) / kLanes * kLanes),
-        coefficients_(room_ * sources_) {}
+        coefficients_(room_ * sources_),
+        units_(6 * sensors_) {}
 
   // Of so many rows, all that the methods below add to them begins anew.
   void clear(int rows) {
     width_ = (rows + kLanes - 1) / kLanes * kLanes;
     std::fill_n(coefficients_.begin(), width_ * sources_, 0.0);
+    for (int s = 0; s < sensors_; ++s) {
+      for (int a = 0; a < 6; ++a) units_[6 * s + a] = unit_wrench(observer_.sensors()[s].node, a);
+    }
   }
 
   // Rows `at` to `at + 5`: the wrench of a segment [world].
@@ -60,7 +64,7 @@ class RowNoise {
       const int node = observer_.sensors()[pair.sensor].node;
       for (int a = 0; a < 6; ++a)
         of(at, 6 * pair.sensor + a) -=
-            g.reading * figures_.wrench[6 * pair.sensor + a] * dot(s, unit_wrench(node, a));
+            g.reading * figures_.wrench[6 * pair.sensor + a] * dot(s, units_[6 * pair.sensor + a]);
       add_velocity(at, s, node, -g.velocity);
     }
   }
@@ -73,7 +77,10 @@ class RowNoise {
     const int own = 6 * sensors_, shared = own + joints_;
     for (int a = 0; a < size; ++a) {
       double alone = 0.0;
-      for (int k = own; k < shared; ++k) alone += coefficients_[k * width_ + a] * coefficients_[k * width_ + a];
+      for (int k = own; k < shared; ++k) {
+        const double of_source = coefficients_[k * width_ + a];
+        alone += of_source * of_source;
+      }
       for (int b = 0; b <= a; b += kLanes) {
         Lanes sum = all_lanes(0.0);
         const auto add = [&](int k) {
@@ -105,7 +112,7 @@ class RowNoise {
   void add_sensor(int at, int s, const Gains& g, double sign) {
     const int node = observer_.sensors()[s].node;
     for (int a = 0; a < 6; ++a)
-      add_column(at, 6 * s + a, unit_wrench(node, a),
+      add_column(at, 6 * s + a, units_[6 * s + a],
                  sign * g.reading * figures_.wrench[6 * s + a]);
     for (int i = 0; i < joints_; ++i)
       add_column(at, 6 * sensors_ + joints_ + i, posture_.momentum(node, i),
@@ -138,6 +145,7 @@ class RowNoise {
   int sensors_, joints_, sources_;
   int room_, width_ = 0;  // for rows, and those in use: whole registers
   std::vector<double> coefficients_;  // sources by rows
+  std::vector<Spatial> units_;        // per sensor and axis: a unit of it [world]
 };
 
 }  // namespace touchline
