@@ -88,6 +88,16 @@ def test_rounding_does_not_choose_a_width_where_friction_is_held_at_zero():
     assert len(chosen) == 1
 
 
+def test_rounding_does_not_choose_between_equals():
+    """What is held at zero costs nothing, so both are the same: the simpler one is the best."""
+    robot = arm()
+    evidence = gather(robot, [[recorded(robot)]])
+    chooser = Chooser(evidence, np.ones(len(evidence), dtype=bool))
+    cost = np.random.default_rng(0).uniform(1.0, 2.0, 20)
+    worse, equal = cost + np.linspace(-0.5, 1.0, 20), cost * (1.0 - 1e-15)
+    assert chooser._simplest([worse + 1.0, cost, worse, equal]) == 1
+
+
 def test_a_rotor_is_found_where_the_torque_is_that_of_the_motor():
     robot = arm()
     joints = tuple(replace(joint, torque="motor") for joint in robot.description.joints)

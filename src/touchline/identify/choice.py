@@ -230,7 +230,8 @@ class Chooser:
 
     def _simplest(self, costs: list[Array]) -> int:
         """The first of the options, the simpler ones first, that is as good as the best."""
-        best = int(np.argmin([cost.mean() for cost in costs]))
+        means = np.array([cost.mean() for cost in costs])
+        best = int(np.argmax(means <= SAME * means.min()))
         for i, cost in enumerate(costs[:best]):
             gain = cost - costs[best]
             if gain.mean() <= BETTER * gain.std() / np.sqrt(len(gain)):
