@@ -169,6 +169,8 @@ void bind_rows(nb::module_& m) {
       .def_rw("coulomb", &tl::JointRow::coulomb)
       .def_rw("viscous", &tl::JointRow::viscous)
       .def_rw("coulomb_width", &tl::JointRow::coulomb_width)
+      .def_rw("stribeck", &tl::JointRow::stribeck)
+      .def_rw("stribeck_speed", &tl::JointRow::stribeck_speed)
       .def("set_rest",
            [](tl::JointRow& joint, const std::vector<double>& q, const std::vector<double>& qd,
               const std::vector<double>& torque) {

@@ -43,6 +43,8 @@ Observer make_observer(Method method) {
     nodes.push_back(node);
     joints[i].nodes = {i + 1};
     joints[i].coulomb = 0.1;
+    joints[i].stribeck = 0.05;
+    joints[i].stribeck_speed = 0.1;
   }
   joints[0].torque = Torque::from;
   joints[0].sources = {0};

@@ -59,7 +59,11 @@ Observer make_observer(const Kind& kind) {
     parent = static_cast<int>(nodes.size()) - 1;
     sensors[sensor++].node = parent;
   }
-  if (kind.rough) joints[1].coulomb = joints[4].coulomb = 0.3;
+  if (kind.rough) {
+    joints[1].coulomb = joints[4].coulomb = 0.3;
+    joints[4].stribeck = joints[5].stribeck = 0.2;
+    joints[4].stribeck_speed = joints[5].stribeck_speed = 0.1;
+  }
   if (kind.two_bandwidths) joints[2].bandwidth = 40.0;
   if (kind.from_sensors && kind.sensors > 0) {
     joints[0].torque = Torque::from;

@@ -179,9 +179,14 @@ WRIST = "{name: wrist, link: hand}"
         ),
         (
             SHOULDER,
+            "{name: shoulder, friction: {stribeck: 0.5}}",
+            "joints[0].friction.stribeck: 0.5 is given without stribeck_speed",
+        ),
+        (
+            SHOULDER,
             "{name: shoulder, friction: {viscos: 1}}",
-            "joints[0].friction.viscos: unknown key; allowed: coulomb, viscous, coulomb_width "
-            "(did you mean 'viscous'?)",
+            "joints[0].friction.viscos: unknown key; allowed: coulomb, viscous, coulomb_width, "
+            "stribeck, stribeck_speed (did you mean 'viscous'?)",
         ),
         (SHOULDER, "{name: shoulder, tork: 1}", "joints[0].tork: unknown key; allowed: name, tor"),
         (SHOULDER, "{torque: sensor}", "joints[0].name: is missing"),

@@ -180,6 +180,7 @@ def test_a_branched_tree_with_a_root_segment_has_the_observers_segments():
 SETTINGS = {
     "signs": {"sign": -1.0, "gain": 0.5, "bias": 0.3},
     "motor": {"torque": "motor", "rotor_inertia": 0.2, "friction": Friction(0.4, 0.7, 0.1)},
+    "falling": {"torque": "motor", "friction": Friction(0.4, 0.7, 0.1, 0.3, 0.2)},
     "gravity": {"compensated": "gravity"},
     "model": {"compensated": "model"},
 }

@@ -49,6 +49,7 @@ ODD_JOINTS = [
     {"sign": -1.0, "gain": 0.25, "bias": 1.5},
     {"compensated": "gravity", "gain": 10.0},
     {"friction": Friction(1.0, 0.5, 0.02)},
+    {"friction": Friction(1.0, 0.5, 0.02, stribeck=0.8, stribeck_speed=0.2)},
     {"compensated": "model", "sign": -1.0},
 ]
 ODD_SENSORS = [

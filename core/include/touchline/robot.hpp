@@ -79,6 +79,8 @@ inline void check(const Robot& robot) {
     for (const int source : joint.sources)
       require(within(source, 0, k), "a joint is read from a sensor that is not there");
     require(joint.bandwidth > 0.0 && std::isfinite(joint.bandwidth), "a bandwidth is not positive");
+    require(std::isfinite(joint.stribeck) && (joint.stribeck == 0.0 || joint.stribeck_speed > 0.0),
+            "friction that falls with speed needs a speed");
     require(joint.rest.sound(), "a learned rest has no sound table");
   }
   for (const SensorRow& sensor : robot.sensors) {

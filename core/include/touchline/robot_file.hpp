@@ -22,7 +22,7 @@
 namespace touchline {
 
 // Of the file; another one is refused. It changes with every part of `Robot`.
-constexpr std::uint32_t kRobotFormat = 5;
+constexpr std::uint32_t kRobotFormat = 6;
 
 // A file that cannot be read or written: it says which, and why.
 struct RobotFileError : std::runtime_error {
@@ -191,9 +191,10 @@ void store(A& file, LearnedRest& rest) {
 template <class A>
 void store(A& file, JointRow& joint) {
   auto& [torque, compensated, sign, gain, bias, range, rotor_inertia, coulomb, viscous,
-         coulomb_width, rest, lower, upper, bandwidth, nodes, sources] = joint;
+         coulomb_width, stribeck, stribeck_speed, rest, lower, upper, bandwidth, nodes,
+         sources] = joint;
   store_all(file, torque, compensated, sign, gain, bias, range, rotor_inertia, coulomb, viscous,
-            coulomb_width, rest, lower, upper, bandwidth, nodes, sources);
+            coulomb_width, stribeck, stribeck_speed, rest, lower, upper, bandwidth, nodes, sources);
 }
 template <class A>
 void store(A& file, SensorRow& sensor) {

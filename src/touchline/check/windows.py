@@ -140,7 +140,7 @@ def _read_torques(robot: Robot, part: Samples) -> Array:
     for j, joint in enumerate(robot.description.joints):
         qd, friction = part.qd[:, j], joint.friction
         torques[:, j] = joint.sign * joint.gain * part.tau[:, j] - joint.bias
-        torques[:, j] -= friction.coulomb * np.tanh(qd / friction.coulomb_width)
+        torques[:, j] -= friction.dry(qd)
         torques[:, j] -= friction.viscous * qd
         if joint.rest is not None:
             torques[:, j] -= joint.rest.at(part.q[:, j], qd)

@@ -5,6 +5,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from touchline.arrays import Array
 from touchline.model.learned_rest import LearnedRest
 from touchline.native import core
 
@@ -14,11 +17,24 @@ AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 
 @dataclass(frozen=True)
 class Friction:
-    """Joint friction [Nm]: `coulomb * tanh(qd / coulomb_width) + viscous * qd`."""
+    """Joint friction [Nm]: `dry(qd) + viscous * qd`.
+
+    Dry friction is `(coulomb + stribeck * exp(-(qd / stribeck_speed)^2)) * tanh(qd / width)` with
+    `coulomb_width`: it falls with speed where `stribeck` is not 0.
+    """
 
     coulomb: float = 0.0
     viscous: float = 0.0
     coulomb_width: float = 0.05
+    stribeck: float = 0.0
+    stribeck_speed: float = 0.0
+
+    def dry(self, speed: Array) -> Array:
+        """Dry friction [Nm] at speeds [rad/s]."""
+        turn = np.tanh(speed / self.coulomb_width)
+        if not self.stribeck:
+            return self.coulomb * turn
+        return (self.coulomb + self.stribeck * np.exp(-((speed / self.stribeck_speed) ** 2))) * turn
 
 
 @dataclass(frozen=True)

@@ -86,6 +86,8 @@ def joint_row(robot: Kernelled, index: int, bandwidth: float | None) -> core.Joi
     row.coulomb = joint.friction.coulomb
     row.viscous = joint.friction.viscous
     row.coulomb_width = joint.friction.coulomb_width
+    row.stribeck = joint.friction.stribeck
+    row.stribeck_speed = joint.friction.stribeck_speed
     if joint.rest is not None:
         row.set_rest(joint.rest.q, joint.rest.qd, joint.rest.torque)
     model = robot.mechanism.joints[joint.name]

@@ -56,6 +56,8 @@ HOOKS: dict[type, dict[str, Hook]] = {
         "coulomb": values.non_negative,
         "viscous": values.non_negative,
         "coulomb_width": values.positive,
+        "stribeck": values.non_negative,
+        "stribeck_speed": values.non_negative,
     },
     Load: _LINK | _MASS,
     LinkCorrection: _MASS,

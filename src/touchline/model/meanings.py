@@ -56,6 +56,16 @@ MEANINGS: dict[str, tuple[str, str, str]] = {
         "rad/s",
         "Speed within which dry friction turns its sign.",
     ),
+    "joints[].friction.stribeck": (
+        "number",
+        "Nm",
+        "What dry friction has more of at slow speeds; needs `stribeck_speed`.",
+    ),
+    "joints[].friction.stribeck_speed": (
+        "number",
+        "rad/s",
+        "Speed with which that falls: exp(-(qd / speed)^2).",
+    ),
     "locked": (
         "mapping JOINT: number",
         "rad or m",

@@ -101,6 +101,9 @@ def _sources(file: RobotFile, names: Names) -> Iterator[Problem]:
         if joint.rotor_inertia and joint.torque.kind != "motor":
             what = f"{joint.rotor_inertia:g} is given, but only a joint with torque: motor has one"
             yield f"{place}.rotor_inertia", what
+        if joint.friction.stribeck and not joint.friction.stribeck_speed:
+            what = f"{joint.friction.stribeck:g} is given without stribeck_speed"
+            yield f"{place}.friction.stribeck", what
 
 
 def _joint_names(file: RobotFile, mechanism: Mechanism) -> Iterator[Problem]:

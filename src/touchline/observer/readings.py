@@ -23,7 +23,7 @@ def read_torque(robot: Robot, q: Array, qd: Array, tau: Array) -> Array:
         if not joint.measured:
             continue
         law, speed = joint.friction, qd[:, j]
-        friction = law.coulomb * np.tanh(speed / law.coulomb_width) + law.viscous * speed
+        friction = law.dry(speed) + law.viscous * speed
         read[:, j] = joint.sign * joint.gain * tau[:, j] - joint.bias - friction
         if joint.rest is not None:
             read[:, j] -= joint.rest.at(q[:, j], speed)

@@ -98,6 +98,9 @@ def _friction(joint: JointDescription) -> str:
     parts = []
     if friction.coulomb:
         parts.append(f"{friction.coulomb:g} tanh(qd / {friction.coulomb_width:g})")
+    if friction.stribeck:
+        fall = f"exp(-(qd / {friction.stribeck_speed:g})^2)"
+        parts.append(f"{friction.stribeck:g} {fall} tanh(qd / {friction.coulomb_width:g})")
     if friction.viscous:
         parts.append(f"{friction.viscous:g} qd")
     if joint.rest is not None:

@@ -15,6 +15,7 @@ import numpy as np
 
 from touchline.arrays import Array
 from touchline.extras import need
+from touchline.model.description import Friction
 from touchline.model.mechanism import Mechanism
 from touchline.model.robot import Robot
 from touchline.simulation.mujoco_model import Addition, build_model
@@ -274,13 +275,13 @@ class _Friction:
     """Friction of the drives whose torque is measured on the motor side."""
 
     def __init__(self, robot: Robot) -> None:
-        rows = [
-            (j.friction.coulomb, j.friction.viscous, j.friction.coulomb_width)
-            if j.torque == "motor"
-            else (0.0, 0.0, 1.0)
-            for j in robot.description.joints
-        ]
+        laws = [j.friction if j.torque == "motor" else Friction() for j in robot.description.joints]
+        rows = [(law.coulomb, law.viscous, law.coulomb_width) for law in laws]
         self._coulomb, self._viscous, self._width = np.array(rows).reshape(-1, 3).T
+        self._falling = [(j, law) for j, law in enumerate(laws) if law.stribeck]
 
     def of_drives(self, qd: Array) -> Array:
-        return self._coulomb * np.tanh(qd / self._width) + self._viscous * qd
+        torque = self._coulomb * np.tanh(qd / self._width) + self._viscous * qd
+        for j, law in self._falling:
+            torque[j] = law.dry(qd[j]) + law.viscous * qd[j]
+        return torque

@@ -51,7 +51,7 @@ def _joint_log(joint: JointDescription, j: int, readings: Readings) -> Array:
     else:
         friction, qd = joint.friction, readings.qd[:, j]
         shown = readings.link_torque[:, j] + friction.viscous * qd
-        shown = shown + friction.coulomb * np.tanh(qd / friction.coulomb_width)
+        shown = shown + friction.dry(qd)
     if joint.compensated == "gravity" and readings.gravity_torque is not None:
         shown = shown - readings.gravity_torque[:, j]
     elif joint.compensated == "model" and readings.motion_torque is not None:

@@ -26,7 +26,7 @@ class JointReadings {
       slope_.push_back(joint.sign * joint.gain);
       offset_.push_back(joint.measured() ? joint.bias : kNaN);
       viscous_.push_back(joint.viscous);
-      if (joint.measured() && joint.coulomb != 0.0) rough_.push_back(j);
+      if (joint.measured() && joint.rough()) rough_.push_back(j);
       if (joint.measured() && !joint.rest.empty()) learned_.push_back(j);
       limits_.push_back(joint.measured() ? safe_limit(joint.range / std::fabs(joint.gain))
                                          : kNoLimit);
@@ -45,8 +45,7 @@ class JointReadings {
     }
     for (std::size_t j : rough_) {
       for (int k = 0; k < kLanes; ++k) {
-        const double speed = lane(qd[j], k);
-        const double friction = joints_[j].coulomb * std::tanh(speed / joints_[j].coulomb_width);
+        const double friction = joints_[j].dry_friction(lane(qd[j], k));
         set_lane(u[j], k, lane(u[j], k) - friction);
       }
     }
@@ -68,8 +67,7 @@ class JointReadings {
   bool read(const double* logged, const double* q, const double* qd, const double* n_bar,
             double* u, Health& health) {
     convert(logged, qd, n_bar, u);
-    for (std::size_t j : rough_)
-      u[j] -= joints_[j].coulomb * std::tanh(qd[j] / joints_[j].coulomb_width);
+    for (std::size_t j : rough_) u[j] -= joints_[j].dry_friction(qd[j]);
     for (std::size_t j : learned_) u[j] -= joints_[j].rest(q[j], qd[j]);
     if (all_below(logged, limits_.data(), limits_.size())) {
       if (incomplete_) present_ = measured_;
@@ -105,7 +103,7 @@ class JointReadings {
   std::vector<char> measured_, present_;
   std::vector<double> slope_, offset_, viscous_;
   std::vector<std::uint64_t> limits_;
-  std::vector<std::size_t> rough_, learned_;  // joints with Coulomb friction, with a learned rest
+  std::vector<std::size_t> rough_, learned_;  // joints with dry friction, with a learned rest
   bool incomplete_ = false;
 };
 

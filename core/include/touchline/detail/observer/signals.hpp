@@ -25,6 +25,7 @@ struct JointRow {
   double sign = 1.0, gain = 1.0, bias = 0.0, range = kInfinity;
   double rotor_inertia = 0.0;
   double coulomb = 0.0, viscous = 0.0, coulomb_width = 0.05;
+  double stribeck = 0.0, stribeck_speed = 0.0;  // what dry friction has more of at slow speeds
   LearnedRest rest;
   double lower = -kInfinity, upper = kInfinity;
   double bandwidth = 100.0;
@@ -32,6 +33,16 @@ struct JointRow {
   std::vector<int> sources;  // Torque::from: the sensors its torque is read from
 
   bool measured() const { return torque == Torque::sensor || torque == Torque::motor; }
+  bool rough() const { return coulomb != 0.0 || stribeck != 0.0; }
+  // Dry friction [Nm or N] at a speed: with `stribeck`, it falls to `coulomb` as the speed grows.
+  double dry_friction(double speed) const {
+    double size = coulomb;
+    if (stribeck != 0.0) {
+      const double part = speed / stribeck_speed;
+      size += stribeck * std::exp(-part * part);
+    }
+    return size * std::tanh(speed / coulomb_width);
+  }
 };
 
 struct SensorRow {
