@@ -13,11 +13,12 @@ from touchline.identify.choice import Chooser
 from touchline.identify.described import description_changes, identified_robot
 from touchline.identify.evidence import gather
 from touchline.identify.identification import identify
+from touchline.identify.laws import SPEEDS, spread
 from touchline.identify.payload import payload_mass
 from touchline.identify.physical import PhysicalBody, pseudo_inertia
 from touchline.identify.regressor import body_vector
 from touchline.model.corrections import load_inertia
-from touchline.model.description import Load
+from touchline.model.description import Friction, Load
 from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot
 from touchline.model.transforms import combine_inertias
@@ -74,6 +75,63 @@ def test_friction_and_offsets_are_found_again():
             assert joint.friction.coulomb_width == width
     for value, error in zip(found.solution.values, found.solution.errors, strict=True):
         assert error < 0.2 * max(abs(value), 0.5)
+
+
+def rubbed(s, laws):
+    """Samples with friction of the joints."""
+    tau = s.tau.copy()
+    for j, law in enumerate(laws):
+        tau[:, j] += law.dry(s.qd[:, j]) + law.viscous * s.qd[:, j]
+    return replace(s, tau=tau)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_friction_that_falls_with_speed_is_found_where_there_is_some(seed):
+    """Five joints of random widths, every other one with friction that falls."""
+    rng, robot, laws = np.random.default_rng(seed), arm(), []
+    for j in range(5):
+        width, coulomb = np.exp(rng.uniform(*np.log((0.01, 0.05)))), rng.uniform(0.5, 3.0)
+        law = Friction(coulomb, rng.uniform(0.0, 1.0), float(width))
+        if (j + seed) % 2:
+            speed = max(float(np.exp(rng.uniform(*np.log((0.05, 0.4))))), 2.5 * width)
+            law = replace(law, stribeck=coulomb * rng.uniform(0.4, 1.2), stribeck_speed=speed)
+        laws.append(law)
+    s = rubbed(recorded(robot), laws)
+    found = identified_robot(identify(gather(robot, [[s]])))
+    for joint, law in zip(found.description.joints, laws, strict=True):
+        assert joint.friction.stribeck == pytest.approx(law.stribeck, rel=0.1)
+        assert joint.friction.coulomb == pytest.approx(law.coulomb, rel=0.05)
+        assert joint.friction.coulomb_width == pytest.approx(law.coulomb_width, rel=0.1)
+    native = tl.Observer(found, bandwidth=20.0).run(s.time, s.q, s.qd, s.tau, s.wrench)
+    assert np.sqrt(np.mean(native.tau_ext[100:] ** 2, axis=0)).max() < 0.02
+
+
+def test_described_friction_may_be_too_large_and_may_begin_to_fall():
+    """Its width stays, and so does its speed once it is described."""
+    plain, robot = Friction(2.0, 0.5, 0.05), arm()
+    truth = [Friction(1.0, 0.2, 0.05), Friction(1.0, 0.2, 0.05, 0.8, 0.3)]
+    s = rubbed(recorded(robot), truth)
+    falls = Friction(2.0, 0.5, 0.05, 1.5, 0.3)
+    for described in ((plain, plain), (plain, falls)):
+        joints = [
+            replace(joint, friction=law)
+            for joint, law in zip(robot.description.joints, described, strict=False)
+        ]
+        joints += robot.description.joints[2:]
+        rough = Robot(replace(robot.description, joints=tuple(joints)), robot.mechanism)
+        found = identified_robot(identify(gather(rough, [[s]]))).description.joints
+        assert found[0].friction.coulomb == pytest.approx(1.0, rel=0.05)
+        assert found[0].friction.stribeck == 0.0
+        assert found[1].friction.coulomb == pytest.approx(1.0, rel=0.05)
+        assert found[1].friction.stribeck == pytest.approx(0.8, rel=0.1)
+        assert found[1].friction.stribeck_speed == pytest.approx(0.3, rel=0.05)
+        assert found[1].friction.coulomb_width == 0.05
+
+
+def test_any_law_of_dry_friction_comes_from_a_few():
+    speed = np.concatenate([-np.geomspace(1e-4, 10.0, 500), [0.0], np.geomspace(1e-4, 10.0, 500)])
+    for law in (Friction(1.0, 0.0, 0.005), Friction(1.0, 0.0, 0.03, 2.0, 0.08)):
+        np.testing.assert_allclose(spread(speed) @ law.dry(SPEEDS), law.dry(speed), atol=1.5e-3)
 
 
 def test_rounding_does_not_choose_a_width_where_friction_is_held_at_zero():

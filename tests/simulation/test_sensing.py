@@ -78,8 +78,9 @@ def test_odd_conventions_change_the_log_but_not_the_estimates(full, reference, c
     np.testing.assert_allclose(found.segment_wrench, expected.segment_wrench, atol=1e-8)
 
 
-def test_motor_side_torques_show_rotor_and_friction(full):
-    motor = {"torque": "motor", "rotor_inertia": 0.3, "friction": Friction(3.0, 2.0, 0.02)}
+@pytest.mark.parametrize("law", [Friction(3.0, 2.0, 0.02), Friction(2.0, 2.0, 0.02, 1.5, 0.3)])
+def test_motor_side_torques_show_rotor_and_friction(full, law):
+    motor = {"torque": "motor", "rotor_inertia": 0.3, "friction": law}
     robot = with_joints(full, **motor)
     simulated = scripted(robot, PUSHES, 0.3, speed=1.0)
     link_side = scripted(full, PUSHES, 0.3, speed=1.0)

@@ -62,7 +62,7 @@ def _residuals(found: Identification) -> Any:
 def _friction(found: Identification) -> Any:
     """Per joint what is left without its friction, over speed, and the law that was found."""
     e = found.evidence
-    kinds = ("coulomb", "viscous", "bias")
+    kinds = ("coulomb", "stribeck", "viscous", "bias")
     columns = [c for c in found.problem.columns if c.row < e.joints and c.kind in kinds]
     joints = sorted({c.row for c in columns if c.kind != "bias"})
     if not joints:
@@ -93,4 +93,6 @@ def _friction(found: Identification) -> Any:
 def _law(column: Column, speed: np.ndarray) -> np.ndarray:
     if column.kind == "coulomb":
         return np.tanh(speed / column.width)
+    if column.kind == "stribeck":
+        return np.tanh(speed / column.width) * np.exp(-((speed / column.speed) ** 2))
     return speed if column.kind == "viscous" else np.ones_like(speed)

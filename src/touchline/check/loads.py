@@ -10,7 +10,7 @@ import numpy as np
 from touchline.arrays import Array
 from touchline.check.averages import averaged
 from touchline.check.findings import Findings
-from touchline.identify.evidence import Evidence, gather
+from touchline.identify.evidence import WIDTHS, Evidence, gather
 from touchline.identify.fit import main_links
 from touchline.identify.identification import MOST_TOUCHED, touched_instants
 from touchline.identify.payload import payload_link
@@ -260,7 +260,7 @@ def _without_friction(values: Array, evidence: Evidence) -> Array:
     out = values.copy()
     if evidence.joints == 0:
         return out
-    width = evidence.width_index(0, COULOMB_WIDTH)
+    width = WIDTHS.index(COULOMB_WIDTH)
     for j in range(evidence.joints):
         if evidence.used[j] and np.std(evidence.speed[:, j]) > MOVED:
             rubbing = np.column_stack([evidence.dry[:, j, width], evidence.speed[:, j]])

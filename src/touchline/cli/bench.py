@@ -287,6 +287,9 @@ def identify(
         "panda",
         "ur10",
     ),
+    kinds: tuple[
+        Literal["payload alone", "frame", "bias", "friction", "delay", "falling friction"], ...
+    ] = ("payload alone", "frame", "bias", "friction", "delay", "falling friction"),
     runs: int = 4,
     seed: int = 0,
     data: Directory = None,
@@ -296,8 +299,9 @@ def identify(
     Example: touchline bench identify --arms sara-full --runs 10
 
     Simulated arms follow the motion of `touchline calibrate --plan`. Their inertias are 1.5 % off,
-    and they carry a payload that the model lacks. Five kinds of arms: without further errors, with
-    a sensor's frame 2 degrees and 5 mm off, a bias of 2 N, friction of 1 Nm, or a delay of 5 ms.
+    and they carry a payload that the model lacks. Six kinds of arms: without further errors, with
+    a sensor's frame 2 degrees and 5 mm off, a bias of 2 N, friction of 1 Nm, a delay of 5 ms, or
+    friction that falls. It falls with speed to 1 Nm, from 1.3 to 2.2 Nm.
     Each line has a figure's error and how many runs are within the goal. For real arms: what is
     left of the residuals on motion that played no part.
 
@@ -305,6 +309,7 @@ def identify(
 
     Args:
         arms: Simulated arms; the pandas, ur5 and ur10 need the package example-robot-data.
+        kinds: What is wrong with them.
         runs: Arms with errors of their own of each kind; each takes some 20 s. 0: none.
         seed: Seed of all that is random.
         data: Folder of the recordings of real arms (see docs/calibration.md).
@@ -313,7 +318,7 @@ def identify(
     from touchline.numbers import check_least
 
     check_least(0, runs=runs)
-    missed = injected.main(arms, runs, seed) if runs else 0
+    missed = injected.main(arms, kinds, runs, seed) if runs else 0
     if data is None:
         print("Identification of real arms: no recordings, name their folder with --data")
         return missed

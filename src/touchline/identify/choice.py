@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from touchline.arrays import Array, Index, Mask
 from touchline.identify.evidence import WIDTHS, Evidence
+from touchline.identify.falling import APART, DryFriction, rounded
 from touchline.identify.fit import (
     BodyChange,
     Column,
@@ -34,6 +35,10 @@ POSES = 0.1  # rad; joints that all moved less show one pose, which tells no ine
 MANY = 5.0  # times a bias is less sure beside masses: then it may be one
 OFFSET, OFFSET_SHARE = 0.1, 0.003  # N or Nm, or of the row's largest reading: less matters little
 BETTER = 1.0  # standard errors by which a larger model must win
+CLEARLY = 2.0  # standard errors by which a finer law of friction must win
+SURE = 5.0  # standard errors that friction must have which falls with speed
+POLISHED, LONGEST = 4, 0.2  # steps of widths and speeds, and of their logarithm at most
+DRY = "coulomb", "stribeck"
 SAME = 1.0 + 1e-9  # costs closer than that differ by rounding, as where friction is held at zero
 
 
@@ -82,7 +87,8 @@ class Chooser:
         self.moved = np.sqrt(np.mean(evidence.qd[use] ** 2, axis=0)) > MOVED
         self.links = main_links(evidence.robot)
         self.nodes = self._seen()
-        self.weight = self._weight(self.start)
+        self.plain: dict[int, Column] = {}
+        self.weight, self.scale = self._weight(self.start), self._scatter(self.start)
         self.rich = self._richest(self.start)
         for _ in range(2):
             found = self.fit(self.richest())
@@ -103,7 +109,8 @@ class Chooser:
 
     def choose(self) -> Problem:
         """Columns of every row, then bodies, then the columns once more beside these."""
-        parts = [self._equations(self.richest(), fold.test) for fold in self.folds]
+        every = Problem((*self.rich, *self.plain.values()), self._bodies(0.1))
+        parts = [self._equations(every, fold.test) for fold in self.folds]
         columns = self._columns_of_rows(self.start)
         loads = self._choose_loads(parts, columns)
         if loads:
@@ -111,7 +118,53 @@ class Chooser:
         bodies = loads + self._choose_bodies(parts, columns, loads)
         if bodies:
             columns = self._beside(bodies)
-        return Problem(columns, bodies)
+        unsure = self._unsure(Problem(columns, bodies))
+        if unsure:
+            self.rich = tuple(
+                self.plain[c.row] if c.row in unsure and c.kind == "coulomb" else c
+                for c in self.rich
+                if c.row not in unsure or c.kind != "stribeck"
+            )
+            columns = self._beside(bodies)
+        return self._polished(Problem(columns, bodies))
+
+    def _polished(self, problem: Problem) -> Problem:
+        """With the widths and speeds that fit best beside all else, where friction falls."""
+        rows = {
+            c.row for c in problem.columns if c.kind == "stribeck" and not self._described(c.row)
+        }
+        if not rows:
+            return problem
+        tried = [problem]
+        for _ in range(POLISHED):
+            beside = _doubted(Solution(problem, np.empty(0), np.empty(0))).problem
+            found = self.fit(beside)
+            moved = {r: _moved(found, r) for r in rows}
+            columns = tuple(
+                _at(c, moved[c.row]) if c.row in rows and c.kind in DRY else c
+                for c in problem.columns
+            )
+            problem = replace(problem, columns=columns)
+            tried.append(problem)
+        return min(tried, key=self._misfit)
+
+    def _misfit(self, problem: Problem) -> float:
+        """The weighed sum of squares that a fit of all instants leaves."""
+        left = self.start + applied(self.evidence, self.fit(problem))
+        return float((self.weight * left**2)[self.use].sum())
+
+    def _described(self, r: int) -> bool:
+        """Does the description know dry friction of the joint? Then its width stays."""
+        law = self.evidence.robot.description.joints[r].friction
+        return law.coulomb > 0.0 or law.stribeck > 0.0
+
+    def _unsure(self, problem: Problem) -> list[int]:
+        """Rows whose friction falls with speed, but not surely once all is fitted together."""
+        if not any(c.kind == "stribeck" for c in problem.columns):
+            return []
+        found = self.with_errors(self.fit(problem))
+        told = zip(problem.columns, found.values, found.errors, strict=True)
+        return [c.row for c, v, e in told if c.kind == "stribeck" and abs(v) < SURE * e]
 
     def fit_beside(self, more: tuple[Column, ...]) -> Solution:
         """Further columns beside a payload and somewhat free inertias, with standard errors."""
@@ -191,8 +244,15 @@ class Chooser:
         return replace(told, body_errors=errors)
 
     def _errors(self, found: Solution, left: Array) -> Solution:
-        equations = self._equations(found.problem, self.use)
-        return equations.with_errors(found, left, self.weight, self.use, self.blocks)
+        beside = _doubted(found)
+        equations = self._equations(beside.problem, self.use)
+        told = equations.with_errors(beside, left, self.weight, self.use, self.blocks)
+        return replace(
+            told,
+            problem=found.problem,
+            values=found.values,
+            errors=told.errors[: len(found.values)],
+        )
 
     def _equations(self, problem: Problem, use: Mask) -> Equations:
         return Equations.of(self.evidence, problem, self.start, self.weight, use)
@@ -243,13 +303,38 @@ class Chooser:
         chosen: list[Column] = []
         for r in self._rows():
             rich = [c for c in self.rich if c.row == r]
-            options = _options(rich)
-            left = [np.zeros(start.shape) for _ in options]
-            for fold in self.folds:
-                for i, option in enumerate(options):
-                    left[i][fold.test, r] = self._row_left(start, r, option, fold.train, fold.test)
-            chosen += options[self._simplest([self._cost(x, r) for x in left])]
+            chosen += self._columns_of_row(start, r, rich)
         return tuple(chosen)
+
+    def _columns_of_row(self, start: Array, r: int, rich: list[Column]) -> list[Column]:
+        """Those of a row; friction that falls with speed must win clearly."""
+        if not any(c.kind == "stribeck" for c in rich):
+            return self._best(start, r, _options(rich))[0]
+        others = [c for c in rich if c.kind not in DRY]
+        plain, cost = self._best(start, r, _options([*others, self.plain[r]]))
+        falling, less = self._best(start, r, _options(rich, falling=True))
+        return falling if self._clearly(cost, less) else plain
+
+    def _best(
+        self, start: Array, r: int, options: list[list[Column]]
+    ) -> tuple[list[Column], Array]:
+        """The simplest of the options that foretell a row best, and its cost (blocks,)."""
+        costs = [self._foretold_row(start, r, option) for option in options]
+        best = self._simplest(costs)
+        return options[best], costs[best]
+
+    def _foretold_row(self, start: Array, r: int, columns: list[Column]) -> Array:
+        """Cost (blocks,) of a row where its own columns alone are fitted to other parts of time."""
+        left = np.zeros(start.shape)
+        for fold in self.folds:
+            left[fold.test, r] = self._row_left(start, r, columns, fold.train, fold.test)
+        return self._cost(left, r)
+
+    def _clearly(self, cost: Array, less: Array) -> bool:
+        """Is a cost (blocks,) so much less that chance hardly makes it so?"""
+        gain = cost - less
+        chance = CLEARLY * gain.std() / np.sqrt(len(gain))
+        return bool(gain.mean() > max(chance, (SAME - 1.0) * cost.mean()))
 
     def _choose_loads(
         self, parts: list[Equations], columns: tuple[Column, ...]
@@ -305,7 +390,11 @@ class Chooser:
         return (start[:, r] + added)[test]
 
     def _richest(self, start: Array) -> tuple[Column, ...]:
-        """All columns that rows may have, with the width of Coulomb friction that fits best."""
+        """All columns that rows may have, with the width of Coulomb friction that fits best.
+
+        Where friction falls with speed, `plain` has the row's Coulomb friction without that.
+        """
+        self.plain = {}
         columns: list[Column] = []
         joints = self.evidence.robot.description.joints
         for r in self._rows():
@@ -314,13 +403,48 @@ class Chooser:
                 own.append(Column("viscous", r))
                 if joints[r].torque == "motor":
                     own.append(Column("rotor", r))
-                own.append(self._best_coulomb(start, r, own))
+                own += self._dry_columns(start, r, own)
             columns += own
         return tuple(columns)
 
+    def _dry_columns(self, start: Array, r: int, beside: list[Column]) -> list[Column]:
+        """Those of dry friction that fit a row best.
+
+        Its width is finer than `WIDTHS`, and it falls with speed, where that is clear.
+        """
+        plain = self._best_coulomb(start, r, beside)
+        row = start[self.use, r], self.weight[self.use, r]
+        dry = DryFriction(self.evidence, r, *row, self.use)
+        cost = self._foretold_row(start, r, [*beside, plain])
+        if not self._described(r):
+            finer = dry.plain(plain.width)
+            less = self._foretold_row(start, r, [*beside, finer])
+            if self._clearly(cost, less):
+                plain, cost = finer, less
+            elif less.mean() < cost.mean():
+                cost = less
+        falling = dry.falling()
+        if not falling or not self._sure(start, r, [*beside, *falling]):
+            return [plain]
+        if not self._clearly(cost, self._foretold_row(start, r, [*beside, *falling])):
+            return [plain]
+        self.plain[r] = plain
+        return falling
+
+    def _sure(self, start: Array, r: int, columns: list[Column]) -> bool:
+        """Is the last of a row's columns no work of chance, where all of them are fitted?"""
+        only = replace(self.evidence, used=np.arange(len(self.evidence.used)) == r)
+        problem = Problem(tuple(columns))
+        found = Equations.of(only, problem, start, self.weight, self.use).solve()
+        left, last = start + applied(only, found), len(columns) - 1
+        beside = _doubted(found)
+        equations = Equations.of(only, beside.problem, start, self.weight, self.use)
+        told = equations.with_errors(beside, left, self.weight, self.use, self.blocks)
+        return bool(abs(told.values[last]) > SURE * told.errors[last])
+
     def _best_coulomb(self, start: Array, r: int, beside: list[Column]) -> Column:
         law = self.evidence.robot.description.joints[r].friction
-        widths = WIDTHS if law.coulomb == 0.0 else (law.coulomb_width,)
+        widths = (law.coulomb_width,) if self._described(r) else WIDTHS
         options = [Column("coulomb", r, width) for width in widths]
         costs = []
         for option in options:
@@ -329,8 +453,8 @@ class Chooser:
         return next(o for o, c in zip(options, costs, strict=True) if c <= SAME * min(costs))
 
 
-def _options(rich: list[Column]) -> list[list[Column]]:
-    """Sets of columns that a row may have, simpler ones first."""
+def _options(rich: list[Column], falling: bool = False) -> list[list[Column]]:
+    """Sets of columns that a row may have, simpler ones first; `falling`: those with that."""
     kinds = [
         (),
         ("bias",),
@@ -339,8 +463,40 @@ def _options(rich: list[Column]) -> list[list[Column]]:
         ("bias", "coulomb", "viscous"),
         ("bias", "coulomb", "viscous", "rotor"),
     ]
+    if falling:
+        kinds = [(*of, "stribeck") for of in kinds if "coulomb" in of]
     sets = [tuple(c for c in rich if c.kind in of) for of in kinds]
     return [list(option) for option in dict.fromkeys(sets)]
+
+
+def _doubted(found: Solution) -> Solution:
+    """With what width and speed do, where friction falls with speed: errors count that doubt."""
+    columns = found.problem.columns
+    more = tuple(
+        replace(c, kind=kind)
+        for c in columns
+        if c.kind == "stribeck"
+        for kind in ("width", "speed")
+    )
+    problem = replace(found.problem, columns=(*columns, *more))
+    return replace(found, problem=problem, values=np.append(found.values, np.zeros(len(more))))
+
+
+def _at(column: Column, place: dict[str, float]) -> Column:
+    speed = place["speed"] if column.kind == "stribeck" else 0.0
+    return replace(column, width=place["width"], speed=speed)
+
+
+def _moved(found: Solution, r: int) -> dict[str, float]:
+    """The width and the speed of a row after a step of Gauss and Newton, not too far away."""
+    own = next(c for c in found.problem.columns if (c.kind, c.row) == ("stribeck", r))
+    coulomb, stribeck = (found.value(kind, r) for kind in DRY)
+    told = {}
+    for kind, size in (("width", coulomb + stribeck), ("speed", stribeck)):
+        step = found.value(kind, r) / max(size, 1e-9)
+        told[kind] = rounded(getattr(own, kind) * float(np.exp(np.clip(step, -LONGEST, LONGEST))))
+    told["speed"] = max(told["speed"], APART * told["width"])
+    return told
 
 
 def _sum(parts: list[Equations]) -> Equations:

@@ -13,6 +13,7 @@ from touchline.identify.payload import payload_link
 from touchline.identify.regressor import body_of_vector
 from touchline.model.corrections import corrected_inertia, load_inertia
 from touchline.model.description import (
+    Friction,
     JointDescription,
     LinkCorrection,
     Load,
@@ -139,29 +140,36 @@ def _joint_changes(old: JointDescription, new: JointDescription) -> dict[str, An
         law = new.friction
         changed["friction"] = {"coulomb": law.coulomb, "viscous": law.viscous}
         changed["friction"]["coulomb_width"] = law.coulomb_width
+        if law.stribeck:
+            changed["friction"]["stribeck"] = law.stribeck
+            changed["friction"]["stribeck_speed"] = law.stribeck_speed
     return changed
 
 
 def _joint(joint: JointDescription, row: int, found: Solution) -> JointDescription:
-    law, width = joint.friction, joint.friction.coulomb_width
-    coulomb = law.coulomb
-    for column, value in zip(found.problem.columns, found.values, strict=True):
-        if (column.kind, column.row) == ("coulomb", row):
-            coulomb, width = law.coulomb + value, column.width
-    if coulomb <= 0.0:
-        coulomb, width = 0.0, law.coulomb_width
-    law = replace(
-        law,
-        coulomb=_short(coulomb),
-        viscous=_short(law.viscous + found.value("viscous", row)),
-        coulomb_width=width,
-    )
     return replace(
         joint,
-        friction=law,
+        friction=_friction(joint.friction, row, found),
         bias=_short(joint.bias + found.value("bias", row)),
         rotor_inertia=_short(joint.rotor_inertia + found.value("rotor", row)),
         gain=_short(joint.gain * (1.0 + found.value("gain", row))),
+    )
+
+
+def _friction(law: Friction, row: int, found: Solution) -> Friction:
+    width, speed = law.coulomb_width, law.stribeck_speed
+    for column in found.problem.columns:
+        if column.row == row and column.kind in ("coulomb", "stribeck"):
+            width = column.width
+            speed = column.speed or speed
+    coulomb = max(law.coulomb + found.value("coulomb", row), 0.0)
+    stribeck = _short(max(law.stribeck + found.value("stribeck", row), 0.0))
+    return Friction(
+        coulomb=_short(coulomb),
+        viscous=_short(law.viscous + found.value("viscous", row)),
+        coulomb_width=width if coulomb > 0.0 or stribeck > 0.0 else law.coulomb_width,
+        stribeck=stribeck,
+        stribeck_speed=speed if stribeck else law.stribeck_speed,
     )
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from touchline.arrays import Array, Index, Mask
 from touchline.errors import InputError
+from touchline.identify.laws import SPEEDS, spread
 from touchline.identify.regressor import Rows, body_vector, momentum_regressors, rows_of
 from touchline.identify.smoothing import Steps, derivative, make_steps, mean, settled, smooth
 from touchline.model.description import Friction
@@ -48,6 +49,7 @@ class Evidence:
         rotor: (N, n) acceleration of the joint.
         speed: (N, n) velocity.
         dry: (N, n, W) tanh of velocity over each of `WIDTHS`, then over the described width.
+        laws: (N, n, K) as of `spread`: from them any law of dry friction is made.
     """
 
     robot: Robot
@@ -63,18 +65,20 @@ class Evidence:
     rotor: Array
     speed: Array
     dry: Array
+    laws: Array
 
     def __len__(self) -> int:
         return len(self.time)
 
     def part(self, use: NDArray) -> "Evidence":
         """Some of the instants."""
-        fields = ("time", "recording", "q", "qd", "reading", "model", "rotor", "speed", "dry")
+        fields = ("time", "recording", "q", "qd", "reading", "model")
+        fields += ("rotor", "speed", "dry", "laws")
         return replace(self, **{name: getattr(self, name)[use] for name in fields})
 
     def joined(self, other: "Evidence") -> "Evidence":
         """These instants and those of further recordings."""
-        fields = ("time", "q", "qd", "reading", "model", "rotor", "speed", "dry")
+        fields = ("time", "q", "qd", "reading", "model", "rotor", "speed", "dry", "laws")
         both = {n: np.concatenate([getattr(self, n), getattr(other, n)]) for n in fields}
         number = other.recording + 1 + self.recording.max(initial=-1)
         both["recording"] = np.concatenate([self.recording, number])
@@ -89,8 +93,8 @@ class Evidence:
         """The residual (N, R) [N or Nm] with the parameters that a robot's description has.
 
         Args:
-            robot: of the same structure; default: the evidence's own. Its friction must have the
-                same width, or one of `WIDTHS`. Sign, gain, polarity and frames are taken as here.
+            robot: of the same structure; default: the evidence's own. Sign, gain, polarity and
+                frames are taken as here.
         """
         robot = robot or self.robot
         bodies = np.array([body_vector(node.inertia) for node in robot.nodes])
@@ -100,7 +104,10 @@ class Evidence:
             left[:, j] += joint.bias + joint.rotor_inertia * self.rotor[:, j]
             left[:, j] += law.viscous * self.speed[:, j]
             if law.coulomb:
-                left[:, j] += law.coulomb * self.dry[:, j, self.width_index(j, law.coulomb_width)]
+                left[:, j] += law.coulomb * self.coulomb(j, law.coulomb_width)
+            if law.stribeck:
+                falling = self.falling(j, law.coulomb_width, law.stribeck_speed)
+                left[:, j] += law.stribeck * falling
             own = self.robot.description.joints[j]
             left[:, j] -= (joint.gain / own.gain - 1.0) * self.reading[:, j]
         for s, sensor in enumerate(robot.description.sensors):
@@ -108,13 +115,18 @@ class Evidence:
             left[:, first : first + 6] += sensor.bias
         return np.where(self.used, left, 0.0)
 
-    def width_index(self, joint: int, width: float) -> int:
-        """Where the column of a width stands in `dry`."""
+    def coulomb(self, joint: int, width: float) -> Array:
+        """The column (N,) of Coulomb friction of a width [rad/s]."""
         own = self.robot.description.joints[joint].friction.coulomb_width
         for i, known in enumerate((*WIDTHS, own)):
             if abs(width - known) < 1e-9:
-                return i
-        raise ValueError(f"coulomb_width {width} is not among the evidence's")
+                return self.dry[:, joint, i]
+        return self.laws[:, joint] @ np.tanh(SPEEDS / width)
+
+    def falling(self, joint: int, width: float, speed: float) -> Array:
+        """The column (N,) of what falls from there with a speed [rad/s]."""
+        law = Friction(coulomb_width=width, stribeck=1.0, stribeck_speed=speed)
+        return self.laws[:, joint] @ law.dry(SPEEDS)
 
 
 def gather(
@@ -251,6 +263,7 @@ def _columns(
             "rotor": derivative(qd[piece], inner),
             "speed": mean(qd[piece]),
             "dry": mean(np.stack(dry, axis=-1)),
+            "laws": mean(spread(qd[piece])),
         }
         chosen = keep[start:stop]
         out = {}
@@ -276,7 +289,7 @@ class Smoother:
 def bare_robot(robot: Robot) -> Robot:
     """The robot without biases and friction: what its log reads as."""
     joints = tuple(
-        replace(j, bias=0.0, friction=replace(Friction(), coulomb_width=j.friction.coulomb_width))
+        replace(j, bias=0.0, friction=replace(j.friction, coulomb=0.0, viscous=0.0, stribeck=0.0))
         for j in robot.description.joints
     )
     sensors = tuple(replace(s, bias=(0.0,) * 6) for s in robot.description.sensors)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Least squares on the filtered equations: some parameters free, the rest as described."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,6 +19,7 @@ from touchline.model.transforms import move_inertia
 BIAS, BIAS_SHARE = 1.0, 0.1  # 1 sigma of a bias: N or Nm, or this part of the largest reading
 FRAME = {"turn": 0.1, "shift": 0.02}  # rad, m: 1 sigma of how far a sensor's frame is off
 STEPS = 30  # of Gauss and Newton at most
+SLIGHTLY = 1.05  # factor of a width or speed, to see what it does
 ENOUGH = 1e-6  # a step this small changes nothing that can be measured
 
 
@@ -27,9 +28,11 @@ class Column:
     """One free number that enters the equations linearly.
 
     Attributes:
-        kind: "bias", "viscous", "coulomb", "rotor", "gain", "turn" or "shift".
+        kind: "bias", "viscous", "coulomb", "stribeck", "rotor", "gain", "turn" or "shift"; for
+            what it does to errors, "width" and "speed" of friction, per unit of their logarithm.
         row: of the joint or of the sensor's axis; of `turn` and `shift` the sensor's first.
-        width: of the Coulomb friction [rad/s].
+        width: of the Coulomb friction [rad/s], or of what it has more at slow speeds.
+        speed: with which that falls [rad/s].
         axis: of the sensor's frame that it turns about, or is shifted along.
         rows: all that it enters.
         positive: may the value not be below zero?
@@ -39,6 +42,7 @@ class Column:
     row: int
     width: float = 0.0
     axis: int = 0
+    speed: float = 0.0
 
     @property
     def rows(self) -> range:
@@ -50,7 +54,7 @@ class Column:
     @property
     def positive(self) -> bool:
         """May the value not be below zero?"""
-        return self.kind in ("viscous", "coulomb", "rotor")
+        return self.kind in ("viscous", "coulomb", "stribeck", "rotor")
 
 
 @dataclass(frozen=True)
@@ -93,7 +97,7 @@ class Solution:
 
     Attributes:
         problem: what was free.
-        values: of the columns, to be added to the described ones (of `coulomb`: the whole value).
+        values: of the columns, to be added to the described ones.
         steps: (bodies, 10) of `PhysicalBody`.
         errors: 1 sigma of the columns.
         body_errors: (bodies, 10) 1 sigma of the ten parameters.
@@ -324,7 +328,18 @@ def column_of(e: Evidence, column: Column, r: int) -> Array:
         return e.rotor[:, r]
     if column.kind in FRAME:
         return _frame_column(e, column, r - column.row)
-    return e.dry[:, r, e.width_index(r, column.width)]
+    if column.kind == "stribeck":
+        return e.falling(r, column.width, column.speed)
+    if column.kind == "width":
+        return _slope(lambda width: e.coulomb(r, width), column.width)
+    if column.kind == "speed":
+        return _slope(lambda speed: e.falling(r, column.width, speed), column.speed)
+    return e.coulomb(r, column.width)
+
+
+def _slope(of: Callable[[float], Array], at: float) -> Array:
+    """How a column changes with the logarithm of a width or speed."""
+    return (of(at * SLIGHTLY) - of(at / SLIGHTLY)) / (2.0 * np.log(SLIGHTLY))
 
 
 def _frame_column(e: Evidence, column: Column, component: int) -> Array:
@@ -363,10 +378,10 @@ def _least(e: Evidence, column: Column) -> float:
     """The least change of a column's value: the described value must not fall below zero."""
     if not column.positive:
         return -np.inf
-    if column.kind == "coulomb":
-        return 0.0
     joint = e.robot.description.joints[column.row]
-    return -(joint.rotor_inertia if column.kind == "rotor" else joint.friction.viscous)
+    if column.kind == "rotor":
+        return -joint.rotor_inertia
+    return -float(getattr(joint.friction, column.kind))
 
 
 def main_links(robot: Robot) -> dict[int, tuple[str, Array]]:

@@ -11,7 +11,7 @@ from touchline.errors import InputError
 from touchline.identify.choice import Chooser
 from touchline.identify.evidence import Evidence
 from touchline.identify.fit import Problem, Solution, applied
-from touchline.identify.touches import find_touches, stretches
+from touchline.identify.touches import STICTION, find_touches, stretches
 
 LEAST_SECONDS = 2.0  # of settled, untouched data; less tells an offset at best
 HELD_OUT = 3  # every third recording, or the last third of each
@@ -137,9 +137,11 @@ def touched_instants(evidence: Evidence) -> Mask:
     for _ in range(ROUNDS):
         chooser = Chooser(evidence, ~touched)
         found = chooser.fit(chooser.richest())
-        described = [joint.friction.coulomb for joint in evidence.robot.description.joints]
-        coulomb = np.array([c + found.value("coulomb", j) for j, c in enumerate(described)])
-        now = find_touches(evidence, evidence.residual() + applied(evidence, found), coulomb)
+        laws = [joint.friction for joint in evidence.robot.description.joints]
+        coulomb = [law.coulomb + found.value("coulomb", j) for j, law in enumerate(laws)]
+        more = [law.stribeck + found.value("stribeck", j) for j, law in enumerate(laws)]
+        held = np.maximum(STICTION * np.array(coulomb), np.add(coulomb, more))
+        now = find_touches(evidence, evidence.residual() + applied(evidence, found), held)
         if (now == touched).all() or now.mean() > MOST_TOUCHED:
             return now
         touched = now

@@ -10,11 +10,19 @@ from touchline.identify.identification import Identification
 from touchline.identify.payload import payload_link
 from touchline.identify.rest import Rest
 
-UNITS = {"bias": "Nm", "viscous": "Nm s/rad", "coulomb": "Nm", "rotor": "kg m2", "gain": ""}
+UNITS = {
+    "bias": "Nm",
+    "viscous": "Nm s/rad",
+    "coulomb": "Nm",
+    "stribeck": "Nm",
+    "rotor": "kg m2",
+    "gain": "",
+}
 WORDS = {
     "bias": "offset",
     "viscous": "viscous friction",
     "coulomb": "Coulomb friction",
+    "stribeck": "more of it at slow speeds (Stribeck)",
     "rotor": "rotor inertia",
     "gain": "gain, relative",
 }
@@ -70,6 +78,8 @@ def _column_lines(found: Identification) -> list[str]:
             what = f"{WORDS[column.kind]} {value:+.3g} +- {error:.2g} {unit}".rstrip()
             if column.kind == "coulomb":
                 what += f" (within {column.width:g} rad/s)"
+            if column.kind == "stribeck":
+                what += f" (falls with {column.speed:g} rad/s)"
             told.append(what)
         lines.append(f"  {names[row]}: {', '.join(told)}")
     return lines

@@ -38,14 +38,13 @@ def _shortest(left: Array) -> tuple[Array, Array]:
     return 0.5 * (low + high), 0.5 * (high - low) / _QUANTILE
 
 
-def find_touches(evidence: Evidence, left: Array, coulomb: Array) -> Mask:
+def find_touches(evidence: Evidence, left: Array, held: Array) -> Mask:
     """Which instants (N,) are touched.
 
     Args:
         evidence: the instants.
         left: (N, R) residuals after a fit.
-        coulomb: (n,) Coulomb friction of the joints by that fit [Nm]. A joint that hardly moves
-            holds up to more than that, of either sign.
+        held: (n,) what a joint that hardly moves may hold by its friction, of either sign [Nm].
     """
     centred = left.copy()
     for number in np.unique(evidence.recording):  # each may rest in a pose of its own
@@ -54,7 +53,7 @@ def find_touches(evidence: Evidence, left: Array, coulomb: Array) -> Mask:
     scatter = usual_scatter(centred, evidence.used)
     slow = np.maximum(0.0, 1.0 - np.abs(evidence.qd) / SLOW)
     excess = np.abs(centred)
-    excess[:, : evidence.joints] -= STICTION * coulomb * slow
+    excess[:, : evidence.joints] -= held * slow
     out = np.any((excess / scatter > FAR)[:, evidence.used], axis=1)
     touched = np.zeros(len(evidence), dtype=bool)
     beside = BESIDE / evidence.bandwidth

@@ -21,7 +21,9 @@ REACH = 0.08  # m; how far its centre may be from that of the link that carries 
 TURNED, MOVED = np.radians(2.0), 5e-3  # rad, m; of a sensor's frame
 BIAS, FRICTION, LATE = 2.0, 1.0, 5e-3  # N, Nm, s
 WIDTHS = 0.01, 0.1  # rad/s, of the Coulomb friction's tanh
-KINDS = "payload alone", "frame", "bias", "friction", "delay"
+FALLING, SPEEDS = (0.3, 1.2), (0.05, 0.4)  # Nm, rad/s; how friction falls with speed, and where
+APART = 2.5  # times the width at least is that speed
+KINDS = "payload alone", "frame", "bias", "friction", "delay", "falling friction"
 
 
 @dataclass(frozen=True)
@@ -74,6 +76,13 @@ def make_wrong_arm(robot: Robot, kind: str, rng: np.random.Generator) -> WrongAr
         if measured:
             width = float(np.exp(rng.uniform(*np.log(WIDTHS))))
             friction[int(rng.choice(measured))] = Friction(FRICTION, 0.0, width)
+    elif kind == "falling friction":
+        measured = [j for j, joint in enumerate(description.joints) if joint.measured]
+        if measured:
+            width = float(np.exp(rng.uniform(*np.log(WIDTHS))))
+            speed = max(float(np.exp(rng.uniform(*np.log(SPEEDS)))), APART * width)
+            law = Friction(FRICTION, 0.0, width, float(rng.uniform(*FALLING)), speed)
+            friction[int(rng.choice(measured))] = law
     elif kind == "delay":
         torques = ["torques"] if any(joint.measured for joint in description.joints) else []
         late[str(rng.choice([*torques, *robot.sensor_names]))] = LATE
@@ -118,6 +127,6 @@ def record(
         columns = slice(0, n) if s < 0 else slice(n + 6 * s, n + 6 * s + 6)
         loads[:, columns] = shifted[:, columns]
     for j, law in case.friction.items():
-        loads[:, j] += law.coulomb * np.tanh(qd[:, j] / law.coulomb_width)
+        loads[:, j] += law.dry(qd[:, j])
     loads[:, n:] += case.bias
     return maker.sensed(q, qd, loads, rng)
