@@ -22,6 +22,7 @@ from touchline.bench.identify.pushes import Detected, judged
 from touchline.bench.tables import Row, aligned
 from touchline.calibrate.plan import Plan, make_plan
 from touchline.calibrate.run import Calibration, calibrate
+from touchline.errors import InputError
 from touchline.logs import write_table
 from touchline.model.description import JointDescription, SensorDescription
 from touchline.model.robot import Robot, load_robot
@@ -195,6 +196,7 @@ def main(arms: Sequence[str], kinds: Sequence[str], runs: int, seed: int) -> int
     """Prints by arm how far off what was found is; 1 where a figure is missed."""
     lines: list[Row] = [("arm", "figure", "goal", "cases", "told", "median", "worst", "within")]
     pushes: list[Row] = [("arm", "", "pushes found", "false events", "in contact untouched")]
+    refused: list[str] = []
     missed = False
     progress = tqdm(total=len(arms) * len(kinds) * runs, file=sys.stderr, leave=False, disable=None)
     for arm in arms:
@@ -209,7 +211,12 @@ def main(arms: Sequence[str], kinds: Sequence[str], runs: int, seed: int) -> int
                 rng = np.random.default_rng((seed, i, run))
                 with TemporaryDirectory() as folder:
                     case = make_wrong_arm(robot, kind, rng)
-                    judgement = judge(case, plan, rng, Path(folder))
+                    try:
+                        judgement = judge(case, plan, rng, Path(folder))
+                    except InputError as error:
+                        refused.append(f"{arm}, {kind}: {error.problems[0].partition(': ')[2]}")
+                        progress.update()
+                        continue
                 for name, figure in judgement.figures.items():
                     figures[name].append(figure)
                 for name, one in judgement.felt.items():
@@ -227,9 +234,11 @@ def main(arms: Sequence[str], kinds: Sequence[str], runs: int, seed: int) -> int
     print(aligned(lines, (0, 1)))
     print("claimed: joints whose friction is said to fall with speed, but does not.")
     print("told: calibrate claims to know it. Biases that it calls mass or bias are left out.")
+    for line in refused:
+        print(f"refused, so nothing was written: {line}")
     print(f"\nPushes of {FORCE:g} N, computed into other motion of these arms:")
     print(aligned(pushes, (0, 1)))
-    return int(missed)
+    return int(missed or len(refused) > 0)
 
 
 def _row(name: str, found: Sequence[Figure]) -> tuple[str, ...]:
