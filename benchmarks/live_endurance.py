@@ -6,8 +6,9 @@ python benchmarks/live_endurance.py [MINUTES [STALLS [WARM]]]
 An arm of its own process moves without a touch and sends 500 samples a second over RTDE. For
 MINUTES (default 4) `touchline live` reads it with page and recorder, and so does the node with a
 recorder, where ROS 2 is there: the slope of their resident memory, after WARM minutes more (default
-1), in which libraries take what they keep. Before that Python is blocked STALLS times (default 20) for 0.3 s, and collects three million objects: the
-longest time between two processed samples, beside that of an idle Python.
+1), in which libraries take what they keep. Before that Python is blocked STALLS times (default 20)
+for 0.3 s, and collects three million objects: the longest time between two processed samples,
+beside that of an idle Python.
 """
 
 import contextlib

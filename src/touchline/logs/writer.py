@@ -7,6 +7,7 @@ progress has a name with an underscore in front, which readers of data sets skip
 """
 
 import json
+import os
 import shutil
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -95,8 +96,9 @@ class TableWriter:
         """Rows written so far."""
         return self._rows
 
-    def _part(self, number: int, done: bool) -> Path:
-        return self.parts / f"{'' if done else '_'}part-{number:05d}.parquet"
+    def _part(self, number: int, done: bool) -> str:
+        # No `Path`: Python would keep the name of each part, and its table of names would grow.
+        return f"{self.parts}{os.sep}{'' if done else '_'}part-{number:05d}.parquet"
 
     def write(self, columns: Mapping[str, Any]) -> None:
         """Append rows.
@@ -153,14 +155,14 @@ class TableWriter:
             self._write_groups(rest=True)
         self._writer.close()
         self._writer, self._part_rows = None, 0
-        self._part(self._count, False).rename(self._part(self._count, True))
+        os.rename(self._part(self._count, False), self._part(self._count, True))
         self._count += 1
 
     def close(self) -> None:
         """Turn the parts into the table."""
         self._close_part()
         if self._count == 1:
-            self._part(0, True).rename(self.path)
+            os.rename(self._part(0, True), self.path)
         else:
             self._merge()
         shutil.rmtree(self.parts, ignore_errors=True)
@@ -217,7 +219,7 @@ def _arrow_array(values: Any, kind: Any) -> Any:
     return pa.array(values, type=kind, from_pandas=not whole)
 
 
-def _parquet_writer(path: Path, schema: Any) -> Any:
+def _parquet_writer(path: Path | str, schema: Any) -> Any:
     """Measured signals do not repeat: dictionaries and compression only cost time; words do.
 
     Of the largest and smallest values, which take time too, only those of stamps are read.
