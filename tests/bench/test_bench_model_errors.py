@@ -24,7 +24,14 @@ def test_one_touch_of_a_wrong_model_in_motion_is_one():
         assert trial.course.several == trial.course.wrong == 0
         robot, _, skin = told_and_real(OFF, run)
         thresholds = without_drift(make_thresholds(robot))
-        blind = Pipeline(robot, skin=skin, torque_error=0.0, friction=0.5, thresholds=thresholds)
+        blind = Pipeline(
+            robot,
+            skin=skin,
+            torque_error=0.0,
+            friction=0.5,
+            thresholds=thresholds,
+            tuning={"detector.drift_shown": 0.0},
+        )
         scene = make_scene(OFF, run)
         s = scene.signals
         blind.run(s.time, s.q, s.qd, s.tau, s.wrench)

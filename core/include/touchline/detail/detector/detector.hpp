@@ -71,8 +71,8 @@ class Detector {
         normalized_(rows_.size(), 0.0),
         shares_(rows_.size(), 0.0),
         drift_(rows_.size(), 0.0),
-        shown_before_(rows_.size(), 0.0),
         excess_(rows_.size(), 1.0),
+        shown_before_(rows_.size(), 0.0),
         standing_(rows_.size()),
         first_looks_(rows_.size()),
         levels_(segments_.size(), 0),
@@ -820,10 +820,10 @@ class Detector {
         baseline_posture_.average(g, q, std::min(1.0, dt / tau));
       }
       const DriftShares shares(activity(), baseline_posture_.distance2(g, q), tuning_);
-      const bool moved = moved_off(g), shows = levels_[g] > 0 ? own_doing(g) : !segments_[g].pending;
+      const bool moved = moved_off(g), free = levels_[g] == 0 && !segments_[g].pending;
       const double sigmas2 = tuning_.drift_shown * tuning_.drift_shown;
       for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
-        if (shows) shown_before_[i] = spreads_[i].variance_beyond(meters_.sigma(i));
+        if (free) shown_before_[i] = spreads_[i].variance_beyond(meters_.sigma(i));
         const double seen = moved && rows_[i].seen > 0.0 ? sigmas2 * shown_before_[i] : 0.0;
         drift_[i] = std::sqrt(std::max(drifted(rows_[i], activity(), shares), seen));
       }
