@@ -53,7 +53,7 @@ int main() {
       const ForceLine line{{draw(), draw(), draw()}, (1.0 / norm(way)) * way};
       const double limit = 0.2 + 0.2 * draw(), steep = 0.5 * draw();
       std::map<int, double> seen, weighed;
-      const Vec3 one = cross(line.direction, Vec3{draw(), draw(), draw()});
+      const Vec3 one = cross(line.direction, Vec3{0.3, -0.5, 0.8});
       Beside beside{{(1.0 / norm(one)) * one, {}}, {0.0, 0.0}};
       beside.axis[1] = cross(line.direction, beside.axis[0]);
       const auto all = [](double) { return 1.0; };

@@ -14,4 +14,4 @@ def test_faces_beside_a_line_are_those_of_a_look_at_each(tmp_path):
     assert compile_program(source, tmp_path / "around", "-O2") == ""
     wrong, found, looked, kept = map(int, run_program(tmp_path / "around").stdout.split())
     assert wrong == 0
-    assert found > 400 and looked > 20_000 and 100 < kept < found
+    assert found > 500 and looked > 20_000 and 100 < kept < found

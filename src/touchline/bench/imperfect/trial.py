@@ -74,10 +74,10 @@ class Trials:
         s = fault.read(self._robot, maker.sensed(q, qd, loads, rng), rng)
         pipeline = Pipeline(self._robot, period=1.0 / RATE, skin=self._skin)
         first = round(BEGIN * RATE)
-        for part in (slice(0, first), slice(first, None)):
-            pipeline.run(s.time[part], s.q[part], s.qd[part], s.tau[part], s.wrench[part])
-            if part.start == 0:
-                before = any(e.status == Status.LOCATED for e in pipeline.events)
+        columns = (s.time, s.q, s.qd, s.tau, s.wrench)
+        pipeline.run(*(column[:first] for column in columns))
+        before = any(event.status == Status.LOCATED for event in pipeline.events)
+        pipeline.run(*(column[first:] for column in columns))
         return _judged(pipeline.events, before, maker.time, path)
 
     def _touch(self, q: Array, rng: np.random.Generator) -> Touch:

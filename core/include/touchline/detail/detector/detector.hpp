@@ -549,8 +549,9 @@ class Detector {
     return s.off && (s.in_motion || still_ < tuning_.pause);
   }
 
-  // Does nothing of a contact load the segment's sensors any more, of such an arm? What its joints then have is friction that has changed meanwhile. One
-  // that is clamped does not lose its load on the sensors at once and keep that on the joints.
+  // Does nothing of a contact load the segment's sensors any more, of such an arm? What its joints
+  // then have is friction that has changed meanwhile: no contact that clamps the arm loses its load on
+  // the sensors at once and keeps that on the joints.
   bool only_joints_left(std::size_t g) const {
     return moved_off(g) && segments_[g].top_wrench > 1.0 &&
            lately(g, Rows::wrench) < settings_.times.release && steady(g, Rows::wrench);
