@@ -132,7 +132,7 @@ def _analyzed(job: Job, log: Path) -> Row:
     pushes = options.pop("friction", None), options.pop("reach", None)
     model = _model(robot, job.configuration, *pushes)
     origin = job.recording.url or None
-    analysis = analyze_as(model, robot, log, out, **options, origin=origin)
+    analysis = analyze_as(model, robot, log, out, **options, origin=origin, threads=1)
     make_figures(out, analysis.robot.name)
     clock = analysis.statistics.clock
     files = [out / name for name in (*NAMES, FIGURES) if (out / name).is_file()]

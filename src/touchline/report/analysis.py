@@ -1,17 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """The main job on a recording: log in, estimates, contacts, events and report out."""
 
+import os
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from touchline.arrays import Mask
 from touchline.check.felt import felt
 from touchline.check.recording import glance
+from touchline.detector.detector import Detection
 from touchline.errors import InputError
 from touchline.folder import ResultsFolder
 from touchline.logs import Log, open_log
@@ -19,9 +24,10 @@ from touchline.logs.period import sample_period
 from touchline.model.pushes import with_pushes
 from touchline.model.robot import Robot, load_robot
 from touchline.observer.bandwidths import bandwidth_warnings, bandwidths
-from touchline.observer.observer import METHODS
+from touchline.observer.observer import METHODS, Estimate
 from touchline.observer.samples import Samples
 from touchline.pipeline.pipeline import Pipeline
+from touchline.pipeline.table import ContactTable
 from touchline.report.beside import Beside
 from touchline.report.comparison import compare_log
 from touchline.report.curves import Curves
@@ -40,6 +46,7 @@ from touchline.report.outputs import (
     write_text,
 )
 from touchline.report.statistics import Statistics
+from touchline.result.event import Event
 from touchline.result.kinds import Watch
 from touchline.result.standing import standing_lines, unlike_told
 
@@ -96,11 +103,14 @@ def analyze_as(
     report: Report = "full",
     origin: str | None = None,
     beside: Path | str | None = None,
+    threads: int | None = None,
 ) -> Analysis:
     """`analyze` with a robot at hand, and `source`, where a later reader of the results finds it.
 
-    Many recordings of one robot need not find out anew what only depends on the robot.
+    Many recordings of one robot need not find out anew what only depends on the robot. `threads`
+    is how many may work at a time; default: as many as there are cores.
     """
+    threads = threads or os.cpu_count() or 1
     import pyarrow.parquet  # noqa: F401  the results need it: told before the work begins
 
     check_inputs(out, log, Path(source))
@@ -115,8 +125,9 @@ def analyze_as(
             pipeline = _pipeline(model, bandwidth, method, period).afresh()
             run = _Run(pipeline, folder.draft, period, other, report)
             glanced = Glance()
-            for part in _with_progress(recording, chain([first], parts)):
-                glanced.add(part, run.add(part))
+            read = _with_progress(recording, chain([first], parts))
+            for part in _ahead(map(run.follow, read), threads):
+                glanced.add(part.samples, run.add(part))
             off = any(s.start for s in run.pipeline.standing)
             found = glance(model, glanced.parts, glanced.felt, off)
             warnings = bandwidth_warnings(bandwidths(model, bandwidth), run.period)
@@ -133,7 +144,7 @@ def analyze_as(
             if report != "none":
                 from touchline.report.page import page_text
 
-                write_text(folder.draft / REPORT, page_text(analysis, report == "full"))
+                write_text(folder.draft / REPORT, page_text(analysis, report == "full", threads))
             folder.commit()
     return analysis
 
@@ -199,6 +210,30 @@ def check_options(
         raise InputError(f"--method {method}: unknown; allowed: {', '.join(METHODS)}")
 
 
+@dataclass(frozen=True)
+class _Part:
+    """Consecutive samples, and what the pipeline made of them; `watch` (N, m), `Watch` numbers."""
+
+    samples: Samples
+    estimate: Estimate
+    detection: Detection
+    watch: NDArray[np.int8]
+    contacts: ContactTable
+    events: list[Event]
+
+
+def _ahead(parts: Iterator[_Part], threads: int) -> Iterator[_Part]:
+    """The parts; while one is used, a thread of its own makes the next, if there may be one."""
+    if threads == 1:
+        yield from parts
+        return
+    with ThreadPoolExecutor(1) as pool:
+        coming = pool.submit(next, parts, None)
+        while (part := coming.result()) is not None:
+            coming = pool.submit(next, parts, None)
+            yield part
+
+
 class _Run:
     """One recording on its way through the pipeline, a part at a time."""
 
@@ -223,22 +258,27 @@ class _Run:
         }
         self._windows = EventWindows(columns, self.period)
 
-    def add(self, part: Samples) -> Mask:
-        """Take the next samples; returns (N,) whether something was felt at each."""
-        time = part.time
-        estimate, detection = self.pipeline.run(time, part.q, part.qd, part.tau, part.wrench)
-        self.statistics.add(time, estimate, detection, self.pipeline.watch)
-        events = self.pipeline.events
+    def follow(self, samples: Samples) -> _Part:
+        """Lead the next samples through the pipeline."""
+        pipeline, signals = self.pipeline, (samples.q, samples.qd, samples.tau, samples.wrench)
+        found = pipeline.run(samples.time, *signals)
+        return _Part(samples, *found, pipeline.watch, pipeline.contacts, pipeline.events)
+
+    def add(self, part: _Part) -> Mask:
+        """Keep what there is to tell of a part; returns (N,) whether something was felt at each."""
+        samples, events, time = part.samples, part.events, part.samples.time
+        estimate, detection = part.estimate, part.detection
+        self.statistics.add(time, estimate, detection, part.watch)
         if self._report != "none":
-            values = self._curves.values(part, estimate, detection)
+            values = self._curves.values(samples, estimate, detection)
             self._curves.traces.add(time, values)
             self._windows.add(time, values, events)
-            self._poses.add(time, part.q, events)
+            self._poses.add(time, samples.q, events)
         self._outputs.estimates(time, estimate)
-        self._outputs.contacts(time, estimate, self.pipeline.contacts)
-        self._outputs.pressed(time, part.q, estimate)
+        self._outputs.contacts(time, estimate, part.contacts)
+        self._outputs.pressed(time, samples.q, estimate)
         self._outputs.events(events)
-        self._outputs.postures(time, part.q)
+        self._outputs.postures(time, samples.q)
         return np.any(detection.levels, axis=1, keepdims=True)[:, 0]
 
     def finish(

@@ -2,7 +2,6 @@
 """A figure per event: the arm from two sides, and the curves around it, within a page's budget."""
 
 import json
-import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from html import escape
@@ -27,7 +26,7 @@ PIECES = (512, 256, 128, 64, 32)  # of time in a plot, at most
 PLOT = (500, 130)  # pixels
 
 
-def figures(analysis: Analysis, room: int) -> tuple[str, set[int]]:
+def figures(analysis: Analysis, room: int, threads: int) -> tuple[str, set[int]]:
     """The section with a figure per event, and the events that have one.
 
     Where there is no room for all, those that stood out least go without plots, then without
@@ -36,12 +35,13 @@ def figures(analysis: Analysis, room: int) -> tuple[str, set[int]]:
     Args:
         analysis: what the page is about.
         room: bytes that the section may take.
+        threads: that may draw at a time.
     """
     events = _ranked(analysis)
     if not events:
         return "", set()
     shown = events[:MOST_PICTURED]
-    pictures = _pictures(analysis, shown)
+    pictures = _pictures(analysis, shown, threads)
     used = sum(map(len, pictures.values())) + FRAME * len(shown)
     plots, most = _plots(analysis, shown, room - used)
     drawn = [event for event in shown if event.id in pictures or event.id in plots]
@@ -66,7 +66,7 @@ def _ranked(analysis: Analysis) -> list[Event]:
     return sorted(analysis.events, key=strength, reverse=True)
 
 
-def _pictures(analysis: Analysis, events: Sequence[Event]) -> dict[int, str]:
+def _pictures(analysis: Analysis, events: Sequence[Event], threads: int) -> dict[int, str]:
     """Two pictures of each event, by its number."""
     from tqdm import tqdm
 
@@ -83,7 +83,7 @@ def _pictures(analysis: Analysis, events: Sequence[Event]) -> dict[int, str]:
         return event.id, f'<div class="views" style="--picture:{width}px">{pair}</div>'
 
     native_skin(robot)  # once, not in every thread
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:  # both cores: nothing native is locked
+    with ThreadPoolExecutor(threads) as pool:  # nothing native is locked
         made = pool.map(drawn, posed)
         bar = tqdm(made, "pictures", len(posed), unit="event", disable=None, leave=False)
         return dict(bar)

@@ -68,8 +68,8 @@ segments in world axes about the world origin. Not a certified safety function.<
 """
 
 
-def page_text(analysis: Analysis, figured: bool = True) -> str:
-    """The whole page, or the page without a figure for each event."""
+def page_text(analysis: Analysis, figured: bool = True, threads: int = 1) -> str:
+    """The whole page, or the page without a figure for each event; `threads` draw at a time."""
     assets = Path(__file__).parent / "assets"
     data = json.dumps(strict(_data(analysis)), allow_nan=False).replace("<", "\\u003c")
     style, script = ((assets / f"report.{kind}").read_text("utf-8") for kind in ("css", "js"))
@@ -77,7 +77,7 @@ def page_text(analysis: Analysis, figured: bool = True) -> str:
     after = [_plots(analysis), _residuals(analysis), _health(analysis), robot_section(analysis)]
     fixed = [data, style, script, *before, *after, *_tables(analysis, set())]
     room = MOST_BYTES - sum(len(p.encode()) for p in fixed)
-    shown, pictured = figures(analysis, room) if figured else ("", set[int]())
+    shown, pictured = figures(analysis, room, threads) if figured else ("", set[int]())
     body = [*before, *_tables(analysis, pictured), shown, *after]
     return PAGE.format(
         title=escape(f"{analysis.log.name} - Touchline"),
