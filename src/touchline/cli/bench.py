@@ -353,8 +353,8 @@ def logs(*, samples: int = 100_000, minutes: float = 6.0) -> int:
     Example: touchline bench logs --minutes 60
 
     Prints CPU time of one process: MCAP (zstd, lz4, plain, without a summary), rosbag2 sqlite3 and
-    CSV as samples, what the other packages take to hand out the bytes alone, and an analysis with
-    and without the report.
+    CSV as samples, and what the other packages take to hand out the bytes alone. Then an analysis
+    with and without the report, of an arm with 7 joint torques and 2 sensors.
 
     Args:
         samples: Samples of the recordings that are read; each has a joint state and three wrenches.
