@@ -85,8 +85,17 @@ def test_every_model_of_the_collection_is_read_or_told_what_is_wrong():
 def test_an_unknown_name_is_answered_with_those_there_are():
     with pytest.raises(tl.InputError, match="did you mean 'sara'"):
         find_robot("sarah")
-    with pytest.raises(tl.InputError, match="is a folder"):
+    with pytest.raises(tl.InputError, match="is a folder without robot.yaml"):
         find_robot(Path(__file__).parent)
+
+
+def test_a_folder_stands_for_the_description_in_it_and_hides_no_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shipped = find_robot("sara")
+    Path("sara").mkdir()  # of results, say
+    assert find_robot("sara") == shipped
+    Path("sara/robot.yaml").write_text(shipped.path.read_text())
+    assert find_robot("sara").path == Path("sara/robot.yaml")
 
 
 def test_names_of_families():

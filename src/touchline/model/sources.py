@@ -24,6 +24,7 @@ from touchline.model.yaml_file import read_yaml
 from touchline.suggest import did_you_mean
 
 DESCRIPTIONS = (".yaml", ".yml")
+DESCRIPTION = "robot.yaml"  # in a folder that stands for a robot
 MODELS = (".urdf", ".xml", ".mjcf", ".xacro")
 EXAMPLE_DATA = "example-robot-data"
 WELL_KNOWN = ("panda", "iiwa", "ur5", "kinova")  # of its robots, as examples
@@ -54,8 +55,8 @@ def find_robot(robot: str | Path) -> Source:
         return Source("model", path)
     if path.suffix.lower() in DESCRIPTIONS or path.is_file():
         return Source("description", path)
-    if path.is_dir():
-        raise InputError(f"{robot}: is a folder; a robot.yaml, a URDF or an MJCF is needed")
+    if (path / DESCRIPTION).is_file():
+        return Source("description", path / DESCRIPTION)
     shipped = shipped_descriptions()
     if name in shipped:
         return Source("description", shipped[name])
@@ -65,6 +66,10 @@ def find_robot(robot: str | Path) -> Source:
     cached = _cached_model(name)
     if cached is not None:
         return Source("model", cached)
+    if path.is_dir():
+        raise InputError(
+            f"{robot}: is a folder without {DESCRIPTION}; that, a URDF or an MJCF is needed"
+        )
     raise InputError(_unknown(name, list(shipped), list(examples)))
 
 
