@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writes the samples of a running robot as they came, so that a killed run can be read."""
 
+import os
 import struct
 import time
 from collections.abc import Mapping
@@ -86,10 +87,9 @@ class ParquetRecorder(_Closing):
     """The contract's table, with `arrival`, `sequence` and each sensor's `SENSOR.age` beside it."""
 
     def __init__(self, path: Path, description: RobotDescription, kept: Mapping[str, Any]) -> None:
-        import pyarrow as pa
-
         # Arrow's own pool holds on to more of what was freed, by 1 MB in half an hour of recording.
-        pa.set_memory_pool(pa.system_memory_pool())
+        # Its writer asks the pool of the library, which is chosen as that is loaded.
+        os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
         self._description = description
         self._ages = [f"{sensor.name}.age" for sensor in description.sensors]
         empty = self._columns([])

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the report plots: which curves, in which panels, gathered while a recording streams by."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -179,38 +180,43 @@ class Curves:
         return [*own, Panel("joint", "external joint torques", "Nm", None, curves)]
 
     def values(self, samples: Samples, estimate: Estimate, detection: Detection) -> Array:
-        """All columns (N, c) of N samples; those of other results are unknown."""
-        parts = [*self._joint_values(estimate, detection)]
-        parts += [estimate.segment_wrench[:, g] for g in self._segments]
-        parts += [*self._test_values(detection), *_signals(samples)]
-        parts.append(np.full((len(samples), len(self._compared)), np.nan))
-        return np.hstack(parts)
+        """All columns (N, c) of N samples, one after another in memory.
 
-    def _joint_values(self, estimate: Estimate, detection: Detection) -> list[Array]:
+        Those of other results are unknown.
+        """
+        values = np.empty((self._columns, len(samples)))
+        parts = (*self._joint_values(estimate, detection), *self._of_segments(estimate, detection))
+        end = 0
+        for part in (*parts, *_signals(samples)):
+            begin, end = end, end + part.shape[-1]
+            values[begin:end] = part.T
+        values[end:] = np.nan
+        return values.T
+
+    def _joint_values(self, estimate: Estimate, detection: Detection) -> Iterator[Array]:
         torques, own_torques = estimate.tau_ext, estimate.segment_torque
         settled = estimate.joint_settled
-        values = []
         for j in range(len(self._robot.joint_names)):
-            columns = [torques[:, j]]
+            yield torques[:, j, None]
             if j in self._joint_rows:
                 i = self._joint_rows[j]
                 own, test = own_torques[:, j], detection.normalized[:, i]
                 known = np.where(settled[:, j], own, np.nan)
-                columns += [own, known - test * self._rows[i].contact]
-            values.append(np.column_stack(columns))
-        return values
+                yield own[:, None]
+                yield (known - test * self._rows[i].contact)[:, None]
 
-    def _test_values(self, detection: Detection) -> list[Array]:
-        values = []
+    def _of_segments(self, estimate: Estimate, detection: Detection) -> Iterator[Array]:
+        for g in self._segments:
+            yield estimate.segment_wrench[:, g]
         for g in range(len(self._robot.segment_names)):
             own = [i for i, row in enumerate(self._rows) if row.segment == g]
             tests = np.abs(detection.normalized[:, own])
-            values.append(tests.max(axis=1, initial=0.0)[:, None])
-        return values
+            yield tests.max(axis=1, initial=0.0)[:, None]
 
 
-def _signals(samples: Samples) -> list[Array]:
+def _signals(samples: Samples) -> Iterator[Array]:
     """As logged; what the core takes for infinite is left out."""
     sensors = [samples.wrench[:, k] for k in range(samples.wrench.shape[1])]
-    signals = [samples.q, samples.qd, samples.tau, *sensors]
-    return [np.where(np.abs(values) < ABSURD, values, np.nan) for values in signals]
+    for values in (samples.q, samples.qd, samples.tau, *sensors):
+        usual = np.abs(values) < ABSURD
+        yield values if usual.all() else np.where(usual, values, np.nan)

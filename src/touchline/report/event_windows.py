@@ -72,15 +72,15 @@ class EventWindows:
         """Take N samples: `time` (N,) [s], all columns (N, c), and the events found so far."""
         if not len(time):
             return
-        if len(self._time):
-            whole_time = np.concatenate([self._time, time])
-            whole = np.vstack([self._values, values])
-        else:
-            whole_time, whole = time, values
         for number in list(self._growing):
             event, traces = self._growing[number]
             self._take(event, traces, time, values)
-        for event in events[self._begun :]:
+        new, recent = events[self._begun :], round(BEFORE / self._period) + 1
+        whole_time, whole = time, values
+        if len(self._time) and (new or len(time) < recent):
+            whole_time = np.concatenate([self._time, time])
+            whole = np.vstack([self._values, values])
+        for event in new:
             if len(self._done) + len(self._growing) >= MOST_WINDOWS:
                 break
             traces = Traces(len(self._columns[event.segment]), PIECES, self._period)
@@ -90,8 +90,7 @@ class EventWindows:
         finite = time[np.isfinite(time)]
         if len(finite):
             self._finish(float(finite[0]))
-        recent = slice(-(round(BEFORE / self._period) + 1), None)
-        self._time, self._values = whole_time[recent].copy(), whole[recent].copy()
+        self._time, self._values = whole_time[-recent:].copy(), whole[-recent:].copy(order="A")
 
     def _take(self, event: Event, traces: Traces, time: Array, values: Array) -> None:
         rows = (time >= event.detected - BEFORE) & (time <= _end(event))
