@@ -125,6 +125,7 @@ class Detector {
       for (std::size_t i = first_[g], end = first_[g + 1]; i < end; ++i) test_row(i, s);
       judge(g, dt);
       decide(g, dt);
+      remember_motion(g);
     }
     follow_offsets(dt);
     if (dt > 0.0) {
@@ -214,6 +215,7 @@ class Detector {
     bool in_motion = false;  // did the present event begin while the arm moved?
     bool pending = false, pending_collision = false;
     bool off = false;  // has the arm shown that it is not as told?
+    bool free = true;  // of any event, at the last sample?
     bool learns = false;  // and moves: what is seen of its rows counts
   };
 
@@ -812,6 +814,16 @@ class Detector {
     if (least > rows_[i].contact) standing_[i].start = std::copysign(least, anchor);
   }
 
+  // What motion had shown before an event, as the event begins.
+  void remember_motion(std::size_t g) {
+    Segment& s = segments_[g];
+    const bool free = levels_[g] == 0 && !s.pending;
+    for (std::size_t i = first_[g]; s.free && !free && i < first_[g + 1]; ++i)
+      shown_before_[i] = shown_by(i);
+    s.free = free;
+  }
+  double shown_by(std::size_t i) const { return spreads_[i].variance_beyond(meters_.sigma(i)); }
+
   // Drifts of the rows, from where the arm was while the baselines were averaged. Of one that is not
   // as told at least what motion had shown before the present event.
   void follow_drift(const double* q, double dt) {
@@ -824,9 +836,12 @@ class Detector {
       const bool moved = moved_off(g), free = levels_[g] == 0 && !segments_[g].pending;
       const double sigmas2 = tuning_.drift_shown * tuning_.drift_shown;
       for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
-        if (free) shown_before_[i] = spreads_[i].variance_beyond(meters_.sigma(i));
-        const double seen = moved && rows_[i].seen > 0.0 ? sigmas2 * shown_before_[i] : 0.0;
-        drift_[i] = std::sqrt(std::max(drifted(rows_[i], activity(), shares), seen));
+        double variance = drifted(rows_[i], activity(), shares);
+        if (moved && rows_[i].seen > 0.0) {
+          const double shown = free ? shown_by(i) : shown_before_[i];
+          variance = std::max(variance, sigmas2 * shown);
+        }
+        drift_[i] = std::sqrt(variance);
       }
     }
   }
