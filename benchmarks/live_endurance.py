@@ -65,7 +65,9 @@ def stalls(arm, address: str, aside: bool, count: int) -> None:
     print(f"{name}: {found} samples, {lost} lost, {runner.overrun} without room")
     for kind, values in gaps.items():
         ms = 1e3 * np.array(values)
-        print(f"  {kind:9} longest gap: median {np.median(ms):5.1f} ms, of all {ms.max():6.1f} ms")
+        median, most = np.percentile(ms, (50, 90))
+        words = f"median {median:5.1f} ms, of 90 % {most:5.1f} ms, of all {ms.max():6.1f} ms"
+        print(f"  {kind:9} longest gap: {words}")
 
 
 def _follow(news, seconds: float) -> None:
