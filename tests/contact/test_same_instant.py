@@ -29,10 +29,10 @@ def arm():
     return robot, Skin(robot)
 
 
-def follow(arm, links, duration=0.2, work=None):
+def follow(arm, links, duration=0.2, work=None, period=1e-3):
     """The contacts after every sample, of pushes on links that all begin at `ONSET`.
 
-    `work`: units of the search in each sample.
+    `work`: units of the search in each second.
     """
     robot, skin = arm
     touches = []
@@ -42,9 +42,9 @@ def follow(arm, links, duration=0.2, work=None):
         place, force = (np.array(values) for values in PUSHES[link])
         position = T[:3, :3] @ place + T[:3, 3]
         touches.append(Touch(Q, patch, position, np.zeros(3), T[:3, :3] @ force))
-    s = resting_signals(robot, Q, [(touch, ONSET) for touch in touches], duration, None)
+    s = resting_signals(robot, Q, [(touch, ONSET) for touch in touches], duration, None, period)
     tuning = {} if work is None else {"localizer.pair_work": work}
-    pipeline = Pipeline(robot, skin=skin, torque_error=0.0, tuning=tuning)
+    pipeline = Pipeline(robot, period=period, skin=skin, torque_error=0.0, tuning=tuning)
     said = [
         pipeline.update(*x).contacts for x in zip(s.time, s.q, s.qd, s.tau, s.wrench, strict=True)
     ]
@@ -110,12 +110,22 @@ def test_an_answer_says_while_a_search_still_runs(arm):
 
 def test_less_work_in_a_sample_gives_the_same_places_later(arm):
     begun, places = [], []
-    for work in (100, 100_000):
+    for work in (100_000, 100_000_000):
         _, said = follow(arm, ["link2", "link6"], work=work)
         begun.append(next(i for i, contacts in enumerate(said) if len(contacts) == 2))
         places.append(np.array([contact.position for contact in said[-1]]))
     assert begun[0] > begun[1] + 2
     np.testing.assert_allclose(*places, atol=1e-4)
+
+
+def test_a_search_takes_as_long_at_any_sample_rate(arm):
+    ends = []
+    for period in (1e-3, 2.5e-4):
+        _, said = follow(arm, ["link2", "link4"], period=period)
+        searching = [any(contact.searching for contact in contacts) for contacts in said]
+        ends.append(period * (len(said) - searching[::-1].index(True)) - ONSET)
+    assert 0.005 < ends[0] < 0.1
+    assert abs(ends[1] - ends[0]) < 0.3 * ends[0]
 
 
 def test_a_pair_that_is_told_apart_is_searched_no_more(arm):

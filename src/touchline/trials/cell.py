@@ -27,6 +27,7 @@ class Cell:
         hands: "steady" ones keep place and force; "trembling" ones change their force all the time;
             "sliding": the last contact slides, the others are held.
         lasts: how long steady hands touch an arm at rest after the last onset [s].
+        force: how strong each touch is [N].
     """
 
     arm: str
@@ -39,6 +40,7 @@ class Cell:
     calibrated: bool = True
     hands: Hands = "steady"
     lasts: float = 0.1
+    force: float = 20.0
 
     @property
     def turning(self) -> bool:

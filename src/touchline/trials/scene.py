@@ -29,7 +29,6 @@ from touchline.trials.touches import (
 )
 from touchline.trials.wrong_model import RUNS, wrong_model
 
-FORCE = 20.0  # N
 FIRST, APART = 0.55, 0.1  # s: the first onset, after settling and a quiet half second, then each
 FRICTION = 0.5
 # Of an arm that is not as its model: s, until the first onset, and of touching; Hz, of its swing.
@@ -122,7 +121,7 @@ def _of_hands(
     onsets = [FIRST + i * step for i in range(len(touches))]
     path = np.zeros((0, 3))
     if cell.hands == "sliding":
-        touches, path = _with_slide(skin, touches, chance)
+        touches, path = _with_slide(skin, touches, cell.force, chance)
         duration = onsets[-1] + WAITS + len(path) * 1e-3 + RESTS
     else:
         duration = onsets[-1] + HELD
@@ -150,20 +149,20 @@ def _of_hands(
 
 
 def _with_slide(
-    skin: Skin, touches: list[Touch], chance: np.random.Generator
+    skin: Skin, touches: list[Touch], force: float, chance: np.random.Generator
 ) -> tuple[list[Touch], Array]:
     """The touches, the last of them where it can slide, and its places (P, 3) [m] in world."""
     sampler = TouchSampler(skin, chance, friction=FRICTION)
     held, last = touches[:-1], touches[-1]
     while (path := slide(skin.robot, sampler, last, FRICTION, chance)) is None:
-        last = sampler.sample(FORCE, last.q, tuple(touch.patch.body for touch in held))
+        last = sampler.sample(force, last.q, tuple(touch.patch.body for touch in held))
     return [*held, last], path
 
 
 def _sample(cell: Cell, robot: Robot, skin: Skin, chance: np.random.Generator) -> list[Touch]:
     if cell.begin == "segments":
-        return sample_on_each(touched_segments(robot), skin, chance, FORCE, FRICTION)
-    return TouchSampler(skin, chance, friction=FRICTION).sample_several(cell.contacts, FORCE)
+        return sample_on_each(touched_segments(robot), skin, chance, cell.force, FRICTION)
+    return TouchSampler(skin, chance, friction=FRICTION).sample_several(cell.contacts, cell.force)
 
 
 def make_pipeline(

@@ -36,7 +36,8 @@ class Tracks {
         pasts_(segments, Past(measurement.posture().nodes().size(), settings.past_worn)),
         arrivals_(single, measurement, settings, fit_, known_, reports_, lone_, period),
         merging_(single.surfaces(), settings, fit_, known_, reports_),
-        twins_(single.surfaces(), measurement, settings, fit_, known_, reports_, rows, segments) {}
+        twins_(single.surfaces(), measurement, settings, fit_, known_, reports_, rows, segments,
+               period) {}
 
   // One sample of segment g: fills the reports. `read()` takes the measurement anew.
   template <class Read>

@@ -137,10 +137,11 @@ struct LocalizerTuning {
   double negligible_patch = 12.0;
 
   // ---- Two contacts that begin together ----
-  // Work on them in one sample: a unit is 20 pairs of points that are tried, or a third of a step
-  // towards a better pair, some 0.5 to 1 us. Half: places are narrowed later than 0.1 s after the
+  // Work on them in a second of the sensors' clock: a unit is 20 pairs of points that are tried, or a
+  // third of a step towards a better pair, some 0.5 to 1 us. A sample has its share: at 1 kHz some half
+  // a millisecond, at 8 kHz no more than a period. Half: places are narrowed later than 0.1 s after the
   // onset. Double: twice the time in a sample.
-  int pair_work = 600;
+  int pair_work = 600'000;
   // Times 1 / K until forces are worth a second search, and a walk from it. Half: it walks on a force
   // of 63 %. Double: later.
   double risen = 2.0;
@@ -188,7 +189,7 @@ struct LocalizerTuning {
     v("turned", "rad", t.turned);
     v("changed", "1", t.changed);
     v("negligible_patch", "nats", t.negligible_patch);
-    v("pair_work", "units", t.pair_work);
+    v("pair_work", "units/s", t.pair_work);
     v("risen", "1/K", t.risen);
     v("search_growth", "1", t.search_growth);
   }

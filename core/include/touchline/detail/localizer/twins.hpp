@@ -4,7 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <limits>
 #include <memory>
 #include <vector>
 
@@ -12,20 +11,23 @@
 #include "touchline/detail/localizer/pair_answer.hpp"
 #include "touchline/detail/localizer/reports.hpp"
 #include "touchline/detail/localizer/segment_contacts.hpp"
+#include "touchline/detail/localizer/work_share.hpp"
 
 namespace touchline {
 
 class Twins {
  public:
   Twins(const LinkSurfaces& surfaces, Measurement& measurement, const LocalizerSettings& settings,
-        JointFit& fit, KnownFit& known, Reports& reports, std::size_t rows, int segments)
+        JointFit& fit, KnownFit& known, Reports& reports, std::size_t rows, int segments,
+        double period)
       : surfaces_(surfaces),
         measurement_(measurement),
         settings_(settings),
         fit_(fit),
         known_(known),
         reports_(reports),
-        said_(surfaces, settings) {
+        said_(surfaces, settings),
+        share_(settings.pair_work, period) {
     for (int g = 0; g < segments; ++g)
       work_.push_back(std::make_unique<Work>(measurement.posture(), surfaces, settings, rows, g));
   }
@@ -99,9 +101,9 @@ class Twins {
     } else if (work.search.done() && !two.taken) {
       take(s, work, one, now);
     } else if (work.parts.working()) {
-      work.parts.work(share(now.time));
+      work.parts.work(share_.take(now.time));
     } else if (work.search.working()) {
-      work.search.work(share(now.time), now, measurement_);
+      work.search.work(share_.take(now.time), now, measurement_);
     } else if (two.taken && !two.separable && !two.walking &&
                work.search.begun() - two.since >= settings_.risen * now.brief()) {
       two.walking = true;
@@ -149,19 +151,6 @@ class Twins {
     }
   }
 
-  // Units of work for a segment in a sample: those that are searched share them.
-  int share(double time) {
-    if (time != time_) {
-      before_ = working_;
-      working_ = 0;
-      left_ = settings_.pair_work;
-      time_ = time;
-    }
-    const int own = std::min(left_, settings_.pair_work / std::max(before_, ++working_));
-    left_ -= own;
-    return own;
-  }
-
   const LinkSurfaces& surfaces_;
   Measurement& measurement_;
   const LocalizerSettings& settings_;
@@ -170,10 +159,7 @@ class Twins {
   Reports& reports_;
   std::vector<std::unique_ptr<Work>> work_;  // per segment
   PairAnswer said_;
-  // How many segments are searched in the sample of this time [s], so far, and in the one before; units
-  // of work that are left in it.
-  double time_ = -std::numeric_limits<double>::infinity();
-  int working_ = 0, before_ = 0, left_ = 0;
+  WorkShare share_;
   Answer answer_;
 };
 
