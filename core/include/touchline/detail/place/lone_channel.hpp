@@ -45,7 +45,7 @@ class LoneChannel {
   // Of segment g, whose rows the measurement has read. So many of their dimensions explain anything.
   Suspect find(int g, int free = 0) {
     const int size = measurement_.size();
-    if (!measurement_.has_wrench() || size - free <= kLeast) return {};
+    if (!measurement_.has_wrench() || size - free < kLeast) return {};
     measurement_.values(rows_.data(), 1);
     measurement_.whiten(rows_.data(), 1);
     all_ = 0.0;
@@ -58,6 +58,31 @@ class LoneChannel {
     const double limit = chi2_limit(std::max(1, size - 1 - free), kNoise);
     if (!best_.any() || left > limit + kShape * kShape * all_ || left > kLeft * all_) return {};
     return borne_out() ? best_ : Suspect{};
+  }
+
+  // Beside one contact with any wrench on one of the bodies at `nodes`, where none explains alone.
+  // `read()` takes the measurement anew. A second contact has as many unknowns as are left over: so
+  // hardly anything may be left.
+  template <class Nodes, class Read>
+  Suspect find_beside_one(int g, const Nodes& nodes, Read&& read) {
+    Suspect found;
+    double least = kAbsurd;
+    for (const auto& body : nodes) {
+      if (!read() || measurement_.size() - 6 < kLeast) return {};
+      for (int k = 0; k < 6; ++k) {
+        double unit[6] = {};
+        unit[k] = kAnything;
+        measurement_.load(body.node, touchline::load(unit), 0.0, column_.data(), 1);
+        if (!measurement_.spread(column_.data(), 1)) return {};
+      }
+      const Suspect suspect = find(g, 6);
+      if (all_ < chi2_limit(measurement_.size() - 6, kArrival)) return {};
+      const double left = all_ - most_;
+      if (!suspect.any() || left > kLeftBeside * all_ || left > least) continue;
+      least = left;
+      found = suspect;
+    }
+    return found;
   }
 
   // From now on until then [s] a channel tells nothing.
@@ -81,7 +106,7 @@ class LoneChannel {
   }
 
  private:
-  static constexpr int kLeast = 5;        // rows: of fewer, a contact leaves nothing over
+  static constexpr int kLeast = 5;        // rows left over: of fewer, a contact leaves nothing
   static constexpr double kAnything = 1e3;  // [N, Nm] sigma of what tells nothing
   static constexpr double kOther = 4.0;   // of the squared error: what feels more, feels something else
   static constexpr double kArrival = 5.0;  // sigmas beyond which known contacts do not explain
@@ -89,6 +114,7 @@ class LoneChannel {
   static constexpr double kShape = 0.03;  // and this part of it: filters turn with the arm
   // Of the squared size: what one channel leaves of a contact that noise, or a gap, nearly hides.
   static constexpr double kLeft = 0.1;
+  static constexpr double kLeftBeside = 0.01;  // the same beside a contact with any wrench
 
   // Calls `visit(channel, other)` for all that segment g feels, with what one unit of it does to the
   // rows in `column_`; `other`: of swapped axes, else -1.
