@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "touchline/detail/localizer/arrivals.hpp"
@@ -34,7 +35,7 @@ class Tracks {
         known_(measurement, fit_, settings),
         reports_(single.surfaces()),
         pasts_(segments, Past(measurement.posture().nodes().size(), settings.past_worn)),
-        looked_(segments, -kAbsurd),
+        looked_(segments),
         arrivals_(single, measurement, settings, fit_, known_, reports_, lone_, period),
         merging_(single.surfaces(), settings, fit_, known_, reports_),
         twins_(single.surfaces(), measurement, settings, fit_, known_, reports_, rows, segments) {}
@@ -44,8 +45,7 @@ class Tracks {
   void follow(SegmentContacts& s, int g, double bandwidth, double time, Read&& read_all) {
     follow_contacts(s, g, bandwidth, time, read_all);
     if (suspect_.any() || settings_.first_entry || !measurement_.has_wrench()) return;
-    if (time - looked_[g] < kLook || s.state.is(Tracking::suspected)) return;
-    looked_[g] = time;
+    if (time - looked_[g].time < kLook || s.state.is(Tracking::suspected)) return;
     suspect_ = look_again(s, g, read_all);
     if (read_all()) lone_.take_out(g, time);
   }
@@ -75,6 +75,12 @@ class Tracks {
   }
 
  private:
+  // When a channel was looked for again [s], and the squared size of what was felt then.
+  struct Look {
+    double time = -kAbsurd, size = 0.0;
+  };
+  // Equations beside the free forces of others: five of a push, and five that only a channel meets.
+  static constexpr int kOver = 2 * JointEstimate::kEach;
   static constexpr double kLook = 0.005;  // [s] between second looks: a suspect lasts four of them
 
   void report(int serial, const Answer& answer) { reports_.add(serial, answer); }
@@ -94,7 +100,8 @@ class Tracks {
       return;
     }
     if (!measurement_.can_be_followed() || settings_.first_entry) {
-      report(s.touched.first, single_.locate(g, 0.0, measurement_, again(s), true));
+      const Answer& a = single_.locate(g, 0.0, measurement_, again(s), true);
+      suspect_.any() ? reports_.add_doubted(s.touched.first, a) : report(s.touched.first, a);
       return;
     }
     now_.lag =
@@ -122,6 +129,10 @@ class Tracks {
     const bool pair = s.state.is(Tracking::pair);
     if (!read_all()) return {};
     const Suspect alone = lone_.find(g);
+    const Look before = std::exchange(looked_[g], Look{now_.time, lone_.size()});
+    const double passed = now_.time - before.time;
+    // What falls as fast as the filter forgets is let go: the shares of several do not fall alike.
+    if (lone_.size() < std::exp(-now_.bandwidth * passed) * before.size) return {};
     if (alone.any()) return alone;
     if (pair && !s.together.separable)
       return lone_.find_beside_one(g, single_.surfaces().bodies(g), read_all);
@@ -129,9 +140,9 @@ class Tracks {
     for (int c = 0; all.count > 1 && c < all.count; ++c) {
       JointEstimate others = all;
       others.remove(c);
-      if (!read_all()) return {};
-      fit_.take_out(others, Change::none(), measurement_);
-      const Suspect one = lone_.find(g);
+      if (!read_all() || measurement_.size() < 3 * others.count + kOver) return {};
+      fit_.take_out(others, Change::of_forces(others.count, settings_.force_scale), measurement_);
+      const Suspect one = lone_.find(g, 3 * others.count);
       if (one.any()) return one;
     }
     return {};
@@ -298,7 +309,7 @@ class Tracks {
   KnownFit known_;
   Reports reports_;
   std::vector<Past> pasts_;  // per segment: of its whole wrench
-  std::vector<double> looked_;  // per segment: when a channel was looked for the last time [s]
+  std::vector<Look> looked_;  // per segment
   Arrivals arrivals_;
   Merging merging_;
   Twins twins_;

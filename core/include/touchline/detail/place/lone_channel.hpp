@@ -42,10 +42,11 @@ class LoneChannel {
     }
   }
 
-  // Of segment g, whose rows the measurement has read. So many of their dimensions explain anything.
-  Suspect find(int g, int free = 0) {
+  // Of segment g, whose rows the measurement has read. So many of their dimensions explain anything;
+  // `most_left`: of the squared size, what the channel may leave.
+  Suspect find(int g, int free = 0, double most_left = kLeft) {
     const int size = measurement_.size();
-    if (!measurement_.has_wrench() || size - free < kLeast) return {};
+    if (size - free <= kLeast) return {};
     measurement_.values(rows_.data(), 1);
     measurement_.whiten(rows_.data(), 1);
     all_ = 0.0;
@@ -56,9 +57,12 @@ class LoneChannel {
     visit_channels(g, [this](int channel, int other) { weigh(channel, other); });
     const double left = all_ - most_;
     const double limit = chi2_limit(std::max(1, size - 1 - free), kNoise);
-    if (!best_.any() || left > limit + kShape * kShape * all_ || left > kLeft * all_) return {};
-    return borne_out() ? best_ : Suspect{};
+    if (!best_.any() || left > limit + kShape * kShape * all_ || left > most_left * all_) return {};
+    return over_determined() && borne_out() ? best_ : Suspect{};
   }
+
+  // Of what was looked at last: its squared size, to the scale of the noise.
+  double size() const { return all_; }
 
   // Beside one contact with any wrench on one of the bodies at `nodes`, where none explains alone.
   // `read()` takes the measurement anew. A second contact has as many unknowns as are left over: so
@@ -68,17 +72,17 @@ class LoneChannel {
     Suspect found;
     double least = kAbsurd;
     for (const auto& body : nodes) {
-      if (!read() || measurement_.size() - 6 < kLeast) return {};
+      if (!read() || measurement_.size() - 6 <= kLeast) return {};
       for (int k = 0; k < 6; ++k) {
         double unit[6] = {};
         unit[k] = kAnything;
         measurement_.load(body.node, touchline::load(unit), 0.0, column_.data(), 1);
         if (!measurement_.spread(column_.data(), 1)) return {};
       }
-      const Suspect suspect = find(g, 6);
+      const Suspect suspect = find(g, 6, kLeftBeside);
       if (all_ < chi2_limit(measurement_.size() - 6, kArrival)) return {};
       const double left = all_ - most_;
-      if (!suspect.any() || left > kLeftBeside * all_ || left > least) continue;
+      if (!suspect.any() || left > least) continue;
       least = left;
       found = suspect;
     }
@@ -95,7 +99,7 @@ class LoneChannel {
   bool take_out(int g, double time) {
     if (!any_out_) return true;
     any_out_ = std::any_of(out_until_.begin(), out_until_.end(), [&](double t) { return time < t; });
-    if (!any_out_ || !measurement_.has_wrench()) return true;
+    if (!any_out_) return true;
     bool good = true;
     visit_channels(g, [&](int channel, int other) {
       if (other >= 0 || !(time < out_until_[channel])) return;
@@ -106,7 +110,7 @@ class LoneChannel {
   }
 
  private:
-  static constexpr int kLeast = 5;        // rows left over: of fewer, a contact leaves nothing
+  static constexpr int kLeast = 5;        // rows: of fewer, a contact leaves nothing over
   static constexpr double kAnything = 1e3;  // [N, Nm] sigma of what tells nothing
   static constexpr double kOther = 4.0;   // of the squared error: what feels more, feels something else
   static constexpr double kArrival = 5.0;  // sigmas beyond which known contacts do not explain
@@ -114,19 +118,22 @@ class LoneChannel {
   static constexpr double kShape = 0.03;  // and this part of it: filters turn with the arm
   // Of the squared size: what one channel leaves of a contact that noise, or a gap, nearly hides.
   static constexpr double kLeft = 0.1;
-  static constexpr double kLeftBeside = 0.01;  // the same beside a contact with any wrench
+  static constexpr double kLeftBeside = 0.01;  // the same beside contacts that explain much
 
   // Calls `visit(channel, other)` for all that segment g feels, with what one unit of it does to the
   // rows in `column_`; `other`: of swapped axes, else -1.
   template <class Visit>
   void visit_channels(int g, Visit&& visit) {
     const Segment& segment = observer_.layout().segments[g];
-    visit_axes(segment.sensor, 1.0, visit);
-    for (const int outer : segment.successors) visit_axes(outer, -1.0, visit);
+    const int first = measurement_.has_wrench() ? 6 : 0;
+    if (first > 0) {
+      visit_axes(segment.sensor, 1.0, visit);
+      for (const int outer : segment.successors) visit_axes(outer, -1.0, visit);
+    }
     for (int i = 0; i < measurement_.scalars(); ++i) {
       if (measurement_.joint(i) < 0) continue;
       std::fill_n(column_.data(), measurement_.size(), 0.0);
-      column_[6 + i] = 1.0;
+      column_[first + i] = 1.0;
       visit(static_cast<int>(at_.tau()) + measurement_.joint(i), -1);
     }
   }
@@ -178,6 +185,17 @@ class LoneChannel {
     if (!(square > 0.0) || along * along <= most_ * square) return;
     most_ = along * along / square;
     best_ = {channel, other, along / square};
+  }
+
+  // Would a push that shows the same have to be at one place? With a sensor it would. A joint's torque
+  // without one needs a body on which a push loads five.
+  bool over_determined() const {
+    if (measurement_.has_wrench()) return true;
+    const int joint = best_.channel - static_cast<int>(at_.tau());
+    const int node = observer_.joints()[joint].nodes[0];
+    int loaded = 0;
+    for (int i = 0; i < measurement_.size(); ++i) loaded += measurement_.feels(i, node) ? 1 : 0;
+    return loaded >= kLeast;
   }
 
   // Does the other segment at the sensor feel the opposite, as it would of an error and would not of
