@@ -79,7 +79,7 @@ class Tracks {
   struct Look {
     double time = -kAbsurd, size = 0.0;
   };
-  // Equations beside the free forces of others: five of a push, and five that only a channel meets.
+  // Equations beside the free force of another: five of a push, and five that only a channel meets.
   static constexpr int kOver = 2 * JointEstimate::kEach;
   static constexpr double kLook = 0.005;  // [s] between second looks: a suspect lasts four of them
 
@@ -122,27 +122,25 @@ class Tracks {
     }
   }
 
-  // Is what is felt, after all, one channel's? All of it; or one of several contacts; or what is left
-  // beside one contact, where no single one explains.
+  // Is what is felt, after all, one channel's? All of it; or one of two contacts that have begun
+  // together; or what is left beside one contact, where no single one explains.
   template <class Read>
   Suspect look_again(SegmentContacts& s, int g, Read&& read_all) {
-    const bool pair = s.state.is(Tracking::pair);
     if (!read_all()) return {};
     const Suspect alone = lone_.find(g);
     const Look before = std::exchange(looked_[g], Look{now_.time, lone_.size()});
     const double passed = now_.time - before.time;
     // What falls as fast as the filter forgets is let go: the shares of several do not fall alike.
     if (lone_.size() < std::exp(-now_.bandwidth * passed) * before.size) return {};
-    if (alone.any()) return alone;
-    if (pair && !s.together.separable)
+    if (alone.any() || !s.state.is(Tracking::pair)) return alone;
+    if (!s.together.separable)
       return lone_.find_beside_one(g, single_.surfaces().bodies(g), read_all);
-    const JointEstimate& all = pair ? s.together.contacts : s.known.contacts;
-    for (int c = 0; all.count > 1 && c < all.count; ++c) {
-      JointEstimate others = all;
-      others.remove(c);
-      if (!read_all() || measurement_.size() < 3 * others.count + kOver) return {};
-      fit_.take_out(others, Change::of_forces(others.count, settings_.force_scale), measurement_);
-      const Suspect one = lone_.find(g, 3 * others.count);
+    for (int c = 0; c < 2; ++c) {
+      JointEstimate other = s.together.contacts;
+      other.remove(c);
+      if (!read_all() || measurement_.size() < 3 + kOver) return {};
+      fit_.take_out(other, Change::of_forces(1, settings_.force_scale), measurement_);
+      const Suspect one = lone_.find(g, 3);
       if (one.any()) return one;
     }
     return {};
