@@ -252,7 +252,7 @@ of a sensor, by what they differ by. Such a channel is named, and nothing that i
 contact or a collision. It is left out of what is estimated where a sensor inboard contradicts it.
 
 A joint and a sensor with no body between them must agree: what they differ by begins no event, and
-one of the two is named. With joint torques alone only those are suspected that a push loads alone
-at one place: the fifth and those beyond. But where one steps alone within a sample, nothing becomes
-a collision for a second.
+one of the two is named. With joint torques alone nothing of this is told: a push on the first link
+loads one joint, too. But where one steps alone within a sample, nothing becomes a collision for a
+second.
 """

@@ -100,8 +100,7 @@ class Tracks {
       return;
     }
     if (!measurement_.can_be_followed() || settings_.first_entry) {
-      const Answer& a = single_.locate(g, 0.0, measurement_, again(s), true);
-      suspect_.any() ? reports_.add_doubted(s.touched.first, a) : report(s.touched.first, a);
+      report(s.touched.first, single_.locate(g, 0.0, measurement_, again(s), true));
       return;
     }
     now_.lag =

@@ -46,7 +46,7 @@ class LoneChannel {
   // `most_left`: of the squared size, what the channel may leave.
   Suspect find(int g, int free = 0, double most_left = kLeft) {
     const int size = measurement_.size();
-    if (size - free <= kLeast) return {};
+    if (!measurement_.has_wrench() || size - free <= kLeast) return {};
     measurement_.values(rows_.data(), 1);
     measurement_.whiten(rows_.data(), 1);
     all_ = 0.0;
@@ -58,7 +58,7 @@ class LoneChannel {
     const double left = all_ - most_;
     const double limit = chi2_limit(std::max(1, size - 1 - free), kNoise);
     if (!best_.any() || left > limit + kShape * kShape * all_ || left > most_left * all_) return {};
-    return over_determined() && borne_out() ? best_ : Suspect{};
+    return borne_out() ? best_ : Suspect{};
   }
 
   // Of what was looked at last: its squared size, to the scale of the noise.
@@ -97,9 +97,9 @@ class LoneChannel {
 
   // Takes out of the rows of segment g what such channels say of them; false if nothing is left.
   bool take_out(int g, double time) {
-    if (!any_out_) return true;
+    if (!any_out_ || !measurement_.has_wrench()) return true;
     any_out_ = std::any_of(out_until_.begin(), out_until_.end(), [&](double t) { return time < t; });
-    if (!any_out_) return true;
+    if (!any_out_ || !measurement_.has_wrench()) return true;
     bool good = true;
     visit_channels(g, [&](int channel, int other) {
       if (other >= 0 || !(time < out_until_[channel])) return;
@@ -111,6 +111,7 @@ class LoneChannel {
 
  private:
   static constexpr int kLeast = 5;        // rows: of fewer, a contact leaves nothing over
+  static constexpr int kTorques = 4;      // beside the sensor: fewer say little of a push's axis
   static constexpr double kAnything = 1e3;  // [N, Nm] sigma of what tells nothing
   static constexpr double kOther = 4.0;   // of the squared error: what feels more, feels something else
   static constexpr double kArrival = 5.0;  // sigmas beyond which known contacts do not explain
@@ -125,21 +126,19 @@ class LoneChannel {
   template <class Visit>
   void visit_channels(int g, Visit&& visit) {
     const Segment& segment = observer_.layout().segments[g];
-    const int first = measurement_.has_wrench() ? 6 : 0;
-    if (first > 0) {
-      visit_axes(segment.sensor, 1.0, visit);
-      for (const int outer : segment.successors) visit_axes(outer, -1.0, visit);
-    }
+    visit_axes(segment.sensor, 1.0, visit);
+    for (const int outer : segment.successors) visit_axes(outer, -1.0, visit);
     for (int i = 0; i < measurement_.scalars(); ++i) {
       if (measurement_.joint(i) < 0) continue;
       std::fill_n(column_.data(), measurement_.size(), 0.0);
-      column_[first + i] = 1.0;
+      column_[6 + i] = 1.0;
       visit(static_cast<int>(at_.tau()) + measurement_.joint(i), -1);
     }
   }
 
   // The axes of a sensor, which this segment feels with a sign. Of one whose log has other axes, a
-  // channel is no axis.
+  // channel is no axis. Swapped ones are looked for where joint torques contradict them: a sensor
+  // inboard tells of the others (parity_watch.hpp).
   template <class Visit>
   void visit_axes(int sensor, double sign, Visit&& visit) {
     if (observer_.sensors()[sensor].turned) return;
@@ -148,6 +147,7 @@ class LoneChannel {
       load_axis(sensor, axis, -1, sign);
       visit(first + axis, -1);
     }
+    if (inner_[sensor] >= 0 || measurement_.size() < 6 + kTorques) return;
     for (int axis = 0; axis < 6; ++axis) {  // of three: each with the next
       const int other = axis % 3 == 2 ? axis - 2 : axis + 1;
       load_axis(sensor, axis, other, sign);
@@ -185,17 +185,6 @@ class LoneChannel {
     if (!(square > 0.0) || along * along <= most_ * square) return;
     most_ = along * along / square;
     best_ = {channel, other, along / square};
-  }
-
-  // Would a push that shows the same have to be at one place? With a sensor it would. A joint's torque
-  // without one needs a body on which a push loads five.
-  bool over_determined() const {
-    if (measurement_.has_wrench()) return true;
-    const int joint = best_.channel - static_cast<int>(at_.tau());
-    const int node = observer_.joints()[joint].nodes[0];
-    int loaded = 0;
-    for (int i = 0; i < measurement_.size(); ++i) loaded += measurement_.feels(i, node) ? 1 : 0;
-    return loaded >= kLeast;
   }
 
   // Does the other segment at the sensor feel the opposite, as it would of an error and would not of
