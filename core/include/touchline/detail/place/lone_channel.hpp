@@ -97,7 +97,7 @@ class LoneChannel {
 
   // Takes out of the rows of segment g what such channels say of them; false if nothing is left.
   bool take_out(int g, double time) {
-    if (!any_out_ || !measurement_.has_wrench()) return true;
+    if (!any_out_) return true;
     any_out_ = std::any_of(out_until_.begin(), out_until_.end(), [&](double t) { return time < t; });
     if (!any_out_ || !measurement_.has_wrench()) return true;
     bool good = true;
