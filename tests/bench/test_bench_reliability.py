@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """The reliability benchmark, in short: faults that must be told, and none where there is none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import touchline as tl
 from touchline.bench.reliability.campaign import Kept, Part, run_all
 from touchline.bench.reliability.judge import judge, listen
-from touchline.bench.reliability.run import tables
+from touchline.bench.reliability.run import tables, untold_channels
+from touchline.check.parity import parity_of
 from touchline.errors import InputError
 from touchline.simulation.contacts import Profile, ScriptedContact
 from touchline.simulation.noise import SensorNoise
@@ -100,6 +103,32 @@ def test_the_tables_count_what_was_missed(listened):
     text, missed = tables(outcomes, 1.0, ["sara: tau.joint1 stuck"] * 2)
     assert "delay, tau" in text and "spike, tau" in text
     assert missed
+
+
+def test_what_the_layout_cannot_tell_is_counted_apart(listened):
+    pipeline, recording, healthy = listened
+    outcomes = [
+        judge(
+            pipeline,
+            recording,
+            healthy,
+            fault_named("delay"),
+            channel_named(recording.robot, name),
+            ("contact", PHASES["contact"]),
+        )
+        for name in ("wrist.fz", "tau.joint2")
+    ]
+    text, _ = tables([replace(outcome, told=9.0, harmless=False) for outcome in outcomes], 1.0, [])
+    lines = {" ".join(line.split()) for line in text.splitlines()}
+    assert "and in 1 runs that the layout cannot tell none 0.0 %" in lines
+    assert "sara-full delay wrist.fz 1 of 1 the layout cannot" in lines
+    assert "sara-full delay tau.joint2 1 of 1" in lines
+
+
+def test_what_check_lists_is_what_the_layout_cannot_tell():
+    robot = tl.load_robot("sara-full")
+    blind = parity_of(robot).blind
+    assert set(untold_channels(robot)) == {*blind, "wrist"}  # all axes: the whole sensor
 
 
 def test_a_push_that_a_slow_joint_feels_first_is_felt_until_its_end():

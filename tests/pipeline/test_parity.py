@@ -12,7 +12,7 @@ from touchline.simulation.scenario import scripted
 from touchline.simulation.scene import Run
 from touchline.trials.cell import Cell
 from touchline.trials.faults import FAULTS, channels_of, injected
-from touchline.trials.recordings import record
+from touchline.trials.recordings import record, robot_named
 from touchline.trials.scene import arm_and_skin, make_pipeline, make_scene
 
 BEGIN = 0.6  # s
@@ -108,3 +108,16 @@ def test_a_torque_of_the_base_sensor_that_nothing_else_feels_is_named(arm, axis)
     _, told, events = heard(pipeline, drifting(robot, samples, name))
     assert [f.channel for f in told][:1] == [name]
     assert not [e for e in events if e.level == "collision"]
+
+
+def test_a_joint_and_a_sensor_right_behind_it_differ_by_a_fault_and_no_contact():
+    """Nothing lies between them: the torque is named, and no event begins."""
+    pytest.importorskip("pinocchio", reason="comes with example-robot-data, the arms' models")
+    robot = robot_named("ur5")
+    pipeline = tl.Pipeline(robot)
+    samples = record(robot, 1, pushed=False, seconds=1.2).samples
+    wrong = drifting(robot, samples, "tau.shoulder_pan_joint")
+    _, told, events = heard(pipeline, wrong)
+    assert [f.channel for f in told][:1] == ["tau.shoulder_pan_joint"]
+    assert told[0].fault == Fault.DISAGREES
+    assert events == []

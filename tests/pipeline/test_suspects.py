@@ -74,6 +74,24 @@ def test_a_push_is_not_suspected(arm, link, force):
     assert events != [] and events[0].level == "collision"
 
 
+@pytest.mark.parametrize("begin", [BEGIN - 0.1, BEGIN + 0.2])
+def test_axes_of_the_base_sensor_that_are_swapped_are_named_and_place_no_push(arm, begin):
+    """They are swapped before a push, or during it: their error looks like a push on the base."""
+    robot, pipeline, _ = arm
+    profile = Profile(BEGIN, 0.35, 0.02, 0.02)
+    push = ScriptedContact(
+        "link6", np.array([0.0, 0.0, 0.05]), np.array([18.0, -9.0, 0.0]), profile
+    )
+    settings = Run(seed=3, noise=SensorNoise(), model_error=0.02, physics=2000.0)
+    samples = scripted(robot, [push], 1.0, 0.5, settings).samples
+    first = int(np.searchsorted(samples.time, begin))
+    samples.wrench[first:, 0] = samples.wrench[first:, 0][:, [1, 0, 2, 3, 4, 5]]
+    _, told, events = heard(pipeline, samples)
+    assert {"base.fx", "base.fy"} <= {change.channel for change in told}
+    sure = [e for e in events if e.status == "located" and (e.body_probability or 0.0) >= 0.9]
+    assert {event.body for event in sure} <= {"link6"}
+
+
 def test_a_push_beside_a_suspect_is_an_event_of_its_own(arm):
     """The phantom is one event, the push another: a collision, on the link that is pushed."""
     robot, pipeline, _ = arm

@@ -11,6 +11,7 @@
 
 #include "touchline/detail/classifier/classifier.hpp"
 #include "touchline/detail/detector/detector.hpp"
+#include "touchline/detail/detector/loadable.hpp"
 #include "touchline/detail/events/describe.hpp"
 #include "touchline/detail/events/event_recorder.hpp"
 #include "touchline/detail/events/period_watch.hpp"
@@ -35,7 +36,8 @@ class Pipeline {
         tuning_(tuning),
         observer_(Tree(robot_.nodes, robot_.gravity), robot_.joints, robot_.sensors, tuning_.method,
                   tuning_.discretization, tuning_.observer),
-        detector_(observer_, robot_.rows, robot_.detection, tuning_.detector),
+        detector_(observer_, robot_.rows, robot_.detection, tuning_.detector,
+                  touchline::loadable(observer_, robot_.rows, robot_.surfaces)),
         localizer_(observer_, robot_.rows, robot_.noise, std::move(robot_.surfaces),
                    localizer_settings(tuning_, robot_.pushes)),
         classifier_(observer_, robot_.blows, tuning_.classifier),
@@ -110,6 +112,8 @@ class Pipeline {
   // In which state the contacts of segment g are, and which transitions there were: for tests.
   const TrackingState& tracking(int g) const { return localizer_.state(g); }
   const Observer& observer() const { return observer_; }
+  // Per row of the detector: can a contact load it?
+  const std::vector<char>& loadable() const { return detector_.loadable(); }
 
   // Without its surfaces, which are the localizer's: `surfaces()`.
   const Robot& robot() const { return robot_; }

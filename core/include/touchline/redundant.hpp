@@ -48,7 +48,7 @@ class RedundantPipeline {
                              std::vector<StandIn> stand_ins = {})
       : whole_(std::move(robot), tuning),
         gates_(whole_.robot(), tuning.gates),
-        parity_(whole_.robot(), whole_.observer(), tuning.gates),
+        parity_(whole_.robot(), whole_.observer(), whole_.loadable(), tuning.gates),
         resets_(whole_.row_layout()) {
     const Robot& own = whole_.robot();
     const std::size_t n = own.joints.size(), k = own.sensors.size();
@@ -67,6 +67,7 @@ class RedundantPipeline {
     sound_.resize(gates_.layout().count(), Fault::none);
     ratios_.resize(kAhead * sound_.size());
     until_.resize(sound_.size(), -kAbsurd);
+    unsure_until_.resize(sound_.size(), -kAbsurd);
     faults_ = before_ = sound_;
     left_.resize(sound_.size());
     restarts_.resize(n + levels_.size(), 0);
@@ -191,10 +192,17 @@ class RedundantPipeline {
   // Is what the whole robot made of a sample contradictory? Then from the next sample on some
   // channel counts no more.
   void watch_parity(const Result& result, double time) {
-    parity_.step(result, time, [&](std::size_t channel) {
-      until_[channel] = time + tuning().gates.contradicted;
-      contradicted_ = true;
-    });
+    const double until = time + tuning().gates.contradicted;
+    parity_.step(
+        result, time,
+        [&](std::size_t channel) {
+          until_[channel] = until;
+          contradicted_ = true;
+        },
+        [&](std::size_t channel) {
+          unsure_until_[channel] = until;
+          unsure_ = true;
+        });
   }
 
   // What is left of a sample without the channels that others contradict. One whose time is over
@@ -223,7 +231,7 @@ class RedundantPipeline {
     const std::vector<Fault>* told = &faults;
     const bool suspected = std::any_of(result.suspects.begin(), result.suspects.end(),
                                        [](char suspect) { return suspect != 0; });
-    if (contradicted_ || suspected) {
+    if (contradicted_ || suspected || unsure_) {
       result.health |= kFaulty;
       faults_ = faults;
       for (std::size_t c = 0; c < faults_.size(); ++c) {
@@ -233,6 +241,7 @@ class RedundantPipeline {
         Fault& fault = faults_[channel_of(i)];
         if (result.suspects[i] != 0 && fault == Fault::none) fault = Fault::suspect;
       }
+      if (unsure_) tell_unsure(result.time);
       told = &faults_;
     }
     if (told != &sound_ || changing_) follow_faults(*told, result.time);
@@ -240,6 +249,16 @@ class RedundantPipeline {
     result.ratios = {ratios, told->size()};
     count_resets(result);
     return result;
+  }
+
+  // Those of which one is wrong: each is suspect, and counts on.
+  void tell_unsure(double time) {
+    unsure_ = false;
+    for (std::size_t c = 0; c < faults_.size(); ++c) {
+      if (!(time < unsure_until_[c])) continue;
+      unsure_ = true;
+      if (faults_[c] == Fault::none) faults_[c] = Fault::suspect;
+    }
   }
 
   // The channel of the whole robot that is channel `i` of the one that speaks.
@@ -714,6 +733,8 @@ class RedundantPipeline {
   bool changing_ = false;             // is any of these a fault?
   std::vector<Suspicion> suspicions_;  // per segment
   bool contradicted_ = false;         // does any channel count no more?
+  std::vector<double> unsure_until_;  // per channel: until when it is one of several, one wrong [s]
+  bool unsure_ = false;               // is any?
   ResetWatch resets_;
   std::vector<std::uint32_t> restarts_;  // per joint, then per segment: as told by who speaks
   const Second* spoke_ = nullptr;        // at the last sample

@@ -95,6 +95,11 @@ def _parity(robot: Robot, findings: Findings) -> None:
         lines.append(f"  a constant error is never seen of: {never}")
         if once:
             lines.append(f"  only some poses show an error of: {_shortened(robot, once)}")
+    pushed = tuple(name for name in parity.pushed if name not in parity.blind)
+    if parity.rank > 0 and pushed:
+        lines.append(
+            f"  many pushes on one body look like an error of: {_shortened(robot, pushed)}"
+        )
     for body in _first_bodies(robot):
         lines.append(
             f"  an error of sensor {body[0]} alone can always be a push on {body[1]}; only joints "

@@ -4,18 +4,23 @@
 With a contact at the outboard end of every segment the measured residuals are y = A(q) x, with x
 the segments' wrenches. What is left of y outside the range of A is the parity space: it is zero
 whatever touches, and only a fault can fill it.
+
+A contact on another body loads fewer signals. Where it loads fewer than the five that a force at a
+place has unknowns, there are many contacts that look like the error of one of these signals.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Mask
 from touchline.model.description import AXES
 from touchline.model.robot import Robot
 
 CONFIGURATIONS = 24
 VISIBLE = 0.02  # of a unit fault; less is nothing beside noise and model errors
+PUSH = 5  # unknowns of a push: its force and its place on a surface
 
 
 @dataclass(frozen=True)
@@ -28,6 +33,7 @@ class Parity:
         rank: of the parity space, in a general pose.
         blind: signals whose constant error no pose shows, in words.
         blind_once: signals whose error a single general pose does not show, in words.
+        pushed: signals whose error many pushes on one body show as well, in words.
     """
 
     signals: int
@@ -35,19 +41,25 @@ class Parity:
     rank: int
     blind: tuple[str, ...]
     blind_once: tuple[str, ...]
+    pushed: tuple[str, ...]
+
+    def tells(self, signal: str) -> bool:
+        """Can the layout tell an error of this signal from contacts?"""
+        return signal not in self.blind and signal not in self.pushed
 
 
 def parity_of(robot: Robot) -> Parity:
     """Rank of the parity space and the single faults that lie outside it."""
     rng = np.random.default_rng(0)
-    names = _signal_names(robot)
-    projections, ranks = [], []
+    names = signal_names(robot)
+    projections, ranks, pushes = [], [], []
     matrix = np.zeros((0, 0))
     for q in _configurations(robot, rng):
         matrix = response(robot, q)
         projection, rank = _left_null(matrix)
         projections.append(projection)
         ranks.append(rank)
+        pushes.append(_pushed(robot, q))
     rank = int(np.median(ranks))
     once = np.median([np.linalg.norm(p, axis=0) for p in projections], axis=0)
     always = np.max([np.linalg.norm(p, axis=0) for p in projections], axis=0)
@@ -57,17 +69,26 @@ def parity_of(robot: Robot) -> Parity:
         rank,
         tuple(name for name, seen in zip(names, always, strict=True) if seen < VISIBLE),
         tuple(name for name, seen in zip(names, once, strict=True) if seen < VISIBLE),
+        tuple(name for name, like in zip(names, np.all(pushes, axis=0), strict=True) if like),
     )
 
 
-def response(robot: Robot, q: Array) -> Array:
+def signal_names(robot: Robot) -> list[str]:
+    """The measured signals in words."""
+    names = [f"torque of {robot.joint_names[j]}" for j in _measured(robot)]
+    return names + [f"{s.name}.{axis}" for s in robot.description.sensors for axis in s.axes]
+
+
+def response(robot: Robot, q: Array, ends: Sequence[int] | None = None) -> Array:
     """A(q) (measured signals, 6 segments): residuals by wrenches in world, about its origin.
 
-    Numbers in N and Nm stand side by side: a metre is the scale of an arm.
+    Numbers in N and Nm stand side by side: a metre is the scale of an arm. `ends`: the node that is
+    touched in each segment; None: its outboard end.
     """
     poses = robot.poses(q)
     starts = {node.sensor: i for i, node in enumerate(robot.nodes) if node.sensor}
-    ends = [_end(robot, name) for name in robot.segment_names]
+    if ends is None:
+        ends = [_end(robot, name) for name in robot.segment_names]
     rows = []
     for j in _measured(robot):
         node = next(i for i, n in enumerate(robot.nodes) if n.joint == robot.joint_names[j])
@@ -82,14 +103,27 @@ def response(robot: Robot, q: Array) -> Array:
     return np.array(rows).reshape(len(rows), 6 * len(ends))
 
 
+def _pushed(robot: Robot, q: Array) -> Mask:
+    """Signals (measured signals,) whose error a contact shows, too, on a body that loads few."""
+    names = robot.segment_names
+    ends = [_end(robot, name) for name in names]
+    found = np.zeros(len(signal_names(robot)), dtype=bool)
+    for body in robot.bodies:
+        if body.segment not in names:
+            continue
+        g = names.index(body.segment)
+        matrix = response(robot, q, [*ends[:g], body.node, *ends[g + 1 :]])
+        sizes = np.linalg.svd(matrix[:, 6 * g : 6 * g + 6], compute_uv=False)
+        if (sizes > VISIBLE * max(sizes.max(initial=0.0), 1e-12)).sum() >= PUSH:
+            continue
+        projection, _ = _left_null(matrix)
+        found |= np.linalg.norm(projection, axis=0) < VISIBLE
+    return found
+
+
 def _measured(robot: Robot) -> list[int]:
     joints = robot.description.joints
     return [j for j, joint in enumerate(joints) if joint.measured]
-
-
-def _signal_names(robot: Robot) -> list[str]:
-    names = [f"torque of {robot.joint_names[j]}" for j in _measured(robot)]
-    return names + [f"{s.name}.{axis}" for s in robot.description.sensors for axis in s.axes]
 
 
 def _configurations(robot: Robot, rng: np.random.Generator) -> Array:

@@ -489,6 +489,7 @@ def reliability(
     page: Annotated[Path | None, arg(metavar="FILE")] = None,
     keep: Annotated[Path | None, arg(metavar="DIR")] = None,
     processes: int = 1,
+    first: int = 0,
 ) -> int:
     """Faults of sensors and clocks, put into recordings: what is told, and what comes of them.
 
@@ -506,13 +507,14 @@ def reliability(
         page: Writes docs/reliability.md.
         keep: Each run that is done is kept here; the same command goes on where it was stopped.
         processes: So many work at a time.
+        first: The first seed.
     """
     from touchline.bench.reliability.run import Plan, main
     from touchline.numbers import check_least
 
     check_least(1, seeds=seeds, processes=processes)
-    check_least(0, share=share, healthy=healthy)
-    return main(Plan(seeds, share, healthy, keep, processes), page)
+    check_least(0, share=share, healthy=healthy, first=first)
+    return main(Plan(seeds, share, healthy, keep, processes, first), page)
 
 
 def tuning(

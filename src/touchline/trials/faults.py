@@ -170,7 +170,8 @@ def _no_stamp(x: Array, past: Array, c: Channel, rng: np.random.Generator, perio
 
 
 LOADS, ALL = ("tau", "wrench"), SIGNALS
-SPIKY, DEAD, WRONG, WANDERS = "spike, saturation", "stuck, zero, garbage", "sign to delay", "bias"
+SPIKY, DEAD = "spike, saturation", "stuck, zero, garbage"
+SIGN_TO_DELAY, WANDERS = "sign to delay", "bias"
 SPEED, ABSENT = "velocity against position", "absent, clock"
 FAULTS = (
     FaultType("spike", _spike, ALL, AT_ONCE, SPIKY, 0.01),
@@ -188,12 +189,12 @@ FAULTS = (
     FaultType("speed zero", _zero, ("qd",), SOON, SPEED),
     FaultType("speed bias", _bias, ("qd",), SOON, SPEED),
     FaultType("speed sign", _sign, ("qd",), SOON, SPEED),
-    FaultType("sign", _sign, LOADS, SLOW, WRONG, LONG),
-    FaultType("double", _double, LOADS, SLOW, WRONG, LONG),
-    FaultType("half", _half, LOADS, SLOW, WRONG, LONG),
-    FaultType("delay", _delay, LOADS, SLOW, WRONG, LONG),
-    FaultType("swapped axes", _swap, ("sensor",), SLOW, WRONG, LONG),
-    FaultType("coarse", _coarse, LOADS, SLOW, WRONG, LONG),
+    FaultType("sign", _sign, LOADS, SLOW, SIGN_TO_DELAY, LONG),
+    FaultType("double", _double, LOADS, SLOW, SIGN_TO_DELAY, LONG),
+    FaultType("half", _half, LOADS, SLOW, SIGN_TO_DELAY, LONG),
+    FaultType("delay", _delay, LOADS, SLOW, SIGN_TO_DELAY, LONG),
+    FaultType("swapped axes", _swap, ("sensor",), SLOW, SIGN_TO_DELAY, LONG),
+    FaultType("coarse", _coarse, LOADS, SLOW, SIGN_TO_DELAY, LONG),
     FaultType("bias", _bias, LOADS, SLOWEST, WANDERS, LONG),
     FaultType("drift", _drift, LOADS, SLOWEST, WANDERS, LONG),
     FaultType("NaN", _nan, ALL, AT_ONCE, ABSENT),

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`touchline bench reliability`: faults of each type on each channel, and what comes of them."""
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,9 +11,11 @@ import numpy as np
 from touchline.bench.reliability.campaign import Part, run_all
 from touchline.bench.reliability.judge import Outcome, listen
 from touchline.bench.tables import Row, aligned
+from touchline.check.parity import parity_of
+from touchline.model.robot import Robot
 from touchline.pipeline.pipeline import Pipeline
-from touchline.trials.faults import FAULTS
-from touchline.trials.recordings import ROBOTS, record, robots
+from touchline.trials.faults import FAULTS, SIGN_TO_DELAY, WANDERS
+from touchline.trials.recordings import ROBOTS, record, robot_named, robots
 
 TOLD, WRONG = 0.98, 0.005  # shares that are required
 RECOVERED = 0.05 + 1e-6  # s: 5 / K of these arms, and what stamps are rounded by
@@ -25,6 +27,7 @@ class Plan:
 
     Attributes:
         seeds: motions and pushes of each arm.
+        first: the first of their numbers.
         share: of the cases of each, drawn at random; 1: all.
         healthy: minutes of motion without a fault, of each arm.
         folder: keeps what is done, for another start to go on with; None: nothing is kept.
@@ -36,11 +39,13 @@ class Plan:
     healthy: float = 0.5
     folder: Path | None = None
     processes: int = 1
+    first: int = 0
 
 
 def outcomes(plan: Plan) -> Iterator[Outcome]:
     """Of all cases of a plan."""
-    parts = [Part(name, seed, plan.share) for seed in range(plan.seeds) for name, _ in robots()]
+    seeds = range(plan.first, plan.first + plan.seeds)
+    parts = [Part(name, seed, plan.share) for seed in seeds for name, _ in robots()]
     return run_all(parts, plan.folder, plan.processes)
 
 
@@ -75,16 +80,43 @@ def main(plan: Plan, out: Path | None = None) -> int:
 
 def tables(found: list[Outcome], hours: float, reports: list[str]) -> tuple[str, bool]:
     """Figures beside the goals, then by type of fault; whether a goal is missed."""
-    goals = _goals(found, hours, reports)
+    untold = {name: untold_channels(robot_named(name)) for name in {o.robot for o in found}}
+    goals = _goals(found, hours, reports, untold)
     rows: list[Row] = [("figure", "goal", "here", "")]
     rows += [(what, goal, here, "" if met else "missed") for what, goal, here, met in goals]
     lines = [aligned(rows, (0, 3)), "", aligned(_by_fault(found))]
+    lines += ["", *_layouts(untold), "", aligned(_missed(found, untold), (0, 1, 2, 4))]
     lines += ["", *reports[:20]] if reports else []
     return "\n".join(lines), not all(met for *_, met in goals)
 
 
+def untold_channels(robot: Robot) -> tuple[str, ...]:
+    """Channels whose errors the layout cannot tell from contacts, as `touchline check` lists them.
+
+    Of a sensor with its axes swapped, that is so where it is so of all of its axes.
+    """
+    parity = parity_of(robot)
+    names = [
+        f"tau.{joint}" for joint in robot.joint_names if not parity.tells(f"torque of {joint}")
+    ]
+    for sensor in robot.description.sensors:
+        axes = [f"{sensor.name}.{axis}" for axis in sensor.axes]
+        lost = [axis for axis in axes if not parity.tells(axis)]
+        names += [*lost, sensor.name] if lost == axes else lost
+    return tuple(names)
+
+
+def _is_untold(outcome: Outcome, untold: dict[str, tuple[str, ...]]) -> bool:
+    """Is it a fault that only other channels can show, where none does?"""
+    shown_by_others = outcome.fault.group in (SIGN_TO_DELAY, WANDERS)
+    return shown_by_others and outcome.channel.name in untold[outcome.robot]
+
+
 def _goals(
-    found: list[Outcome], hours: float, reports: list[str]
+    found: list[Outcome],
+    hours: float,
+    reports: list[str],
+    untold: dict[str, tuple[str, ...]],
 ) -> list[tuple[str, str, str, bool]]:
     count = max(len(found), 1)
 
@@ -94,14 +126,19 @@ def _goals(
     crashes = sum(bool(o.crash) or not o.finite for o in found)
     goals = [(f"{count} runs: crash, exception, not finite", "0", str(crashes), crashes == 0)]
     groups: dict[str, list[Outcome]] = defaultdict(list)
+    beyond: dict[str, list[Outcome]] = defaultdict(list)
     for o in found:
-        groups[o.fault.group].append(o)
+        (beyond if _is_untold(o, untold) else groups)[o.fault.group].append(o)
     for group in dict.fromkeys(fault.group for fault in FAULTS):
         part = groups[group]
         told = sum(o.told_in_time for o in part) / max(len(part), 1)
         goal = 1.0 if group.startswith("absent") else TOLD
         what = f"told in time or harmless: {group}"
         goals.append((what, f"{100 * goal:.0f} %", f"{100 * told:.1f} %", told >= goal))
+        if part := beyond[group]:
+            told = sum(o.told_in_time for o in part) / len(part)
+            what = f"  and in {len(part)} runs that the layout cannot tell"
+            goals.append((what, "none", f"{100 * told:.1f} %", True))
     collisions = sum(o.collisions > 0 for o in found)
     goals.append(("runs with a phantom collision", "0", str(collisions), collisions == 0))
     wrong = share(lambda o: o.wrong > 0)
@@ -145,6 +182,30 @@ def _by_fault(found: list[Outcome]) -> list[Row]:
     return rows
 
 
+def _layouts(untold: dict[str, tuple[str, ...]]) -> list[str]:
+    """What each layout cannot tell."""
+    lines = ["errors that a layout cannot tell from contacts, as touchline check lists them:"]
+    return lines + [f"  {name}: {', '.join(untold[name]) or 'none'}" for name in sorted(untold)]
+
+
+def _missed(found: list[Outcome], untold: dict[str, tuple[str, ...]]) -> list[Row]:
+    """What was neither told in time nor harmless, by arm, type of fault and channel."""
+    runs: Counter[tuple[str, str, str]] = Counter()
+    missed: Counter[tuple[str, str, str]] = Counter()
+    beyond = set()
+    for o in found:
+        key = (o.robot, o.fault.name, o.channel.name)
+        runs[key] += 1
+        missed[key] += not o.told_in_time
+        if _is_untold(o, untold):
+            beyond.add(key)
+    rows: list[Row] = [("not told in time", "fault", "channel", "runs", "")]
+    for key in sorted(key for key in missed if missed[key] > 0):
+        note = "the layout cannot" if key in beyond else ""
+        rows.append((*key, f"{missed[key]} of {runs[key]}", note))
+    return rows
+
+
 def _signal(outcome: Outcome) -> str:
     return outcome.channel.signal if outcome.channel.signal != "wrench" else "F/T"
 
@@ -180,12 +241,18 @@ is not the touched one, and is not what the healthy recording says either.
 ms, the estimates have forgotten what was left out. A wild channel counts again after 10 usual
 samples; these 10 ms come on top.
 
-What a layout cannot tell, `touchline check ROBOT` lists as its parity space. Two swapped axes of a
-sensor are told where a sensor inboard contradicts them. Scale, delay, bias and
-drift of one channel are told where they make it jump or stand still. They are also told where that
-channel alone explains what a force-torque sensor's segment feels (`suspect`): a contact does so at
-one place in thousands. Then it is named, and nothing that it explains is a sure contact or a
-collision. It is left out of what is estimated where a sensor inboard contradicts it. With joint
-torques alone nothing of this is told: a push on the first link loads one joint, too. But where
-one steps alone within a sample, nothing becomes a collision for a second.
+What a layout cannot tell, `touchline check ROBOT` lists as its parity space, and so does the table.
+Of signs, scales, delays and biases these runs are counted apart. There an error looks like contacts
+at the ends of segments, or like many pushes on one body: one that loads fewer than five signals.
+
+Scale, delay, bias and drift of one channel are told where they make it jump or stand still. They
+are also told where that channel alone explains what a segment feels (`suspect`), or what it feels
+beside contacts that are known. A contact does so at one place in thousands. So are two swapped axes
+of a sensor, by what they differ by. Such a channel is named, and nothing that it explains is a sure
+contact or a collision. It is left out of what is estimated where a sensor inboard contradicts it.
+
+A joint and a sensor with no body between them must agree: what they differ by begins no event, and
+one of the two is named. With joint torques alone nothing of this is told: a push on the first link
+loads one joint, too. But where one steps alone within a sample, nothing becomes a collision for a
+second.
 """

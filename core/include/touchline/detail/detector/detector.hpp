@@ -30,8 +30,9 @@ namespace touchline {
 
 class Detector {
  public:
+  // `loadable`: per row, can a contact load it? Those that none can begin no event. Empty: all can.
   Detector(const Observer& observer, std::vector<DetectionRow> rows, DetectionSettings settings,
-           const DetectorTuning& tuning = {})
+           const DetectorTuning& tuning = {}, std::vector<char> loadable = {})
       : tuning_(tuning),
         per_trend_(1.0 / tuning.trend),
         per_fro_memory_(1.0 / tuning.fro_memory),
@@ -75,20 +76,25 @@ class Detector {
         shown_before_(rows_.size(), 0.0),
         standing_(rows_.size()),
         first_looks_(rows_.size()),
+        loadable_(std::move(loadable)),
         levels_(segments_.size(), 0),
         quiet_(segments_.size(), 0.0),
         statistics_(segments_.size() * settings_.tests.size(), 0.0),
         fires_(segments_.size(), 0),
         still_(tuning_.pause) {
+    loadable_.resize(rows_.size(), 1);
     for (const TestSetting& setting : settings_.tests)
       for (std::size_t g = 0; g < segments_.size(); ++g) fires_[g] |= std::isfinite(setting.limits[g]);
     for (std::size_t g = 0; g < segments_.size(); ++g) {
       std::vector<DetectionRow> own;
-      for (const DetectionRow& row : rows_) {
-        if (row.segment == static_cast<int>(g)) own.push_back(row);
+      std::vector<char> own_loadable;
+      for (std::size_t i = 0; i < rows_.size(); ++i) {
+        if (rows_[i].segment != static_cast<int>(g)) continue;
+        own.push_back(rows_[i]);
+        own_loadable.push_back(loadable_[i]);
       }
       first_[g + 1] = first_[g] + own.size();
-      tests_.emplace_back(observer, own, settings_, tuning_);
+      tests_.emplace_back(observer, own, std::move(own_loadable), settings_, tuning_);
       joint_tests_ = joint_tests_ || tests_.back().used();
     }
     for (std::size_t i = 0; i < rows_.size(); ++i) {
@@ -144,6 +150,8 @@ class Detector {
   const std::vector<double>& drift() const { return drift_; }
   // Per row: how many times as large as told its noise is seen to be, at least 1.
   const std::vector<double>& excess() const { return excess_; }
+  // Per row: can a contact load it?
+  const std::vector<char>& loadable() const { return loadable_; }
   const std::vector<int>& levels() const { return levels_; }  // per segment
   // Per segment: over how long its baseline has been averaged [s].
   const std::vector<double>& quiet() const { return quiet_; }
@@ -336,6 +344,7 @@ class Detector {
     const double normalized = normalized_[i] = (sample.residual - baseline) / row.contact;
     const double x = normalized / limit;
     const double share = shares_[i] = std::fabs(x);
+    if (loadable_[i] == 0) return;
     segment.peak = std::max(segment.peak, share);
     if (still_ >= tuning_.pause) segment.slow = std::max(segment.slow, slow_share(i));
     const double borne = (borne_out_.value(i) - baseline) / (row.contact * limit);
@@ -881,6 +890,7 @@ class Detector {
   std::vector<double> shown_before_;  // per row: variance of what motion had shown before an event
   std::vector<Standing> standing_;  // per row
   std::vector<FirstLook> first_looks_;  // per row
+  std::vector<char> loadable_;  // per row: can a contact load it?
   std::vector<int> levels_;
   std::vector<double> quiet_, statistics_;
   std::vector<char> fires_;  // per segment: can a test fire, or are statistics all that is asked for?

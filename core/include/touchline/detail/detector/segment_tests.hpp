@@ -33,11 +33,13 @@ struct RowSample {
 
 class SegmentTests {
  public:
-  // `tuning` stays the caller's.
+  // `tuning` stays the caller's. Rows that are not `loadable` are left out.
   SegmentTests(const Observer& observer, std::vector<DetectionRow> rows,
-               const DetectionSettings& settings, const DetectorTuning& tuning)
+               std::vector<char> loadable, const DetectionSettings& settings,
+               const DetectorTuning& tuning)
       : tuning_(tuning),
         rows_(std::move(rows)),
+        loadable_(std::move(loadable)),
         covariance_(observer, rows_, settings.noise),
         windows_(rows_.size(), settings.windows, settings.noise.period),
         innovations_(rows_.size(), settings.noise.period, tuning) {
@@ -146,14 +148,14 @@ class SegmentTests {
     std::size_t count = 0;
     referred_ = true;
     for (std::size_t i = 0; i < rows_.size(); ++i) {
-      if (!samples[i].known) continue;
+      if (!samples[i].known || loadable_[i] == 0) continue;
       changed |= count >= active_.size() || active_[count] != i;
       ++count;
     }
     changed |= count != active_.size();
     if (changed) active_.clear();
     for (std::size_t i = 0, k = 0; i < rows_.size(); ++i) {
-      if (!samples[i].known) continue;
+      if (!samples[i].known || loadable_[i] == 0) continue;
       if (changed) active_.push_back(i);
       difference_[k] = smooth_slow_[i];
       offset_[k] = samples[i].reference;
@@ -210,6 +212,7 @@ class SegmentTests {
 
   const DetectorTuning& tuning_;
   std::vector<DetectionRow> rows_;
+  std::vector<char> loadable_;  // per row
   RowCovariance covariance_;
   WindowTest windows_;
   InnovationTest innovations_;

@@ -11,6 +11,9 @@
 // A torque at the innermost sensor without a force is no single touch: no link is as far away. Two
 // may cancel, but then the joints between them feel it, or a sensor does. So nothing else may.
 //
+// A joint and the sensor right behind it, with no body between them: no touch makes them differ. One
+// that is wrong alone is known by what the sensor's own segment feels of it; else it is one of these.
+//
 // What two quantities alone tell is not judged. A force at the innermost sensor that no joint feels
 // may be a push on the link that carries it, and a torque of one joint a hand that pinches it.
 // Theory: docs/theory.md, section 3.4.
@@ -32,8 +35,9 @@ namespace touchline {
 
 class ParityWatch {
  public:
-  // Of a robot whose parts fit.
-  ParityWatch(const Robot& robot, const Observer& observer, const GatesTuning& tuning = {})
+  // Of a robot whose parts fit; `loadable`: per row of its detector, can a contact load it?
+  ParityWatch(const Robot& robot, const Observer& observer, const std::vector<char>& loadable,
+              const GatesTuning& tuning = {})
       : tuning_(tuning),
         at_{robot.joints.size(), robot.sensors.size()},
         observer_(observer),
@@ -55,6 +59,15 @@ class ParityWatch {
         if (first_[own] >= 0) pairs_.push_back({static_cast<int>(g), own});
       }
     }
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      if (loadable[i] != 0) continue;
+      const int joint = observer.joints()[rows_[i].joint].nodes[0];
+      for (const int t : layout.segments[rows_[i].segment].successors) {
+        const int own = layout.segment_of_sensor[t];
+        if (layout.is_outboard(observer.sensors()[t].node, joint) && first_[own] >= 0)
+          bare_.push_back({static_cast<int>(i), own});
+      }
+    }
     for (const Pair& pair : pairs_)
       innermost_.erase(std::remove(innermost_.begin(), innermost_.end(), pair.outer),
                        innermost_.end());
@@ -71,14 +84,15 @@ class ParityWatch {
   }
 
   // Takes what the whole robot says of a sample at `time` [s]. Calls `contradicted(channel)` for each
-  // that the others contradict.
-  template <class Contradicted>
-  void step(const Result& result, double time, Contradicted&& contradicted) {
+  // that the others contradict, and `unsure(channel)` for each of several of which one is wrong.
+  template <class Contradicted, class Unsure>
+  void step(const Result& result, double time, Contradicted&& contradicted, Unsure&& unsure) {
     const double dt = time - time_;
     time_ = time;
     const bool goes_on = dt > 0.0 && dt < tuning_.step_periods * period_;
     if (!goes_on || (result.health & kSettling) != 0) return begin_anew();
     for (const Pair& pair : pairs_) compare(pair, result, dt, contradicted);
+    for (const Bare& bare : bare_) compare_joint(bare, result, dt, contradicted, unsure);
     for (std::size_t i = 0; i < innermost_.size(); ++i)
       compare_couple(innermost_[i], witnesses_[i], result, dt, contradicted);
   }
@@ -94,6 +108,10 @@ class ParityWatch {
 
   struct Pair {
     int inner, outer;  // segments
+  };
+
+  struct Bare {
+    int row, outer;  // of a joint; the segment of the sensor right behind it
   };
 
   void begin_anew() { std::fill(since_.begin(), since_.end(), 0.0); }
@@ -155,6 +173,46 @@ class ParityWatch {
     contradicted(first + static_cast<std::size_t>(largest(own)));
     contradicted(first + static_cast<std::size_t>(other));
   }
+
+  // A joint's torque beyond what the sensor right behind it says.
+  template <class Contradicted, class Unsure>
+  void compare_joint(const Bare& bare, const Result& result, double dt, Contradicted&& contradicted,
+                     Unsure&& unsure) {
+    const double beyond = std::fabs(result.normalized[bare.row]);
+    const std::size_t torque = at_.tau() + static_cast<std::size_t>(rows_[bare.row].joint);
+    if (!broken(torque, beyond > tuning_.parity_clear, dt)) return;
+    const double* own = result.normalized.data() + first_[bare.outer];
+    const int sensor = observer_.layout().segments[bare.outer].sensor, axis = largest(own);
+    const std::size_t first = at_.wrench() + 6 * static_cast<std::size_t>(sensor);
+    if (std::fabs(own[axis]) < tuning_.parity_noise) return contradicted(torque);
+    const double shown = std::fabs(own[axis]) * rows_[first_[bare.outer] + axis].contact;
+    const double missed = beyond * rows_[bare.row].contact;
+    if (std::fabs(shown - missed) < tuning_.parity_left * missed && only_axis(sensor, own) == axis)
+      return contradicted(first + static_cast<std::size_t>(axis));
+    unsure(torque);
+    if (observer_.sensors()[sensor].turned) return;
+    for (std::size_t i = 0; i < 6; ++i) {
+      if (measures(bare, static_cast<int>(i))) unsure(first + i);
+    }
+  }
+
+  // Is an axis of the sensor right behind a joint along that joint's, or nearly?
+  bool measures(const Bare& bare, int axis) const {
+    const int joint = observer_.joints()[rows_[bare.row].joint].nodes[0];
+    const int sensor = observer_.layout().segments[bare.outer].sensor;
+    const std::vector<Node>& nodes = observer_.tree().nodes();
+    double unit[6] = {};
+    unit[axis % 3] = 1.0;
+    Vec3 along = load(unit).linear;
+    bool fixed = true;
+    for (int node = observer_.sensors()[sensor].node; node != joint; node = nodes[node].parent) {
+      fixed = fixed && nodes[node].kind == NodeKind::fixed;
+      along = nodes[node].placement.R * along;
+    }
+    const bool same_kind = (nodes[joint].kind == NodeKind::revolute) == (axis >= 3);
+    return same_kind && (!fixed || std::fabs(along.z) > kAlong);
+  }
+  static constexpr double kAlong = 0.5;  // cosine: 60 degrees, an axis with less shows half or less
 
   static int largest(const double* shown) {
     int most = 0;
@@ -226,6 +284,7 @@ class ParityWatch {
   double period_;
   std::vector<int> first_;  // per segment: its first row of six of a wrench; -1: none
   std::vector<Pair> pairs_;
+  std::vector<Bare> bare_;
   std::vector<int> innermost_;  // segments whose sensor has none inboard
   std::vector<std::vector<std::size_t>> witnesses_;  // of each: other rows that its loads pass
   std::vector<double> since_;  // per channel: for how long its relation has been broken [s]

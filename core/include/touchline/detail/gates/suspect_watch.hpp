@@ -39,6 +39,7 @@ class SuspectWatch {
   void add(const Suspect& suspect) {
     if (!suspect.any() || !(std::fabs(suspect.error) > least_[suspect.channel])) return;
     now_[suspect.channel] = 1;
+    if (suspect.other >= 0) now_[suspect.other] = 1;
     any_ = true;
   }
   // Calls `out(channel, until)` for each that tells nothing until then [s].

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "touchline/detail/localizer/arrivals.hpp"
@@ -34,6 +35,7 @@ class Tracks {
         known_(measurement, fit_, settings),
         reports_(single.surfaces()),
         pasts_(segments, Past(measurement.posture().nodes().size(), settings.past_worn)),
+        looked_(segments),
         arrivals_(single, measurement, settings, fit_, known_, reports_, lone_, period),
         merging_(single.surfaces(), settings, fit_, known_, reports_),
         twins_(single.surfaces(), measurement, settings, fit_, known_, reports_, rows, segments,
@@ -42,6 +44,52 @@ class Tracks {
   // One sample of segment g: fills the reports. `read()` takes the measurement anew.
   template <class Read>
   void follow(SegmentContacts& s, int g, double bandwidth, double time, Read&& read_all) {
+    follow_contacts(s, g, bandwidth, time, read_all);
+    if (suspect_.any() || settings_.first_entry || !measurement_.has_wrench()) return;
+    if (time - looked_[g].time < kLook || s.state.is(Tracking::suspected)) return;
+    suspect_ = look_again(s, g, read_all);
+    if (read_all()) lone_.take_out(g, time);
+  }
+
+  // A channel that would show alone what is felt in the last sample, or what the known contacts leave.
+  const Suspect& suspect() const { return suspect_; }
+  // From now on until then [s] a channel tells nothing.
+  void leave_out(int channel, double until) { lone_.leave_out(channel, until); }
+
+  // Segment g is touched anew.
+  int begin(int g) {
+    pasts_[g].restart();
+    return reports_.next();
+  }
+
+  // What is said after the last sample.
+  const Reports& reports() const { return reports_; }
+
+  // Gives each body the probability that the evidence for links gives it, where one contact stands for
+  // all that joint torques show.
+  bool share_out(const std::vector<BodyShare>& shares) {
+    if (measurement_.can_be_followed() || settings_.first_entry || reports_.count() != 1) return false;
+    Answer& answer = reports_.answer(0);
+    if (!placed(answer)) return false;
+    single_.share_out(shares, measurement_, answer);
+    return true;
+  }
+
+ private:
+  // When a channel was looked for again [s], and the squared size of what was felt then.
+  struct Look {
+    double time = -kAbsurd, size = 0.0;
+  };
+  // Equations beside the free force of another: five of a push, and five that only a channel meets.
+  static constexpr int kOver = 2 * JointEstimate::kEach;
+  static constexpr double kLook = 0.005;  // [s] between second looks: a suspect lasts four of them
+
+  void report(int serial, const Answer& answer) { reports_.add(serial, answer); }
+  void report(const KnownContact& k) { reports_.add(k); }
+  void end(int serial) { reports_.end(serial); }
+
+  template <class Read>
+  void follow_contacts(SegmentContacts& s, int g, double bandwidth, double time, Read&& read_all) {
     const auto read = [&] { return read_all() && lone_.take_out(g, time); };
     reports_.clear();
     suspect_ = {};
@@ -74,34 +122,29 @@ class Tracks {
     }
   }
 
-  // A channel that would show alone what is felt in the last sample, or what the known contacts leave.
-  const Suspect& suspect() const { return suspect_; }
-  // From now on until then [s] a channel tells nothing.
-  void leave_out(int channel, double until) { lone_.leave_out(channel, until); }
-
-  // Segment g is touched anew.
-  int begin(int g) {
-    pasts_[g].restart();
-    return reports_.next();
+  // Is what is felt, after all, one channel's? All of it; or one of two contacts that have begun
+  // together; or what is left beside one contact, where no single one explains.
+  template <class Read>
+  Suspect look_again(SegmentContacts& s, int g, Read&& read_all) {
+    if (!read_all()) return {};
+    const Suspect alone = lone_.find(g);
+    const Look before = std::exchange(looked_[g], Look{now_.time, lone_.size()});
+    const double passed = now_.time - before.time;
+    // What falls as fast as the filter forgets is let go: the shares of several do not fall alike.
+    if (lone_.size() < std::exp(-now_.bandwidth * passed) * before.size) return {};
+    if (alone.any() || !s.state.is(Tracking::pair)) return alone;
+    if (!s.together.separable)
+      return lone_.find_beside_one(g, single_.surfaces().bodies(g), read_all);
+    for (int c = 0; c < 2; ++c) {
+      JointEstimate other = s.together.contacts;
+      other.remove(c);
+      if (!read_all() || measurement_.size() < 3 + kOver) return {};
+      fit_.take_out(other, Change::of_forces(1, settings_.force_scale), measurement_);
+      const Suspect one = lone_.find(g, 3);
+      if (one.any()) return one;
+    }
+    return {};
   }
-
-  // What is said after the last sample.
-  const Reports& reports() const { return reports_; }
-
-  // Gives each body the probability that the evidence for links gives it, where one contact stands for
-  // all that joint torques show.
-  bool share_out(const std::vector<BodyShare>& shares) {
-    if (measurement_.can_be_followed() || settings_.first_entry || reports_.count() != 1) return false;
-    Answer& answer = reports_.answer(0);
-    if (!placed(answer)) return false;
-    single_.share_out(shares, measurement_, answer);
-    return true;
-  }
-
- private:
-  void report(int serial, const Answer& answer) { reports_.add(serial, answer); }
-  void report(const KnownContact& k) { reports_.add(k); }
-  void end(int serial) { reports_.end(serial); }
 
   template <class Read>
   void arrive(SegmentContacts& s, Read&& read) {
@@ -264,6 +307,7 @@ class Tracks {
   KnownFit known_;
   Reports reports_;
   std::vector<Past> pasts_;  // per segment: of its whole wrench
+  std::vector<Look> looked_;  // per segment
   Arrivals arrivals_;
   Merging merging_;
   Twins twins_;

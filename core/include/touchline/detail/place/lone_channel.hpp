@@ -17,9 +17,11 @@
 
 namespace touchline {
 
-// A channel that alone explains what is felt, and what it would be wrong by [N or Nm].
+// A channel that alone explains what is felt, and what it would be wrong by [N or Nm]. Or two axes
+// of a sensor that are swapped: one has too much of what the other one lacks.
 struct Suspect {
   int channel = -1;  // as `ChannelLayout`; -1: there is none
+  int other = -1;    // the one that it is swapped with; -1: none
   double error = 0.0;
   bool any() const { return channel >= 0; }
 };
@@ -40,8 +42,9 @@ class LoneChannel {
     }
   }
 
-  // Of segment g, whose rows the measurement has read. So many of their dimensions explain anything.
-  Suspect find(int g, int free = 0) {
+  // Of segment g, whose rows the measurement has read. So many of their dimensions explain anything;
+  // `most_left`: of the squared size, what the channel may leave.
+  Suspect find(int g, int free = 0, double most_left = kLeft) {
     const int size = measurement_.size();
     if (!measurement_.has_wrench() || size - free <= kLeast) return {};
     measurement_.values(rows_.data(), 1);
@@ -51,11 +54,39 @@ class LoneChannel {
     if (free > 0 && all_ < chi2_limit(size - free, kArrival)) return {};  // they explain it alone
     most_ = 0.0;
     best_ = {};
-    visit_channels(g, [this](int channel) { weigh(channel); });
+    visit_channels(g, [this](int channel, int other) { weigh(channel, other); });
     const double left = all_ - most_;
     const double limit = chi2_limit(std::max(1, size - 1 - free), kNoise);
-    if (!best_.any() || left > limit + kShape * kShape * all_ || left > kLeft * all_) return {};
+    if (!best_.any() || left > limit + kShape * kShape * all_ || left > most_left * all_) return {};
     return borne_out() ? best_ : Suspect{};
+  }
+
+  // Of what was looked at last: its squared size, to the scale of the noise.
+  double size() const { return all_; }
+
+  // Beside one contact with any wrench on one of the bodies at `nodes`, where none explains alone.
+  // `read()` takes the measurement anew. A second contact has as many unknowns as are left over: so
+  // hardly anything may be left.
+  template <class Nodes, class Read>
+  Suspect find_beside_one(int g, const Nodes& nodes, Read&& read) {
+    Suspect found;
+    double least = kAbsurd;
+    for (const auto& body : nodes) {
+      if (!read() || measurement_.size() - 6 <= kLeast) return {};
+      for (int k = 0; k < 6; ++k) {
+        double unit[6] = {};
+        unit[k] = kAnything;
+        measurement_.load(body.node, touchline::load(unit), 0.0, column_.data(), 1);
+        if (!measurement_.spread(column_.data(), 1)) return {};
+      }
+      const Suspect suspect = find(g, 6, kLeftBeside);
+      if (all_ < chi2_limit(measurement_.size() - 6, kArrival)) return {};
+      const double left = all_ - most_;
+      if (!suspect.any() || left > least) continue;
+      least = left;
+      found = suspect;
+    }
+    return found;
   }
 
   // From now on until then [s] a channel tells nothing.
@@ -70,8 +101,8 @@ class LoneChannel {
     any_out_ = std::any_of(out_until_.begin(), out_until_.end(), [&](double t) { return time < t; });
     if (!any_out_ || !measurement_.has_wrench()) return true;
     bool good = true;
-    visit_channels(g, [&](int channel) {
-      if (!(time < out_until_[channel])) return;
+    visit_channels(g, [&](int channel, int other) {
+      if (other >= 0 || !(time < out_until_[channel])) return;
       for (int i = 0; i < measurement_.size(); ++i) column_[i] *= kAnything;
       good = measurement_.spread(column_.data(), 1) && good;
     });
@@ -80,6 +111,7 @@ class LoneChannel {
 
  private:
   static constexpr int kLeast = 5;        // rows: of fewer, a contact leaves nothing over
+  static constexpr int kTorques = 4;      // beside the sensor: fewer say little of a push's axis
   static constexpr double kAnything = 1e3;  // [N, Nm] sigma of what tells nothing
   static constexpr double kOther = 4.0;   // of the squared error: what feels more, feels something else
   static constexpr double kArrival = 5.0;  // sigmas beyond which known contacts do not explain
@@ -87,9 +119,10 @@ class LoneChannel {
   static constexpr double kShape = 0.03;  // and this part of it: filters turn with the arm
   // Of the squared size: what one channel leaves of a contact that noise, or a gap, nearly hides.
   static constexpr double kLeft = 0.1;
+  static constexpr double kLeftBeside = 0.01;  // the same beside contacts that explain much
 
-  // Calls `visit(channel)` for all that segment g feels, with what one unit of it does to the rows in
-  // `column_`.
+  // Calls `visit(channel, other)` for all that segment g feels, with what one unit of it does to the
+  // rows in `column_`; `other`: of swapped axes, else -1.
   template <class Visit>
   void visit_channels(int g, Visit&& visit) {
     const Segment& segment = observer_.layout().segments[g];
@@ -99,31 +132,49 @@ class LoneChannel {
       if (measurement_.joint(i) < 0) continue;
       std::fill_n(column_.data(), measurement_.size(), 0.0);
       column_[6 + i] = 1.0;
-      visit(static_cast<int>(at_.tau()) + measurement_.joint(i));
+      visit(static_cast<int>(at_.tau()) + measurement_.joint(i), -1);
     }
   }
 
   // The axes of a sensor, which this segment feels with a sign. Of one whose log has other axes, a
-  // channel is no axis.
+  // channel is no axis. Swapped ones are looked for where joint torques contradict them: a sensor
+  // inboard tells of the others (parity_watch.hpp).
   template <class Visit>
   void visit_axes(int sensor, double sign, Visit&& visit) {
     if (observer_.sensors()[sensor].turned) return;
-    const int node = observer_.sensors()[sensor].node;
+    const int first = static_cast<int>(at_.wrench()) + 6 * sensor;
     for (int axis = 0; axis < 6; ++axis) {
-      double unit[6] = {};
-      unit[axis] = sign;
-      const Spatial w = wrench_to_parent(measurement_.posture().pose(node), load(unit));
-      if (sign > 0.0) {  // its own joints do not count on it
-        std::fill_n(column_.data(), measurement_.size(), 0.0);
-        store(w, column_.data());
-      } else {
-        measurement_.load(node, w, 0.0, column_.data(), 1);
-      }
-      visit(static_cast<int>(at_.wrench()) + 6 * sensor + axis);
+      load_axis(sensor, axis, -1, sign);
+      visit(first + axis, -1);
+    }
+    if (inner_[sensor] >= 0 || measurement_.size() < 6 + kTorques) return;
+    for (int axis = 0; axis < 6; ++axis) {  // of three: each with the next
+      const int other = axis % 3 == 2 ? axis - 2 : axis + 1;
+      load_axis(sensor, axis, other, sign);
+      visit(first + axis, first + other);
     }
   }
 
-  void weigh(int channel) {
+  // What one unit of an axis, less one of another, does to the rows: to `column_`.
+  void load_axis(int sensor, int axis, int other, double sign) {
+    const int node = observer_.sensors()[sensor].node;
+    const Spatial w = wrench_to_parent(measurement_.posture().pose(node), unit(axis, other, sign));
+    if (sign > 0.0) {  // its own joints do not count on it
+      std::fill_n(column_.data(), measurement_.size(), 0.0);
+      store(w, column_.data());
+    } else {
+      measurement_.load(node, w, 0.0, column_.data(), 1);
+    }
+  }
+
+  static Spatial unit(int axis, int other, double size) {
+    double values[6] = {};
+    values[axis] = size;
+    if (other >= 0) values[other] = -size;
+    return touchline::load(values);
+  }
+
+  void weigh(int channel, int other) {
     const int size = measurement_.size();
     measurement_.whiten(column_.data(), 1);
     double along = 0.0, square = 0.0;
@@ -133,7 +184,7 @@ class LoneChannel {
     }
     if (!(square > 0.0) || along * along <= most_ * square) return;
     most_ = along * along / square;
-    best_ = {channel, along / square};
+    best_ = {channel, other, along / square};
   }
 
   // Does the other segment at the sensor feel the opposite, as it would of an error and would not of
@@ -148,10 +199,11 @@ class LoneChannel {
     if (measurement_.normalized() == nullptr) return false;
     const int other = here ? observer_.layout().segment_of_sensor[inner_[sensor]] : own;
     const int at = here ? inner_[sensor] : sensor;
-    double unit[6] = {}, shown[6];
-    unit[axis] = here ? -best_.error : best_.error;
+    const int swapped = best_.other >= 0 ? best_.other - best_.channel + axis : -1;
+    const Spatial error = unit(axis, swapped, here ? -best_.error : best_.error);
+    double shown[6];
     const Posture& posture = measurement_.posture();
-    const Spatial w = wrench_to_parent(posture.pose(observer_.sensors()[sensor].node), load(unit));
+    const Spatial w = wrench_to_parent(posture.pose(observer_.sensors()[sensor].node), error);
     store(wrench_to_child(posture.pose(observer_.sensors()[at].node), w), shown);
     double with = 0.0, without = 0.0, size = 0.0;
     for (std::size_t i = 0; i < measurement_.tests(); ++i) {
