@@ -80,8 +80,6 @@ class Tracks {
   struct Look {
     double time = -kAbsurd, size = 0.0;
   };
-  // Equations beside the free force of another: five of a push, and five that only a channel meets.
-  static constexpr int kOver = 2 * JointEstimate::kEach;
   static constexpr double kLook = 0.005;  // [s] between second looks: a suspect lasts four of them
 
   void report(int serial, const Answer& answer) { reports_.add(serial, answer); }
@@ -122,8 +120,7 @@ class Tracks {
     }
   }
 
-  // Is what is felt, after all, one channel's? All of it; or one of two contacts that have begun
-  // together; or what is left beside one contact, where no single one explains.
+  // Is all that is felt, after all, one channel's?
   template <class Read>
   Suspect look_again(SegmentContacts& s, int g, Read&& read_all) {
     if (!read_all()) return {};
@@ -132,18 +129,7 @@ class Tracks {
     const double passed = now_.time - before.time;
     // What falls as fast as the filter forgets is let go: the shares of several do not fall alike.
     if (lone_.size() < std::exp(-now_.bandwidth * passed) * before.size) return {};
-    if (alone.any() || !s.state.is(Tracking::pair)) return alone;
-    if (!s.together.separable)
-      return lone_.find_beside_one(g, single_.surfaces().bodies(g), read_all);
-    for (int c = 0; c < 2; ++c) {
-      JointEstimate other = s.together.contacts;
-      other.remove(c);
-      if (!read_all() || measurement_.size() < 3 + kOver) return {};
-      fit_.take_out(other, Change::of_forces(1, settings_.force_scale), measurement_);
-      const Suspect one = lone_.find(g, 3);
-      if (one.any()) return one;
-    }
-    return {};
+    return alone;
   }
 
   template <class Read>

@@ -141,7 +141,7 @@ struct LocalizerTuning {
   // third of a step towards a better pair, some 0.5 to 1 us. A sample has its share: at 1 kHz some half
   // a millisecond, at 8 kHz no more than a period. Half: places are narrowed later than 0.1 s after the
   // onset. Double: twice the time in a sample.
-  int pair_work = 600'000;
+  int pair_work = 600000;
   // Times 1 / K until forces are worth a second search, and a walk from it. Half: it walks on a force
   // of 63 %. Double: later.
   double risen = 2.0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How much work a sample may do on searches: a budget per time of the sensors' clock, so that an answer
-// takes as long at any sample rate, shared by all that is searched in it. No allocation.
+// How much work a sample may do on searches: a budget per time of the sensors' clock. So an answer takes
+// as long at any sample rate. All that is searched in a sample shares it. No allocation.
 // Theory: docs/theory.md, section 6.5.
 #pragma once
 

@@ -42,9 +42,8 @@ class LoneChannel {
     }
   }
 
-  // Of segment g, whose rows the measurement has read. So many of their dimensions explain anything;
-  // `most_left`: of the squared size, what the channel may leave.
-  Suspect find(int g, int free = 0, double most_left = kLeft) {
+  // Of segment g, whose rows the measurement has read. So many of their dimensions explain anything.
+  Suspect find(int g, int free = 0) {
     const int size = measurement_.size();
     if (!measurement_.has_wrench() || size - free <= kLeast) return {};
     measurement_.values(rows_.data(), 1);
@@ -57,37 +56,12 @@ class LoneChannel {
     visit_channels(g, [this](int channel, int other) { weigh(channel, other); });
     const double left = all_ - most_;
     const double limit = chi2_limit(std::max(1, size - 1 - free), kNoise);
-    if (!best_.any() || left > limit + kShape * kShape * all_ || left > most_left * all_) return {};
+    if (!best_.any() || left > limit + kShape * kShape * all_ || left > kLeft * all_) return {};
     return borne_out() ? best_ : Suspect{};
   }
 
   // Of what was looked at last: its squared size, to the scale of the noise.
   double size() const { return all_; }
-
-  // Beside one contact with any wrench on one of the bodies at `nodes`, where none explains alone.
-  // `read()` takes the measurement anew. A second contact has as many unknowns as are left over: so
-  // hardly anything may be left.
-  template <class Nodes, class Read>
-  Suspect find_beside_one(int g, const Nodes& nodes, Read&& read) {
-    Suspect found;
-    double least = kAbsurd;
-    for (const auto& body : nodes) {
-      if (!read() || measurement_.size() - 6 <= kLeast) return {};
-      for (int k = 0; k < 6; ++k) {
-        double unit[6] = {};
-        unit[k] = kAnything;
-        measurement_.load(body.node, touchline::load(unit), 0.0, column_.data(), 1);
-        if (!measurement_.spread(column_.data(), 1)) return {};
-      }
-      const Suspect suspect = find(g, 6, kLeftBeside);
-      if (all_ < chi2_limit(measurement_.size() - 6, kArrival)) return {};
-      const double left = all_ - most_;
-      if (!suspect.any() || left > least) continue;
-      least = left;
-      found = suspect;
-    }
-    return found;
-  }
 
   // From now on until then [s] a channel tells nothing.
   void leave_out(int channel, double until) {
@@ -119,7 +93,6 @@ class LoneChannel {
   static constexpr double kShape = 0.03;  // and this part of it: filters turn with the arm
   // Of the squared size: what one channel leaves of a contact that noise, or a gap, nearly hides.
   static constexpr double kLeft = 0.1;
-  static constexpr double kLeftBeside = 0.01;  // the same beside contacts that explain much
 
   // Calls `visit(channel, other)` for all that segment g feels, with what one unit of it does to the
   // rows in `column_`; `other`: of swapped axes, else -1.
