@@ -336,10 +336,12 @@ class Detector {
     double w[6] = {};
     for (std::size_t k = first; rows_[k].component >= 0; ++k)
       w[rows_[k].component] = samples_[k].residual - states_.baseline[k];
-    const Spatial shown = wrench_to_parent(posture_.pose(observer_.sensors()[sensor].node), touchline::load(w));
+    const Pose& X = posture_.pose(observer_.sensors()[sensor].node);
+    const Spatial shown = wrench_to_parent(X, touchline::load(w));
     double outboard = samples_[i].residual - states_.baseline[i];
     const double inboard = outboard;
-    for (int node : observer_.joints()[rows_[i].joint].nodes) outboard -= dot(posture_.subspace(node), shown);
+    for (int node : observer_.joints()[rows_[i].joint].nodes)
+      outboard -= dot(posture_.subspace(node), shown);
     if (inboard * outboard <= 0.0) return 0.0;
     return std::fabs(inboard) < std::fabs(outboard) ? inboard : outboard;
   }
