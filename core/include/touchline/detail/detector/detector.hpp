@@ -948,20 +948,12 @@ class Detector {
       const DriftShares shares(activity(), segment.way2, tuning_);
       const double way2 = std::min(segment.way2, sq(tuning_.drift_farthest));
       const bool moved = moved_off(g), free = levels_[g] == 0 && !segment.pending;
-      double wrench[2] = {0.0, 0.0};  // of forces and moments: a load that swings turns between axes
       for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
         const double shown = moved && rows_[i].seen > 0.0
                                  ? (free ? shown_by(i) : shown_before_[i]).at(way2, tuning_)
                                  : 0.0;
         const double friction = sq(tuning_.friction_doubt * friction_drift_[i]);
-        drift_[i] = std::max({drifted(rows_[i], activity(), shares), shown, friction});
-        if (rows_[i].component < 0) continue;
-        double& most = wrench[rows_[i].component / 3];
-        most = std::max(most, shown);
-      }
-      for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
-        const double other = rows_[i].component < 0 ? 0.0 : wrench[rows_[i].component / 3];
-        drift_[i] = std::sqrt(std::max(drift_[i], other));
+        drift_[i] = std::sqrt(std::max({drifted(rows_[i], activity(), shares), shown, friction}));
       }
     }
   }
