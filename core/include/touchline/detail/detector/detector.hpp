@@ -16,6 +16,7 @@
 #include "touchline/detail/detector/borne_out.hpp"
 #include "touchline/detail/detector/detection_row.hpp"
 #include "touchline/detail/detector/first_look.hpp"
+#include "touchline/detail/detector/friction_seen.hpp"
 #include "touchline/detail/detector/motion_spread.hpp"
 #include "touchline/detail/detector/noise_meter.hpp"
 #include "touchline/detail/detector/row_covariance.hpp"
@@ -46,6 +47,8 @@ class Detector {
         bandwidths_(of_rows([this](const DetectionRow& row) { return bandwidth_of(row); })),
         states_(rows_.size()),
         spreads_(rows_.size()),
+        friction_(rows_.size()),
+        friction_drift_(rows_.size(), 0.0),
         borne_out_(bandwidths_),
         residuals_(rows_.size()),
         known_(rows_.size()),
@@ -73,7 +76,8 @@ class Detector {
         shares_(rows_.size(), 0.0),
         drift_(rows_.size(), 0.0),
         excess_(rows_.size(), 1.0),
-        shown_before_(rows_.size(), 0.0),
+        before_(rows_.size(), 0.0),
+        shown_before_(rows_.size()),
         standing_(rows_.size()),
         first_looks_(rows_.size()),
         loadable_(std::move(loadable)),
@@ -123,6 +127,7 @@ class Detector {
     time_ = now;
     if (dt > 0.0) follow_motion(q, qd, dt);
     for (std::size_t g = 0; g < segments_.size(); ++g) read_segment(g);
+    if (dt > 0.0 && sound_) follow_friction(dt);
     borne_out_.add(residuals_, known_, dt);
     for (std::size_t g = 0; g < segments_.size(); ++g) {
       Segment& s = segments_[g];
@@ -186,6 +191,7 @@ class Detector {
   void go_on_from(const Detector& other, int of, int row, double baseline) {
     states_.go_on_from(other.states_, of, row, baseline);
     spreads_[row] = other.spreads_[of];
+    friction_.go_on_from(other.friction_, of, row);
     meters_.go_on_from(other.meters_, of, row);
     looks_over_ -= first_looks_[row].over();
     first_looks_[row] = other.first_looks_[of];
@@ -224,6 +230,7 @@ class Detector {
     bool pending = false, pending_collision = false;
     bool off = false;  // has the arm shown that it is not as told?
     bool free = true;  // of any event, at the last sample?
+    double way2 = 0.0;  // of the joints since the baseline, squared [rad2]
     bool learns = false;  // and moves: what is seen of its rows counts
   };
 
@@ -299,6 +306,67 @@ class Detector {
     segment.learns = segment.off && still_ < tuning_.pause;
   }
 
+  // Friction of the joints that are tested beside a force-torque sensor, which feels none of it.
+  void follow_friction(double dt) {
+    for (std::size_t g = 0; g < segments_.size(); ++g) {
+      if (observer_.layout().segments[g].sensor < 0) continue;
+      const bool silent = placed_ && is_silent(g);
+      double most = 0.0;
+      for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+        const DetectionRow& row = rows_[i];
+        if (row.component >= 0 || !samples_[i].known || !(row.seen > 0.0)) continue;
+        const double part = std::min(1.0, dt * bandwidths_[i]);
+        friction_.follow(i, qd_[row.joint], part, std::min(1.0, part * per_trend_), tuning_);
+        if (silent && states_.started[i] && friction_.tells(i, tuning_))
+          friction_.learn(i, unexplained(i), dt, tuning_);
+        most = std::max(most, friction_.shown(i, row.contact, tuning_));
+      }
+      for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+        const DetectionRow& row = rows_[i];
+        if (row.component >= 0 || !samples_[i].known || !(row.seen > 0.0)) continue;
+        // A joint of which little has been seen may have as much friction as another one, or as stood
+        // there when it was moving at the start.
+        double other = most;
+        if (states_.shown[i] > row.contact && states_.anchor[i] * friction_.way(i) < 0.0)
+          other = std::max(other, std::fabs(states_.anchor[i]));
+        const double own = friction_.shown(i, row.contact, tuning_);
+        const double friction = std::max(own, (1.0 - friction_.sure(i, tuning_)) * other);
+        friction_drift_[i] = friction * friction_.turned(i);
+      }
+    }
+  }
+
+  // What a joint's row has that no contact explains of which the sensor shows no more than it does: one
+  // inboard of the joint does not load it, one outboard by what the sensor shows.
+  double unexplained(std::size_t i) const {
+    const std::size_t first = first_[rows_[i].segment];
+    const int sensor = observer_.layout().segments[rows_[i].segment].sensor;
+    double w[6] = {};
+    for (std::size_t k = first; rows_[k].component >= 0; ++k)
+      w[rows_[k].component] = samples_[k].residual - states_.baseline[k];
+    const Pose& X = posture_.pose(observer_.sensors()[sensor].node);
+    const Spatial shown = wrench_to_parent(X, touchline::load(w));
+    double outboard = samples_[i].residual - states_.baseline[i];
+    const double inboard = outboard;
+    for (int node : observer_.joints()[rows_[i].joint].nodes)
+      outboard -= dot(posture_.subspace(node), shown);
+    if (inboard * outboard <= 0.0) return 0.0;
+    return std::fabs(inboard) < std::fabs(outboard) ? inboard : outboard;
+  }
+
+  // Does the sensor of a segment feel nothing?
+  bool is_silent(std::size_t g) const {
+    bool any = false;
+    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+      if (rows_[i].component < 0) continue;
+      if (!samples_[i].known || !states_.started[i]) return false;
+      any = true;
+      const double off = samples_[i].residual - states_.baseline[i];
+      if (std::fabs(off) > limits_[i] * rows_[i].contact) return false;
+    }
+    return any;
+  }
+
   bool read_wrench(std::size_t g, double* wrench, double* innovation) const {
     const RowLayout& layout = observer_.row_layout();
     const int sensor = observer_.layout().segments[g].sensor;
@@ -339,7 +407,8 @@ class Detector {
     sample.reference = states_.reference[i];
     sample.referred = states_.referred[i];
     const double spread = shown_by_motion_[i] =
-        segment.learns && row.seen > 0.0 ? spreads_[i].limit(tuning_) : 0.0;
+        std::max(segment.learns && row.seen > 0.0 ? spreads_[i].limit(tuning_) : 0.0,
+                 tuning_.friction_margin * friction_drift_[i]);
     const double limit = limits_[i] = largest_noise(i, spread) / row.contact;
     const double normalized = normalized_[i] = (sample.residual - baseline) / row.contact;
     const double x = normalized / limit;
@@ -368,8 +437,8 @@ class Detector {
     const double baseline = states_.baseline[i];
     const double now = samples_[i].residual - baseline, mean = states_.trend[i] - baseline;
     if (now * mean <= 0.0) return 0.0;
-    const double limit = std::max(row.contact, trend_meters_.limit(i, row.seen,
-        first_looks_[i].ratio(), tuning_));
+    const double noise = trend_meters_.limit(i, row.seen, first_looks_[i].ratio(), tuning_);
+    const double limit = std::max({row.contact, noise, shown_by_motion_[i]});
     return std::min(std::fabs(now), std::fabs(mean)) / limit;
   }
 
@@ -435,12 +504,15 @@ class Detector {
     if ((!quiet || may_begin) && s.origin == Origin::reversal && pushed(g)) s.origin = Origin::push;
     advance(s.score > 1.0, dt, s.pending, s.above);
     s.highest = s.pending ? std::max(s.highest, s.score) : 0.0;
+    if (levels_[g] > 0 || !s.pending)
+      for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) before_[i] = states_.trend[i];
     advance(s.collision > 1.0, dt, s.pending_collision, s.above_collision);
     // What motion shows soon exceeds no limit; it need not fall below a part of it.
     const double release = own_doing(g) ? 1.0 : settings_.times.release;
     s.below = lasting(s.score < release, dt, s.below);
     if (lasts(g, s.pending, s.above, s.score, s.borne_score)) levels_[g] = std::max(levels_[g], 1);
     if (lasts(g, s.pending_collision, s.above_collision, s.collision, s.borne_collision)) levels_[g] = 2;
+    if (s.lasted == 0.0 && levels_[g] > 0 && s.origin == Origin::push && moved_off(g)) start_from(g);
     if (levels_[g] == 0) {
       s.top = s.top_wrench = s.rest = s.back = s.below = s.lasted = 0.0;
       s.in_motion = still_ < tuning_.pause;
@@ -518,6 +590,18 @@ class Detector {
       const double trend = states_.trend[i];
       const double quick = samples_[i].residual - trend, before = trend - states_.baseline[i];
       if (std::fabs(quick) >= tuning_.creep_share * std::fabs(before)) return true;
+    }
+    return false;
+  }
+
+  // Does a sensor's wrench change faster than motions do? That is not learned as one of their errors.
+  bool steps(std::size_t g) const {
+    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+      if (rows_[i].component < 0 || !samples_[i].known) continue;
+      const double trend = states_.trend[i];
+      const double quick = samples_[i].residual - trend, before = trend - states_.baseline[i];
+      const double least = std::max(rows_[i].contact, tuning_.creep_share * std::fabs(before));
+      if (std::fabs(quick) > least) return true;
     }
     return false;
   }
@@ -602,6 +686,7 @@ class Detector {
     states_.baseline[i] = states_.anchor[i] = states_.origin[i] = states_.reference[i] = trend;
     states_.shown[i] = std::max(states_.shown[i], std::fabs(trend));
     states_.age[i] = states_.referred[i] = settled_at_[i];
+    friction_.rest(i);
   }
 
   // What is left of a contact and does not change rests there: an offset from now on. What stood
@@ -625,6 +710,16 @@ class Detector {
         return false;
     }
     return true;
+  }
+
+  // What the rows of an arm that is off in motion were off by before a push goes on.
+  void start_from(std::size_t g) {
+    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+      if (!samples_[i].known || !(rows_[i].seen > 0.0)) continue;
+      std::swap(states_.trend[i], before_[i]);
+      rest(i);
+      std::swap(states_.trend[i], before_[i]);
+    }
   }
 
   void go_back(std::size_t g) {
@@ -676,7 +771,7 @@ class Detector {
     for (std::size_t g = 0; g < segments_.size(); ++g) {
       const Segment& segment = segments_[g];
       const bool felt = levels_[g] > 0;
-      const bool learns = segment.learns && dt > 0.0 && (!felt || own_doing(g));
+      const bool learns = segment.learns && dt > 0.0 && (felt ? own_doing(g) : !steps(g));
       const bool rests = stopped && segment.off;
       const bool usual = !(confirmed || looking || learns || felt || rests || segment.pending);
       for (std::size_t i = first_[g], end = first_[g + 1]; i < end; ++i) {
@@ -684,8 +779,8 @@ class Detector {
         if (usual || !samples_[i].known) continue;
         if (crossed_[i] > 0.0) confirm_start(i);
         if (learns && rows_[i].seen > 0.0) {
-          spreads_[i].add(samples_[i].residual - states_.baseline[i], dt, felt, tuning_);
-          shown_by_motion_[i] = spreads_[i].limit(tuning_);
+          spreads_[i].add(samples_[i].residual - states_.baseline[i], segment.way2, dt, felt, tuning_);
+          shown_by_motion_[i] = std::max(shown_by_motion_[i], spreads_[i].limit(tuning_));
         }
         if (looking) look(i);
         if (rests && !felt && rows_[i].seen > 0.0) rest(i);
@@ -696,6 +791,7 @@ class Detector {
       }
     }
     offset_ = follow_baselines(dt);
+    follow_ways(dt);
     for (std::size_t g = 0; g < segments_.size(); ++g) {
       for (std::size_t i = first_[g + 1]; i-- > first_[g];) {
         if (!(averages_[i] > 0.0)) continue;
@@ -800,6 +896,19 @@ class Detector {
     }
     return false;
   }
+  static double sq(double x) { return x * x; }
+
+  // What the joints did while the baselines were averaged.
+  void follow_ways(double dt) {
+    for (std::size_t g = 0; g < segments_.size(); ++g) {
+      if (observer_.layout().segments[g].sensor < 0) continue;
+      for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+        const double tau = std::min(states_.age[i], settings_.times.baseline);
+        if (rows_[i].component < 0 && averages_[i] > 0.0 && tau > 0.0)
+          friction_.average(i, std::min(1.0, dt / tau));
+      }
+    }
+  }
   static Lanes within(const Lanes& x, const Lanes& low, const Lanes& high) {
     const Lanes below = high < x ? high : x;
     return x < low ? low : below;
@@ -831,7 +940,9 @@ class Detector {
       shown_before_[i] = shown_by(i);
     s.free = free;
   }
-  double shown_by(std::size_t i) const { return spreads_[i].variance_beyond(meters_.sigma(i)); }
+  MotionSpread::Shown shown_by(std::size_t i) const {
+    return spreads_[i].beyond(meters_.sigma(i), tuning_);
+  }
 
   // Drifts of the rows, from where the arm was while the baselines were averaged. Of one that is not
   // as told at least what motion had shown before the present event.
@@ -841,16 +952,17 @@ class Detector {
         const double tau = std::min(quiet_[g], settings_.times.baseline);
         baseline_posture_.average(g, q, std::min(1.0, dt / tau));
       }
-      const DriftShares shares(activity(), baseline_posture_.distance2(g, q), tuning_);
-      const bool moved = moved_off(g), free = levels_[g] == 0 && !segments_[g].pending;
-      const double sigmas2 = tuning_.drift_shown * tuning_.drift_shown;
+      Segment& segment = segments_[g];
+      segment.way2 = baseline_posture_.distance2(g, q);
+      const DriftShares shares(activity(), segment.way2, tuning_);
+      const double way2 = std::min(segment.way2, sq(tuning_.drift_farthest));
+      const bool moved = moved_off(g), free = levels_[g] == 0 && !segment.pending;
       for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
-        double variance = drifted(rows_[i], activity(), shares);
-        if (moved && rows_[i].seen > 0.0) {
-          const double shown = free ? shown_by(i) : shown_before_[i];
-          variance = std::max(variance, sigmas2 * shown);
-        }
-        drift_[i] = std::sqrt(variance);
+        const double shown = moved && rows_[i].seen > 0.0
+                                 ? (free ? shown_by(i) : shown_before_[i]).at(way2, tuning_)
+                                 : 0.0;
+        const double friction = sq(tuning_.friction_doubt * friction_drift_[i]);
+        drift_[i] = std::sqrt(std::max({drifted(rows_[i], activity(), shares), shown, friction}));
       }
     }
   }
@@ -868,6 +980,8 @@ class Detector {
   std::vector<double> bandwidths_;  // per row: of its filter [rad/s]
   RowStates states_;
   std::vector<MotionSpread> spreads_;  // per row
+  FrictionSeen friction_;
+  std::vector<double> friction_drift_;  // per row: what friction may have added since the baseline
   BorneOut borne_out_;
   // Of the sample: residuals, whether they are known and count as noise.
   RowLanes residuals_, known_, counts_;
@@ -887,7 +1001,8 @@ class Detector {
   std::vector<double> collision_shares_;  // per row: its threshold, in those of a collision
   std::vector<double> normalized_, shares_;  // in thresholds; the size of that, in limits
   std::vector<double> drift_, excess_;
-  std::vector<double> shown_before_;  // per row: variance of what motion had shown before an event
+  std::vector<double> before_;  // per row: its trend before a test held
+  std::vector<MotionSpread::Shown> shown_before_;  // per row: what motion had shown before an event
   std::vector<Standing> standing_;  // per row
   std::vector<FirstLook> first_looks_;  // per row
   std::vector<char> loadable_;  // per row: can a contact load it?

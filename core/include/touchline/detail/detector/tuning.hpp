@@ -70,6 +70,9 @@ struct DetectorTuning {
   // What motion has shown is remembered over so long of motion [s]. Half: a pause in a program
   // forgets its friction. Double: what one hard motion has shown dulls the next 20 s.
   double motion_memory = 10.0;
+  // What motion has shown is doubted by the share of so long of motion [s]: an error that grows has yet
+  // to show the rest. Half: in the first second places are too sure. Double: they are too unsure.
+  double motion_few = 0.5;
   // While it is taken for a contact an error counts so many times: it then fills the memory in 0.5
   // s. Half: false events of motion last twice as long. Double: a push that lasts is learned in
   // 0.25 s.
@@ -91,6 +94,32 @@ struct DetectorTuning {
   // nobody has calibrated. A friction that changes sign exceeds its own twofold. Half: what it leaves
   // is placed as one more contact. Double: pushes on such arms are placed less often.
   double drift_shown = 2.0;
+  // The same, of as much as the way that the arm has gone from its baseline is longer than it was. Half:
+  // what a load does that swings farther is placed. Double: pushes on such arms are placed less often.
+  double drift_grown = 1.0;
+  // But ways are at least so long [rad]: on shorter ones noise is most of what is seen. Half and double:
+  // how far the errors of an arm that has hardly moved may grow.
+  double drift_least = 0.05;
+
+  // ---- Friction ----
+  // A joint so fast has shown half of its friction [rad/s], and at ten times that most of it. Half:
+  // friction that comes later is a push. Double: what comes at once is expected too late.
+  double friction_speed = 0.01;
+  // Parts of a joint's friction that must have come before it is learned. Half: noise of velocities
+  // tells of it. Double: a slow start is felt for longer before it counts as friction.
+  double friction_turned = 0.1;
+  // Seconds of a whole change by which a first look is doubted. Half: noise counts as friction for a
+  // moment. Double: friction that comes at once is felt.
+  double friction_few = 1e-3;
+  // Seconds of a whole change after which a joint's own friction is known; before, it may have as much
+  // as another one. Half: a first change of part of it counts for all. Double: the doubt lasts longer.
+  double friction_enough = 0.02;
+  // Times the friction that has come since the baseline, which an event must exceed. Half: friction
+  // itself does. Double: pushes on one joint that has turned are felt by sensors alone for longer.
+  double friction_margin = 2.0;
+  // Times that friction, which are one sigma of it for places. Half: part of it, where a joint is slow,
+  // is placed as a contact. Double: joints that turn tell less of places.
+  double friction_doubt = 1.5;
 
   // ---- When an arm moves ----
   // Slower than this it stands [rad/s]; a hand that pushes an arm moves it, too. Half: trembling
@@ -192,12 +221,21 @@ struct DetectorTuning {
     v("first_often", "values", t.first_often);
     v("first_clearly", "1", t.first_clearly);
     v("motion_memory", "s", t.motion_memory);
+    v("motion_few", "s", t.motion_few);
     v("motion_touched", "1", t.motion_touched);
     v("motion_sigmas", "1", t.motion_sigmas);
     v("drift_way", "rad", t.drift_way);
     v("drift_farthest", "rad", t.drift_farthest);
     v("drift_speed", "rad/s", t.drift_speed);
     v("drift_shown", "1", t.drift_shown);
+    v("drift_grown", "1", t.drift_grown);
+    v("drift_least", "rad", t.drift_least);
+    v("friction_speed", "rad/s", t.friction_speed);
+    v("friction_turned", "1", t.friction_turned);
+    v("friction_few", "s", t.friction_few);
+    v("friction_enough", "s", t.friction_enough);
+    v("friction_margin", "1", t.friction_margin);
+    v("friction_doubt", "1", t.friction_doubt);
     v("standing", "rad/s", t.standing);
     v("moving", "rad/s", t.moving);
     v("pause", "s", t.pause);

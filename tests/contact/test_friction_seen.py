@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Friction of joints that turn loads no sensor: it is learned, and makes no contact."""
+
+import numpy as np
+import pytest
+
+import touchline as tl
+from touchline.localizer.skin import Skin
+from touchline.observer.dynamics import contact_loads
+from touchline.trials.arms import load_arm
+from touchline.trials.free_motion import MotionMaker, Trajectory
+
+RATE, SECONDS = 500.0, 5.0
+FRICTION, TURN = 1.0, 0.01  # Nm, and over which speed it changes its sign [rad/s]
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return load_arm("panda", 1)
+
+
+def motion(arm):
+    """Every joint turns to and fro, each at other times."""
+    n = len(arm.joint_names)
+    frequency = np.linspace(2.0, 3.5, n)[None, :]
+    trajectory = Trajectory(
+        np.linspace(-0.4, 0.5, n) - np.eye(n)[3] * 1.5,
+        np.full((1, n), 0.2),
+        frequency,
+        np.linspace(0.0, 5.0, n)[None, :],
+        (1e-3, 0.0),
+    )
+    maker = MotionMaker(arm, arm, RATE, SECONDS)
+    return maker, *maker.loads(trajectory)
+
+
+def events(arm, friction, torque=None, push=None):
+    """Of the moving arm with friction, and with a torque on one joint or a force on a link."""
+    maker, q, qd, loads = motion(arm)
+    n = q.shape[1]
+    if torque is not None:
+        loads[:, 6] -= torque(maker.time)
+    if push is not None:
+        node = next(p.node for p in Skin(arm).patches if p.link == "panda_link6")
+        at = np.array([arm.poses(x)[node][:3, 3] for x in q])
+        force = push(maker.time)
+        contact = contact_loads(arm, q, "panda_link6", np.hstack([force, np.cross(at, force)]))
+        loads[:, :n] -= contact.torque
+        loads[:, n:] -= contact.wrench.reshape(len(q), -1)
+    s = maker.sensed(q, qd, loads, np.random.default_rng(1))
+    pipeline = tl.Pipeline(arm, period=1.0 / RATE)
+    rubbing = friction * np.tanh(s.qd / TURN)
+    pipeline.run(s.time, s.q, s.qd, s.tau + rubbing, s.wrench)
+    return pipeline.events
+
+
+def during(begin, end, value):
+    return lambda t: np.where((t > begin) & (t < end), 1.0, 0.0)[:, None] * np.asarray(value)
+
+
+def test_friction_makes_no_events(arm):
+    assert len(events(arm, FRICTION)) <= 1  # of some 30 turns
+
+
+def test_joints_that_turn_during_a_push_make_no_second_contact(arm):
+    found = events(arm, FRICTION, push=during(3.0, 4.5, [0.0, 15.0, 0.0]))
+    (own,) = (event for event in found if 2.9 < event.detected < 4.7)
+    assert own.status == tl.Status.LOCATED and own.link == "panda_link6"
+    assert own.cleared is not None and own.cleared < 4.7
+
+
+def test_an_arm_without_friction_still_tells_of_a_torque_on_one_joint(arm):
+    found = events(arm, 0.0, torque=lambda t: during(3.0, 4.0, [1.0])(t)[:, 0])
+    assert any(2.99 < event.detected < 3.1 for event in found)
