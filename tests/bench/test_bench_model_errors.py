@@ -30,7 +30,7 @@ def test_one_touch_of_a_wrong_model_in_motion_is_one():
             torque_error=0.0,
             friction=0.5,
             thresholds=thresholds,
-            tuning={"detector.drift_shown": 0.0},
+            tuning={"detector.drift_shown": 0.0, "detector.drift_grown": 0.0},
         )
         scene = make_scene(OFF, run)
         s = scene.signals

@@ -76,7 +76,6 @@ class Detector {
         shares_(rows_.size(), 0.0),
         drift_(rows_.size(), 0.0),
         excess_(rows_.size(), 1.0),
-        before_(rows_.size(), 0.0),
         shown_before_(rows_.size()),
         standing_(rows_.size()),
         first_looks_(rows_.size()),
@@ -504,15 +503,12 @@ class Detector {
     if ((!quiet || may_begin) && s.origin == Origin::reversal && pushed(g)) s.origin = Origin::push;
     advance(s.score > 1.0, dt, s.pending, s.above);
     s.highest = s.pending ? std::max(s.highest, s.score) : 0.0;
-    if (levels_[g] > 0 || !s.pending)
-      for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) before_[i] = states_.trend[i];
     advance(s.collision > 1.0, dt, s.pending_collision, s.above_collision);
     // What motion shows soon exceeds no limit; it need not fall below a part of it.
     const double release = own_doing(g) ? 1.0 : settings_.times.release;
     s.below = lasting(s.score < release, dt, s.below);
     if (lasts(g, s.pending, s.above, s.score, s.borne_score)) levels_[g] = std::max(levels_[g], 1);
     if (lasts(g, s.pending_collision, s.above_collision, s.collision, s.borne_collision)) levels_[g] = 2;
-    if (s.lasted == 0.0 && levels_[g] > 0 && s.origin == Origin::push && moved_off(g)) start_from(g);
     if (levels_[g] == 0) {
       s.top = s.top_wrench = s.rest = s.back = s.below = s.lasted = 0.0;
       s.in_motion = still_ < tuning_.pause;
@@ -710,16 +706,6 @@ class Detector {
         return false;
     }
     return true;
-  }
-
-  // What the rows of an arm that is off in motion were off by before a push goes on.
-  void start_from(std::size_t g) {
-    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
-      if (!samples_[i].known || !(rows_[i].seen > 0.0)) continue;
-      std::swap(states_.trend[i], before_[i]);
-      rest(i);
-      std::swap(states_.trend[i], before_[i]);
-    }
   }
 
   void go_back(std::size_t g) {
@@ -1001,7 +987,6 @@ class Detector {
   std::vector<double> collision_shares_;  // per row: its threshold, in those of a collision
   std::vector<double> normalized_, shares_;  // in thresholds; the size of that, in limits
   std::vector<double> drift_, excess_;
-  std::vector<double> before_;  // per row: its trend before a test held
   std::vector<MotionSpread::Shown> shown_before_;  // per row: what motion had shown before an event
   std::vector<Standing> standing_;  // per row
   std::vector<FirstLook> first_looks_;  // per row
