@@ -47,7 +47,7 @@ class Tracks {
     follow_contacts(s, g, bandwidth, time, read_all);
     if (suspect_.any() || settings_.first_entry || !measurement_.has_wrench()) return;
     if (time - looked_[g].time < kLook || s.state.is(Tracking::suspected)) return;
-    suspect_ = look_again(s, g, read_all);
+    suspect_ = look_again(g, read_all);
     if (read_all()) lone_.take_out(g, time);
   }
 
@@ -122,7 +122,7 @@ class Tracks {
 
   // Is all that is felt, after all, one channel's?
   template <class Read>
-  Suspect look_again(SegmentContacts& s, int g, Read&& read_all) {
+  Suspect look_again(int g, Read&& read_all) {
     if (!read_all()) return {};
     const Suspect alone = lone_.find(g);
     const Look before = std::exchange(looked_[g], Look{now_.time, lone_.size()});
