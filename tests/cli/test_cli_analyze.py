@@ -143,7 +143,7 @@ def test_the_summary_tells_what_there_is(robot, recording, tmp_path, capsys):
     assert "detection: rows; not calibrated: thresholds follow from the noise figures" in out
     for word in ("400 Hz", "settling", "bad_time", "missing", "sensor_excluded", "joint7", "wrist"):
         assert word in out
-    assert "K dt = 1.25 > 1" in out and "use about 100" in out
+    assert "K dt = 1.25 > 1" in out and "about 100 (--bandwidth 100" in out
 
 
 def test_other_files_in_the_directory_stay(results, tmp_path):

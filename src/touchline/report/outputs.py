@@ -2,10 +2,8 @@
 """The files that an analysis leaves in its directory, readable even if it is killed."""
 
 import json
-import math
 from collections.abc import Sequence
 from pathlib import Path
-from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -26,7 +24,6 @@ ESTIMATES, CONTACTS, POSTURES = "estimates.parquet", "contacts.parquet", "postur
 EVENTS, ANALYSIS, REPORT = "events.json", "analysis.json", "report.html"
 NAMES = (ESTIMATES, CONTACTS, POSTURES, EVENTS, ANALYSIS, REPORT)
 LONGEST = 10.0  # s; the first seconds of a longer touch tell its widget no more
-EVENTS_WITHIN = 1.0  # s; the whole list is written each time
 MOST = 500  # samples of a touch that are looked at
 CONTACT_SCHEMA = {"time": "f8", "health": "u4"} | contact_schema()
 
@@ -124,10 +121,7 @@ class Outputs:
         self._estimates = EstimateWriter(directory, *names)
         self._contacts = TableWriter(directory / CONTACTS, CONTACT_SCHEMA)
         self._postures = PostureWriter(directory / POSTURES, robot)
-        self._state: list[Any] | None = None
-        self._told_of: list[str] = []  # events, as of `_state`
-        self._written: list[str] | None = None
-        self._written_at = -math.inf  # [s]
+        self._written: list[Any] | None = None
         self._lines: dict[int, str] = {}  # of events that have ended, which change no more
         self.events([])
 
@@ -152,13 +146,11 @@ class Outputs:
         self._contacts.write(rows | table.columns())
 
     def events(self, events: Sequence[Event]) -> None:
-        """Bring `events.json` up to date: an event is in it within a second of work."""
+        """Bring `events.json` up to date: an event is in it as soon as it begins."""
         state = [(event.cleared, event.level) for event in events]
-        if state != self._state:  # a widget is told while its samples are recent
-            self._told_of, self._state = [self._told(event) for event in events], state
-        if self._told_of != self._written and monotonic() - self._written_at >= EVENTS_WITHIN:
-            _write_lines(self.directory / EVENTS, self._told_of)
-            self._written, self._written_at = self._told_of, monotonic()
+        if state != self._written:
+            _write_lines(self.directory / EVENTS, [self._told(event) for event in events])
+            self._written = state
 
     def _told(self, event: Event) -> str:
         line = self._lines.get(event.id)
