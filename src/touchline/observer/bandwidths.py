@@ -6,9 +6,7 @@ from touchline.tuning import DEFAULTS
 
 TUSTIN_LIMIT, RINGING = DEFAULTS["observer.tustin_steps"], 1.0  # of bandwidth times period
 SUGGESTED = 1 / 3
-# Times 1 / K. Of 167 touches of a real arm, which last 0.4 s, at 15 Hz 27 were found at K = 5. At
-# K = 15 99 were, and 146 at K = 100.
-MERGES = 8.0
+MERGES = DEFAULTS["detector.confirm"]  # times 1 / K: what stood there before a touch takes so long
 
 
 def bandwidths(robot: Robot, override: float | None) -> dict[float, list[str]]:

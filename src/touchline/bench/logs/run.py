@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """`touchline bench logs`."""
 
-import json
 import multiprocessing
 import os
 import tempfile
@@ -199,36 +198,27 @@ def _analysis(folder: Path, robot: Robot, minutes: float) -> str:
     log = folder / "long.parquet"
     write_table(log, samples, robot.description)
     hours = len(samples) / RATE / 3600
-    head = (
-        "analyze --report",
-        "events",
-        "CPU s",
-        "per hour",
-        "goal",
-        "clock s",
-        "per hour",
-        "goal",
-    )
-    rows: list[Row] = [(*head, "memory MB")]
+    head = ("CPU s", "per hour", "goal", "clock s", "per hour", "goal")
+    rows: list[Row] = [("analyze --report", "events", *head, "memory MB")]
     for report, (most, longest) in HOUR.items():
         # A process of its own, so that its memory and start are counted.
         context = multiprocessing.get_context("spawn")
         with ProcessPoolExecutor(1, context) as pool:
-            told = pool.submit(_analyzed, str(log), robot, str(folder / report), report).result()
-        events, spent, clock, memory = json.loads(told)
+            done = pool.submit(_analyzed, str(log), robot, str(folder / report), report)
+            events, spent, clock, memory = done.result()
         cpu = (f"{spent:.2f}", f"{spent / hours:.1f}", f"{most:g}")
         wall = (f"{clock:.2f}", f"{clock / hours:.1f}", "" if longest is None else f"{longest:g}")
         rows.append((report, str(events), *cpu, *wall, str(memory)))
     touches, joints = int(60 * minutes / TOUCH_EVERY), len(robot.joint_names)
-    told = f"{minutes:g} minutes at 1 kHz, {touches} touches, {joints} joints"
+    what = f"{minutes:g} minutes at 1 kHz, {touches} touches, {joints} joints"
     sensors = f"{len(robot.sensor_names)} sensors; {os.cpu_count()} cores"
-    return f"\n{told}, {sensors}\n{aligned(rows)}"
+    return f"\n{what}, {sensors}\n{aligned(rows)}"
 
 
-def _analyzed(log: str, robot: Robot, out: str, report: Any) -> str:
+def _analyzed(log: str, robot: Robot, out: str, report: Any) -> tuple[int, float, float, int]:
     from touchline.report.analysis import analyze
 
     began, clock = time.process_time(), time.perf_counter()
     analysis = analyze(log, robot, out, report=report)
     spent, clock = time.process_time() - began, time.perf_counter() - clock
-    return json.dumps([len(analysis.events), spent, clock, peak_megabytes()])
+    return len(analysis.events), spent, clock, peak_megabytes()
