@@ -305,6 +305,10 @@ class Detector {
     segment.learns = segment.off && still_ < tuning_.pause;
   }
 
+  bool shows_friction(std::size_t i) const {
+    return rows_[i].component < 0 && samples_[i].known && rows_[i].seen > 0.0;
+  }
+
   // Friction of the joints that are tested beside a force-torque sensor, which feels none of it.
   void follow_friction(double dt) {
     for (std::size_t g = 0; g < segments_.size(); ++g) {
@@ -312,8 +316,8 @@ class Detector {
       const bool silent = placed_ && is_silent(g);
       double most = 0.0;
       for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+        if (!shows_friction(i)) continue;
         const DetectionRow& row = rows_[i];
-        if (row.component >= 0 || !samples_[i].known || !(row.seen > 0.0)) continue;
         const double part = std::min(1.0, dt * bandwidths_[i]);
         friction_.follow(i, qd_[row.joint], part, std::min(1.0, part * per_trend_), tuning_);
         if (silent && states_.started[i] && friction_.tells(i, tuning_))
@@ -321,8 +325,8 @@ class Detector {
         most = std::max(most, friction_.shown(i, row.contact, tuning_));
       }
       for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
+        if (!shows_friction(i)) continue;
         const DetectionRow& row = rows_[i];
-        if (row.component >= 0 || !samples_[i].known || !(row.seen > 0.0)) continue;
         // A joint of which little has been seen may have as much friction as another one, or as stood
         // there when it was moving at the start.
         double other = most;
@@ -562,6 +566,13 @@ class Detector {
     return false;
   }
 
+  // By how much a row has changed within the last moments, and what motions change it by at most in them
+  // [N or Nm].
+  double quick(std::size_t i) const { return std::fabs(samples_[i].residual - states_.trend[i]); }
+  double creep(std::size_t i) const {
+    return tuning_.creep_share * std::fabs(states_.trend[i] - states_.baseline[i]);
+  }
+
   // What an event that begins now would have begun with.
   Origin origin(std::size_t g, double dt) const {
     if (segments_[g].age < tuning_.start / slowest_[g] +
@@ -569,11 +580,9 @@ class Detector {
     bool slow = true, creeps = true;
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
       if (shares_[i] < std::min(1.0, segments_[g].peak)) continue;
-      const double trend = states_.trend[i];
-      const double quick = samples_[i].residual - trend, before = trend - states_.baseline[i];
       slow = slow && rows_[i].component < 0 &&
           std::fabs(qd_[rows_[i].joint]) < tuning_.reversal_speed;
-      creeps = creeps && std::fabs(quick) < tuning_.creep_share * std::fabs(before);
+      creeps = creeps && quick(i) < creep(i);
     }
     return slow ? Origin::reversal : creeps ? Origin::creep : Origin::push;
   }
@@ -583,9 +592,7 @@ class Detector {
   bool pushed(std::size_t g) const {
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
       if (rows_[i].component < 0 || std::fabs(normalized_[i]) < limits_[i]) continue;
-      const double trend = states_.trend[i];
-      const double quick = samples_[i].residual - trend, before = trend - states_.baseline[i];
-      if (std::fabs(quick) >= tuning_.creep_share * std::fabs(before)) return true;
+      if (quick(i) >= creep(i)) return true;
     }
     return false;
   }
@@ -594,10 +601,7 @@ class Detector {
   bool steps(std::size_t g) const {
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
       if (rows_[i].component < 0 || !samples_[i].known) continue;
-      const double trend = states_.trend[i];
-      const double quick = samples_[i].residual - trend, before = trend - states_.baseline[i];
-      const double least = std::max(rows_[i].contact, tuning_.creep_share * std::fabs(before));
-      if (std::fabs(quick) > least) return true;
+      if (quick(i) > std::max(rows_[i].contact, creep(i))) return true;
     }
     return false;
   }
@@ -611,8 +615,7 @@ class Detector {
     if (s.top_wrench > 1.0 && (s.origin == Origin::push || !own_doing(g))) return false;
     if (s.lasted < tuning_.trend / slowest_[g]) return false;
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
-      const double quick = samples_[i].residual - states_.trend[i];
-      if (counts(i, Rows::wrench) && std::fabs(quick) > limits_[i] * rows_[i].contact) return true;
+      if (counts(i, Rows::wrench) && quick(i) > limits_[i] * rows_[i].contact) return true;
     }
     return false;
   }
@@ -671,7 +674,7 @@ class Detector {
   bool steady(std::size_t g, Rows which = Rows::all) const {
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
       const double most = settings_.times.release * limits_[i] * rows_[i].contact;
-      if (counts(i, which) && std::fabs(samples_[i].residual - states_.trend[i]) > most) return false;
+      if (counts(i, which) && quick(i) > most) return false;
     }
     return true;
   }
