@@ -33,6 +33,7 @@ from touchline.identify.delay import Delay, find_delays, refined, with_delays
 from touchline.identify.described import description_changes, identified_robot
 from touchline.identify.evidence import filtered, gather
 from touchline.identify.frame import FrameError, find_frames, joined, with_frames
+from touchline.identify.gain import Gain, find_gains, motor_joints, multiplied, with_gains
 from touchline.identify.identification import Identification, identify, rms
 from touchline.identify.rest import Rest, grids_of, with_rest
 from touchline.identify.rest import learn as learn_rest
@@ -49,7 +50,7 @@ SHORT = (
     "written instead: what one residual of a hundred exceeds, and the tail of normal values beyond "
     "it; how often that is exceeded only a longer recording tells"
 )
-TURNS = 2  # times that frames are looked for: the first finds them but for the square of the angle
+TURNS = 2  # times that gains and frames are looked for: the first time not all is found
 ROUNDS = 4  # of leaving out what seems to be touched
 
 
@@ -91,6 +92,7 @@ class Calibration:
         lacking: why there are none, and what was taken instead.
         delays: that were found beside it.
         frames: of sensors that were found to be off.
+        gains: of motor currents that were found to be off; None if that was not asked for.
         rest: what was learned of what is left; None if that was not asked for.
         losses: what is said of parts of the recordings that cannot be read.
     """
@@ -108,6 +110,7 @@ class Calibration:
     lacking: str = ""
     delays: tuple[Delay, ...] = ()
     frames: tuple[FrameError, ...] = ()
+    gains: tuple[Gain, ...] | None = None
     rest: Rest | None = None
     losses: tuple[str, ...] = ()
 
@@ -127,6 +130,7 @@ def calibrate(
     trust: bool = False,
     identification: bool = True,
     learn: bool = False,
+    gains: bool = False,
 ) -> Calibration:
     """Calibrates a robot and writes its new description.
 
@@ -139,6 +143,7 @@ def calibrate(
         trust: what stands out is the robot's own doing, not a contact.
         identification: of biases, friction and inertias; False takes them as described.
         learn: tables of what is left of joint torques over the joints' own motion, too.
+        gains: those of motor currents, too; loads count as described unless a sensor weighs them.
 
     Raises:
         InputError: something cannot be read or written, is too short, or shows contacts throughout.
@@ -147,6 +152,10 @@ def calibrate(
     _check(logs, out, false_alarms)
     if learn and not identification:
         raise InputError("--learn: it learns what identification leaves: leave --no-identify out")
+    if gains and not identification:
+        raise InputError("--gains: they are identified: leave --no-identify out")
+    if gains and not motor_joints(model):
+        raise InputError(f"--gains: {robot} has no joint with torque: motor")
     had_rest = any(joint.rest is not None for joint in model.description.joints)
     if learn:
         model = with_rest(model, {})
@@ -165,6 +174,7 @@ def calibrate(
     found: Identification | None = None
     left_out: list[tuple[int, float, float]] = []
     delays: list[Delay] = []
+    factors: list[Gain] = []
     frames: list[FrameError] = []
     rest: Rest | None = None
     if identification:
@@ -173,6 +183,14 @@ def calibrate(
             with naming(logs):
                 evidence = gather(model, recordings.all("equations"))
             refuse_one_pose(evidence, logs)
+            for _ in range(TURNS if gains else 0):
+                wrong = find_gains(evidence)
+                factors = multiplied(factors, wrong)
+                if not any(gain.plausible for gain in wrong):
+                    break
+                model = with_gains(model, wrong)
+                recordings = Recordings(model, logs)
+                evidence = gather(model, recordings.all("equations"))
             delays = find_delays(evidence)
             if delays:
                 prompt = with_delays(model, delays)
@@ -255,6 +273,7 @@ def calibrate(
         lacking,
         tuple(delays),
         tuple(frames),
+        tuple(factors) if gains else None,
         rest,
         tuple(losses),
     )

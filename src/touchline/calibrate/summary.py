@@ -10,6 +10,7 @@ from touchline.detector.limits import threshold
 from touchline.detector.residual_noise import residual_noise
 from touchline.detector.thresholds import make_thresholds, row_name
 from touchline.identify.frame import FrameError
+from touchline.identify.gain import LEAST, Gain
 from touchline.identify.summary import identification_lines, rest_lines
 from touchline.model.robot import Robot
 from touchline.model.values import METHODS
@@ -33,7 +34,8 @@ def summary_text(result: Calibration) -> str:
             for x in result.delays
         ]
         off = [line for frame in result.frames for line in _frame_lines(frame)]
-        parts.append(identification_lines(result.identification, late + off))
+        gains = [] if result.gains is None else _gain_lines(result.gains)
+        parts.append(identification_lines(result.identification, gains + late + off))
     if result.rest is not None:
         parts.append(rest_lines(result.rest, result.robot.joint_names))
     parts.append(_noise_lines(result))
@@ -44,6 +46,23 @@ def summary_text(result: Calibration) -> str:
         parts += [_row_lines(result), _threshold_lines(result), _held_out_lines(result)]
     parts.append([f"written: {result.out}"])
     return "\n\n".join("\n".join(lines) for lines in parts if lines)
+
+
+def _gain_lines(gains: tuple[Gain, ...]) -> list[str]:
+    """Gains of motor currents that are off."""
+    if not gains:
+        return [f"  gains: none is off by {100 * LEAST:g} % or more, as far as the data can tell"]
+    lines = []
+    for gain in gains:
+        if gain.plausible:
+            told = f"{gain.factor:.3f} +- {gain.error:.2g} times the described one"
+        else:
+            told = (
+                f"left as described: {gain.factor:.3g} times that would fit best, which no gain "
+                "is; is a load missing in the description?"
+            )
+        lines.append(f"  {gain.name}: gain {told}")
+    return lines
 
 
 def _frame_lines(frame: FrameError) -> list[str]:

@@ -282,14 +282,17 @@ def calibrated(
 
 def identify(
     *,
-    arms: tuple[Literal["sara", "sara-full", "panda", "panda-torques", "ur5", "ur10"], ...] = (
+    arms: tuple[
+        Literal["sara", "sara-full", "panda", "panda-torques", "ur5", "ur10", "ur10-currents"], ...
+    ] = (
         "sara-full",
         "panda",
         "ur10",
     ),
     kinds: tuple[
-        Literal["payload alone", "frame", "bias", "friction", "delay", "falling friction"], ...
-    ] = ("payload alone", "frame", "bias", "friction", "delay", "falling friction"),
+        Literal["payload alone", "frame", "bias", "friction", "delay", "falling friction", "gain"],
+        ...,
+    ] = ("payload alone", "frame", "bias", "friction", "delay", "falling friction", "gain"),
     runs: int = 4,
     seed: int = 0,
     data: Directory = None,
@@ -299,9 +302,11 @@ def identify(
     Example: touchline bench identify --arms sara-full --runs 10
 
     Simulated arms follow the motion of `touchline calibrate --plan`. Their inertias are 1.5 % off,
-    and they carry a payload that the model lacks. Six kinds of arms: without further errors, with
-    a sensor's frame 2 degrees and 5 mm off, a bias of 2 N, friction of 1 Nm, a delay of 5 ms, or
-    friction that falls. It falls with speed to 1 Nm, from 1.3 to 2.2 Nm.
+    and they carry a payload that the model lacks. Seven kinds of arms: without further errors, with
+    a sensor's frame 2 degrees and 5 mm off, a bias of 2 N, friction of 1 Nm, a delay of 5 ms,
+    friction that falls, or gains of currents that are off. Friction falls with speed to 1 Nm, from
+    1.3 to 2.2 Nm. Gains are 0.7 to 1.4 times the described ones, beside 1 to 5 Nm of friction in
+    each motor; then a payload is there only where a sensor weighs it.
     Each line has a figure's error and how many runs are within the goal. For real arms: what is
     left of the residuals on motion that played no part.
 

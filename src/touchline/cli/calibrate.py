@@ -22,6 +22,7 @@ def calibrate(
     trust: bool = False,
     identify: bool = True,
     learn: bool = False,
+    gains: bool = False,
     figure: Annotated[Path | None, arg(metavar="FILE")] = None,
     pictures: Annotated[Path | None, arg(metavar="DIR")] = None,
 ) -> int:
@@ -60,6 +61,9 @@ def calibrate(
         learn: Learns what physics leaves of each joint's torque, as a table over the joint's own
             position and velocity, beside the robot.yaml (NAME_rest.csv). A joint gets one only
             where that helps in time and space it has not seen. Off where nothing was seen.
+        gains: Identifies the gains of motor currents (torque: motor) as well. Describe all loads
+            first: gains and masses scale together. Only a force-torque sensor that weighs the arm
+            tells them apart.
         figure: Draws how often which statistic was exceeded, with the thresholds (.svg, .png).
         pictures: Draws residuals before and after, and friction over speed, into this folder.
     """
@@ -68,7 +72,7 @@ def calibrate(
     if plan is not None:
         beside = {"LOG": logs, "--robot": robot, "--method": method, "--trust": trust}
         beside |= {"--false-alarms": false_alarms, "--no-identify": not identify, "--learn": learn}
-        beside |= {"--figure": figure, "--pictures": pictures}
+        beside |= {"--gains": gains, "--figure": figure, "--pictures": pictures}
         if any(beside.values()):
             given = ", ".join(name for name, value in beside.items() if value)
             raise InputError(f"--plan {plan}: proposes a motion and reads none: leave {given} out")
@@ -89,7 +93,7 @@ def calibrate(
             raise InputError("--pictures: draws what was identified: leave --no-identify out")
         make_folder(pictures)
     with described(robot, logs[0] if logs else None, out) as source:
-        result = run(list(logs), source, out, method, false_alarms, trust, identify, learn)
+        result = run(list(logs), source, out, method, false_alarms, trust, identify, learn, gains)
     print(summary_text(result))
     if figure is not None:
         from touchline.calibrate.figure import draw_calibration

@@ -166,9 +166,9 @@ class Chooser:
         told = zip(problem.columns, found.values, found.errors, strict=True)
         return [c.row for c, v, e in told if c.kind == "stribeck" and abs(v) < SURE * e]
 
-    def fit_beside(self, more: tuple[Column, ...]) -> Solution:
-        """Further columns beside a payload and somewhat free inertias, with standard errors."""
-        problem = self.loaded()
+    def fit_beside(self, more: tuple[Column, ...], problem: Problem | None = None) -> Solution:
+        """Further columns beside a problem, by default the loaded one, with standard errors."""
+        problem = problem or self.loaded()
         return self.with_errors(self.fit(replace(problem, columns=(*problem.columns, *more))))
 
     def ambiguous(self) -> dict[int, float]:

@@ -152,7 +152,6 @@ def _joint(joint: JointDescription, row: int, found: Solution) -> JointDescripti
         friction=_friction(joint.friction, row, found),
         bias=_short(joint.bias + found.value("bias", row)),
         rotor_inertia=_short(joint.rotor_inertia + found.value("rotor", row)),
-        gain=_short(joint.gain * (1.0 + found.value("gain", row))),
     )
 
 

@@ -8,6 +8,7 @@ Every column has gone through the observer's own filter, so no acceleration is n
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,8 +98,7 @@ class Evidence:
                 frames are taken as here.
         """
         robot = robot or self.robot
-        bodies = np.array([body_vector(node.inertia) for node in robot.nodes])
-        left = np.einsum("nrbk,bk->nr", self.model, bodies) - self.reading
+        left = self._load(robot) - self.reading
         for j, joint in enumerate(robot.description.joints):
             law = joint.friction
             left[:, j] += joint.bias + joint.rotor_inertia * self.rotor[:, j]
@@ -114,6 +114,15 @@ class Evidence:
             first = self.joints + 6 * s
             left[:, first : first + 6] += sensor.bias
         return np.where(self.used, left, 0.0)
+
+    @cached_property
+    def load(self) -> Array:
+        """What the described inertias make of each row (N, R) [N or Nm]."""
+        return self._load(self.robot)
+
+    def _load(self, robot: Robot) -> Array:
+        bodies = np.array([body_vector(node.inertia) for node in robot.nodes])
+        return np.einsum("nrbk,bk->nr", self.model, bodies)
 
     def coulomb(self, joint: int, width: float) -> Array:
         """The column (N,) of Coulomb friction of a width [rad/s]."""

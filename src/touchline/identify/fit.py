@@ -28,8 +28,9 @@ class Column:
     """One free number that enters the equations linearly.
 
     Attributes:
-        kind: "bias", "viscous", "coulomb", "stribeck", "rotor", "gain", "turn" or "shift"; for
-            what it does to errors, "width" and "speed" of friction, per unit of their logarithm.
+        kind: "bias", "viscous", "coulomb", "stribeck", "rotor", "turn" or "shift"; "gain" for what
+            is expected more, as a part of it; for what it does to errors, "width" and "speed" of
+            friction, per unit of their logarithm.
         row: of the joint or of the sensor's axis; of `turn` and `shift` the sensor's first.
         width: of the Coulomb friction [rad/s], or of what it has more at slow speeds.
         speed: with which that falls [rad/s].
@@ -122,6 +123,13 @@ class Solution:
         for column, value in zip(self.problem.columns, self.values, strict=True):
             if (column.kind, column.row) == (kind, row):
                 return float(value)
+        return 0.0
+
+    def error(self, kind: str, row: int) -> float:
+        """1 sigma of that; 0 if it was not free."""
+        for column, error in zip(self.problem.columns, self.errors, strict=True):
+            if (column.kind, column.row) == (kind, row):
+                return float(error)
         return 0.0
 
 
@@ -321,7 +329,7 @@ def column_of(e: Evidence, column: Column, r: int) -> Array:
     if column.kind == "bias":
         return np.ones(len(e))
     if column.kind == "gain":
-        return -e.reading[:, r]
+        return e.load[:, r]
     if column.kind == "viscous":
         return e.speed[:, r]
     if column.kind == "rotor":

@@ -16,7 +16,6 @@ UNITS = {
     "coulomb": "Nm",
     "stribeck": "Nm",
     "rotor": "kg m2",
-    "gain": "",
 }
 WORDS = {
     "bias": "offset",
@@ -24,7 +23,6 @@ WORDS = {
     "coulomb": "Coulomb friction",
     "stribeck": "more of it at slow speeds (Stribeck)",
     "rotor": "rotor inertia",
-    "gain": "gain, relative",
 }
 SHORT = 20.0  # s; less is told to be little
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from touchline.arrays import Array
+from touchline.identify.gain import motor_joints
 from touchline.model.description import Friction, SensorDescription
 from touchline.model.mechanism import Inertia
 from touchline.model.perturbed import perturbed
@@ -23,7 +24,8 @@ BIAS, FRICTION, LATE = 2.0, 1.0, 5e-3  # N, Nm, s
 WIDTHS = 0.01, 0.1  # rad/s, of the Coulomb friction's tanh
 FALLING, SPEEDS = (0.3, 1.2), (0.05, 0.4)  # Nm, rad/s; how friction falls with speed, and where
 APART = 2.5  # times the width at least is that speed
-KINDS = "payload alone", "frame", "bias", "friction", "delay", "falling friction"
+GAINS, DRY = (0.7, 1.4), (1.0, 5.0)  # of currents to the described ones; Nm, their joints' friction
+KINDS = "payload alone", "frame", "bias", "friction", "delay", "falling friction", "gain"
 
 
 @dataclass(frozen=True)
@@ -48,15 +50,27 @@ class WrongArm:
     late: dict[str, float]
     turned: int = -1
 
+    @property
+    def gains(self) -> Array:
+        """Gains of the torques as they are, over the described ones (n,)."""
+        real, told = (robot.description.joints for robot in (self.real, self.robot))
+        return np.array([a.gain / b.gain for a, b in zip(real, told, strict=True)])
+
 
 def make_wrong_arm(robot: Robot, kind: str, rng: np.random.Generator) -> WrongArm:
-    """An arm with a payload that its model lacks, and one thing more."""
+    """An arm with a payload that its model lacks, and one thing more.
+
+    Gains, masses and a payload scale together: where no sensor weighs the payload, an arm whose
+    gains are off has none.
+    """
     description, k = robot.description, len(robot.sensor_names)
     mechanism = perturbed(robot.mechanism, UNKNOWN, rng)
     node, link = flange(robot)
     mass = float(rng.uniform(*MASS))
     centre = robot.mechanism.links[link].inertia.com + _direction(rng) * rng.uniform(0.0, REACH)
     body = Inertia(mass, centre, mass * 0.04**2 * np.eye(3))
+    if kind == "gain" and not k:
+        body = Inertia.zero()
     own = mechanism.links[link]
     loaded = replace(own, inertia=combine_inertias([own.inertia, body]))
     mechanism = replace(mechanism, links=mechanism.links | {link: loaded})
@@ -86,6 +100,12 @@ def make_wrong_arm(robot: Robot, kind: str, rng: np.random.Generator) -> WrongAr
     elif kind == "delay":
         torques = ["torques"] if any(joint.measured for joint in description.joints) else []
         late[str(rng.choice([*torques, *robot.sensor_names]))] = LATE
+    elif kind == "gain":
+        joints = list(description.joints)
+        for j in motor_joints(robot):
+            joints[j] = replace(joints[j], gain=joints[j].gain * float(rng.uniform(*GAINS)))
+            friction[j] = Friction(float(rng.uniform(*DRY)), 0.0, WIDTHS[0])
+        description = replace(description, joints=tuple(joints))
     return WrongArm(robot, Robot(description, mechanism), node, bias, friction, late, turned)
 
 
@@ -128,5 +148,6 @@ def record(
         loads[:, columns] = shifted[:, columns]
     for j, law in case.friction.items():
         loads[:, j] += law.dry(qd[:, j])
+    loads[:, :n] /= case.gains
     loads[:, n:] += case.bias
     return maker.sensed(q, qd, loads, rng)

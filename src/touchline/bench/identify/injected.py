@@ -2,8 +2,8 @@
 """Errors put into simulated arms: how closely `calibrate` finds them after its planned motion.
 
 Inertias are 1.5 % off the model, noise is typical, and a body that the model lacks is at the end of
-the arm. Beside it one thing more is wrong: a sensor's frame, a bias, friction or a delay. What is
-judged is the description that `touchline calibrate` writes.
+the arm. Beside it one thing more is wrong: a sensor's frame, a bias, friction, a delay or gains of
+currents. What is judged is the description that `touchline calibrate` writes.
 """
 
 import sys
@@ -23,6 +23,7 @@ from touchline.bench.tables import Row, aligned
 from touchline.calibrate.plan import Plan, make_plan
 from touchline.calibrate.run import Calibration, calibrate
 from touchline.errors import InputError
+from touchline.identify.gain import motor_joints
 from touchline.logs import write_table
 from touchline.model.description import JointDescription, SensorDescription
 from touchline.model.robot import Robot, load_robot
@@ -49,6 +50,7 @@ GOALS = {  # unit and what is required
     "friction": ("%", 5.0),
     "stribeck": ("%", 10.0),
     "claimed": ("joints", 0.0),
+    "gain": ("%", 5.0),
     "delay": ("ms", 0.2),
 }
 
@@ -91,7 +93,8 @@ def judge(case: WrongArm, plan: Plan, rng: np.random.Generator, folder: Path) ->
     log, out = folder / "log.parquet", folder / "robot.yaml"
     samples = record(case, planned(plan), float(plan.time[-1]), RATE, rng)
     write_table(log, samples, case.robot.description)
-    result = calibrate([log], case.robot.description.path or "", out)
+    off_gains = bool((case.gains != 1.0).any())
+    result = calibrate([log], case.robot.description.path or "", out, gains=off_gains)
     found = load_robot(out)
     errors = _wrench_errors(case, found, rng)
     true, own = (robot.nodes[case.payload].inertia for robot in (case.real, found))
@@ -115,13 +118,22 @@ def judge(case: WrongArm, plan: Plan, rng: np.random.Generator, folder: Path) ->
     falling = [j for j, law in case.friction.items() if law.stribeck]
     claimed = [j for j, joint in enumerate(found.description.joints) if joint.friction.stribeck]
     errors["claimed"] = float(len(set(claimed) - set(falling)))
-    for j, law in case.friction.items():
+    for j, law in ({} if off_gains else case.friction).items():
         friction = found.description.joints[j].friction
         if law.stribeck:
             told["stribeck"] = friction.stribeck > 0.0
             errors["stribeck"] = 100.0 * abs(friction.stribeck / law.stribeck - 1.0)
         else:
             errors["friction"] = 100.0 * abs(friction.coulomb / law.coulomb - 1.0)
+    if off_gains:
+        written = {gain.name for gain in result.gains or () if gain.plausible}
+        pairs = zip(found.description.joints, case.real.description.joints, strict=True)
+        told["gain"] = bool(written)
+        errors["gain"] = max(
+            100.0 * abs(own.gain / true.gain - 1.0)
+            for own, true in pairs
+            if own.name in written or not written
+        )
     for name, late in case.late.items():
         delay = _delay(found.description.joints, found.description.sensors, name)
         errors["delay"] = 1e3 * abs(delay - late)
@@ -205,7 +217,7 @@ def main(arms: Sequence[str], kinds: Sequence[str], runs: int, seed: int) -> int
         figures: dict[str, list[Figure]] = {name: [] for name in GOALS}
         felt: dict[str, list[Detected]] = {"before": [], "after": []}
         for i, kind in enumerate(KINDS):
-            if kind not in kinds:
+            if kind not in kinds or (kind == "gain" and not motor_joints(robot)):
                 continue
             for run in range(runs):
                 rng = np.random.default_rng((seed, i, run))
@@ -233,6 +245,7 @@ def main(arms: Sequence[str], kinds: Sequence[str], runs: int, seed: int) -> int
     print(f"What calibrate finds after its planned motion, {runs} arms of each kind:")
     print(aligned(lines, (0, 1)))
     print("claimed: joints whose friction is said to fall with speed, but does not.")
+    print("gain: of the joints whose gain is told, the worst; of all where none is.")
     print("told: calibrate claims to know it. Biases that it calls mass or bias are left out.")
     for line in refused:
         print(f"refused, so nothing was written: {line}")

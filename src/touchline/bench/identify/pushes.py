@@ -133,6 +133,6 @@ def _pushed(
         pushing = size[:, None] * way
         about_origin = np.hstack([pushing, np.cross(at, pushing)])
         loads = contact_loads(robot, s.q[rows], link, about_origin)
-        tau[rows] -= loads.torque
+        tau[rows] -= loads.torque / [joint.gain for joint in robot.description.joints]
         wrench[rows] -= loads.wrench
     return replace(s, tau=tau, wrench=wrench)
