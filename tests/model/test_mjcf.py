@@ -249,6 +249,11 @@ def test_a_mass_from_a_missing_mesh_is_an_error(tmp_path):
         load_mechanism(write(tmp_path, body, MESH))
 
 
+def test_a_missing_mesh_that_no_geom_uses_is_no_matter(tmp_path):
+    body = f'<body name="b">{INERTIAL}<geom size=".1"/></body>'
+    assert load_mechanism(write(tmp_path, body, MESH)).warnings == ()
+
+
 def test_other_meshes_are_kept_where_one_is_missing(tmp_path, monkeypatch):
     """The path is relative, as on a command line."""
     folder = tmp_path / "arm"

@@ -46,9 +46,8 @@ def _compiled(mujoco: Any, path: Path) -> tuple[Any, list[LostMesh]]:
         message = " ".join(str(error).split())
     try:
         spec = mujoco.MjSpec.from_file(str(path))
-        lost = _leave_out_meshes(spec, path)
-        if lost:
-            return spec.compile(), lost
+        lost = _leave_out_meshes(spec, path)  # none where no geom is made of a missing mesh
+        return spec.compile(), lost
     except InputError:
         raise
     except ValueError as error:
