@@ -235,4 +235,5 @@ def _first_with_mass(mechanism: Mechanism) -> str:
 
 
 def _told(sensor: FoundSensor) -> str:
-    return f"sensor {sensor.name} ({sensor.source}) carries {sensor.link}: {sensor.why}"
+    source = sensor.source or ", ".join(sensor.columns.values())
+    return f"sensor {sensor.name} ({source}) carries {sensor.link}: {sensor.why}"
