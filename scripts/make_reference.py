@@ -265,9 +265,10 @@ def logs() -> str:
         + NOTE
         + "A table is Parquet, CSV or CSV.gz, with one row per sample. Other column names are "
         "given under `log` in [robot.yaml](robot_yaml.md). Columns that are not listed here are "
-        "left alone. Those from `arrival` on are written by `touchline live --record`. Joints with "
-        "`torque: none` and axes that a sensor lacks need no column. An empty cell is not measured. "
-        "A signal slower than the rows must be interpolated to them; in a rosbag2 this is done.\n\n"
+        "left alone. Those from `arrival` on are written by `touchline live --record`. Joints "
+        "with `torque: none` and axes that a sensor lacks need no column. An empty cell "
+        "is not measured. A signal slower than the rows must be interpolated to them; in a "
+        "rosbag2 this is done.\n\n"
         + table(
             "column|type|unit|if missing|meaning", ([f"`{c}`", *rest] for c, *rest in LOG_COLUMNS)
         )

@@ -11,7 +11,8 @@ from touchline.simulation.places import PlaceFinder
 from touchline.simulation.scene import Run, make_plant
 from touchline.simulation.sensing import sense
 from touchline.simulation.setup import read_setup
-from touchline.simulation.simulator import Rates, run
+from touchline.simulation.simulator import Rates
+from touchline.simulation.simulator import run as simulate
 from touchline.simulation.touchable import structure_links
 from touchline.trials.scene import FRICTION, arm_and_skin
 from touchline.trials.touches import TouchSampler, resting_signals
@@ -123,7 +124,7 @@ def yielding(seed, robot, plant):
     plant.reset(q, time=-1.0 / settings.rate)
     springs = JointSprings(q, np.full(len(q), 30.0), np.full(len(q), 6.0))
     rates = Rates(settings.rate, settings.control)
-    readings, _ = run(plant, springs, [ScriptedForces([contact])], 1.7, rates)
+    readings, _ = simulate(plant, springs, [ScriptedForces([contact])], 1.7, rates)
     return robot.body_of(place.link).name, sense(robot, readings, settings.noise, rng)
 
 

@@ -292,7 +292,7 @@ def test_a_joint_without_position_and_velocity_is_not_made_up():
 
 
 def test_a_wild_position_comes_back_in_a_recording_of_short_parts():
-    """Where the joint stands after a pause nobody knows: no way since the fault speaks against it."""
+    """Where a joint stands after a pause nobody knows: nothing speaks against what it reports."""
     s = in_motion("ur5")
     rng = np.random.default_rng(2)
     s.q[AT : AT + 100, 2] += rng.uniform(0.5, 3.0, 100)

@@ -11,13 +11,18 @@ from touchline.result.kinds import Fault
 def test_faults_are_counted_over_parts():
     faulty = FaultyChannels()
     time = np.arange(1000) / 1000.0
-    spike, wild = (FaultChange(i, "q.a", f, 2.0) for i, f in ((900, Fault.SPIKE), (905, Fault.WILD)))
+    spike = FaultChange(900, "q.a", Fault.SPIKE, 2.0)
+    wild = FaultChange(905, "q.a", Fault.WILD, 2.0)
     faulty.add(time, [FaultChange(10, "tau.b", Fault.SPIKE, 2.0), spike, wild])
     faulty.add(time + 1.0, [FaultChange(0, "tau.b", Fault.NONE, 0.0)])
-    assert faulty.lines() == faulty.lines() == [
-        "q.a: not believed in 55 % of the samples, first at 0.900 s, most often wild",
-        "tau.b: not believed in 49.5 % of the samples, first at 0.010 s, most often spike",
-    ]
+    assert (
+        faulty.lines()
+        == faulty.lines()
+        == [
+            "q.a: not believed in 55 % of the samples, first at 0.900 s, most often wild",
+            "tau.b: not believed in 49.5 % of the samples, first at 0.010 s, most often spike",
+        ]
+    )
 
 
 def test_single_spikes_and_long_lists_are_not_told():

@@ -108,7 +108,7 @@ def package_folder(package: str, folder: Path, package_dirs: Sequence[Path] = ()
     roots += [Path(entry) for entry in package_dirs if _is_package(Path(entry), package)]
     for root in (*roots, *_around(package, folder), *installed_shares(package)):
         if root.is_dir():
-            return root.absolute()  # xacro would take a relative one from the including file's folder
+            return root.absolute()  # a relative one xacro takes from the including file's folder
     raise _missing(package, package_dirs)
 
 

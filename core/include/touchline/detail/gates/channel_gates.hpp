@@ -373,7 +373,7 @@ class ChannelGates {
   }
 
   // A wild channel comes back after some usual steps; a position after the way that its joint has
-  // come by its speed, or for good as another one: at once where that way is not known any more.
+  // come by its speed, or for good as another one. Where that way is not known any more it waits less.
   void wait_for_calm(std::size_t c) {
     const bool calm = ratio_[c] <= 1.0 && lives(c, last_[c]);
     if (c < at_.qd()) {
