@@ -52,9 +52,9 @@ LOG_COLUMNS = [
     ),
     ("q.JOINT", "number", "rad or m", "required", "Position of an observed joint."),
     ("qd.JOINT", "number", "rad/s or m/s", "estimated from q", "Velocity."),
-    ("tau.JOINT", "number", "Nm or N", "NaN: not measured", "Torque, as `joints[].torque` says."),
-    ("SENSOR.fx, .fy, .fz", "number", "N", "NaN: not measured", "Force, in the sensor's frame."),
-    ("SENSOR.mx, .my, .mz", "number", "Nm", "NaN: not measured", "Moment about its origin."),
+    ("tau.JOINT", "number", "Nm or N", "required", "Torque, as `joints[].torque` says."),
+    ("SENSOR.fx, .fy, .fz", "number", "N", "required", "Force, in the sensor's frame."),
+    ("SENSOR.mx, .my, .mz", "number", "Nm", "required", "Moment about its origin."),
     ("truth.contact.K.link", "whole number", "", "none", "Link in `truth.links`; of a simulation."),
     ("truth.contact.K.x, .y, .z", "number", "m", "none", "Place in world; of a simulation."),
     ("truth.contact.K.fx, .fy, .fz", "number", "N", "none", "Force in world; of a simulation."),
@@ -265,7 +265,10 @@ def logs() -> str:
         + NOTE
         + "A table is Parquet, CSV or CSV.gz, with one row per sample. Other column names are "
         "given under `log` in [robot.yaml](robot_yaml.md). Columns that are not listed here are "
-        "left alone. Those from `arrival` on are written by `touchline live --record`.\n\n"
+        "left alone. Those from `arrival` on are written by `touchline live --record`. Joints "
+        "with `torque: none` and axes that a sensor lacks need no column. An empty cell "
+        "is not measured. A signal slower than the rows must be interpolated to them; in a "
+        "rosbag2 this is done.\n\n"
         + table(
             "column|type|unit|if missing|meaning", ([f"`{c}`", *rest] for c, *rest in LOG_COLUMNS)
         )

@@ -5,6 +5,15 @@ import numpy as np
 import pytest
 
 from touchline.pipeline.pipeline import Pipeline
+from touchline.simulation.contacts import Profile, ScriptedContact, ScriptedForces
+from touchline.simulation.control import JointSprings, hold
+from touchline.simulation.places import PlaceFinder
+from touchline.simulation.scene import Run, make_plant
+from touchline.simulation.sensing import sense
+from touchline.simulation.setup import read_setup
+from touchline.simulation.simulator import Rates
+from touchline.simulation.simulator import run as simulate
+from touchline.simulation.touchable import structure_links
 from touchline.trials.scene import FRICTION, arm_and_skin
 from touchline.trials.touches import TouchSampler, resting_signals
 
@@ -102,3 +111,31 @@ def test_the_contact_at_hand_and_its_event_name_the_same_body():
         assert region.probability.sum() == pytest.approx(1.0)
         assert on_body == pytest.approx(contact.body_probability, abs=0.05)
     assert placed >= 3
+
+
+def yielding(seed, robot, plant):
+    """The body that is pushed for half a second, and signals of an arm held as by weak springs."""
+    setup, settings = read_setup(robot), Run(physics=1000.0)
+    rng = np.random.default_rng([15, seed])
+    q = rng.uniform(setup.lower, setup.upper)
+    place = PlaceFinder(robot, hold(q), rng).find(structure_links(robot), 0.7, 1.4)
+    push, profile = 20.0 * place.direction, Profile(0.7, 0.5, 0.1, 0.1)
+    contact = ScriptedContact(place.link, place.at.point, push, profile)
+    plant.reset(q, time=-1.0 / settings.rate)
+    springs = JointSprings(q, np.full(len(q), 30.0), np.full(len(q), 6.0))
+    rates = Rates(settings.rate, settings.control)
+    readings, _ = simulate(plant, springs, [ScriptedForces([contact])], 1.7, rates)
+    return robot.body_of(place.link).name, sense(robot, readings, settings.noise, rng)
+
+
+def test_what_is_left_when_an_arm_springs_back_is_no_evidence():
+    robot, skin = arm_and_skin("panda-torques", 1)
+    plant, right = make_plant(robot, Run(physics=1000.0)), []
+    for seed in range(16):
+        body, s = yielding(seed, robot, plant)
+        pipeline = Pipeline(robot, period=1e-3, skin=skin)
+        pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+        right += [event.body == body for event in pipeline.events if event.detected < 1.5]
+    print(f"right {np.mean(right):.2f} of {len(right)}")
+    assert len(right) >= 12
+    assert np.mean(right) >= 0.8

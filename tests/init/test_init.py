@@ -140,6 +140,8 @@ def table(joints, q="q.{}", qd="qd.{}", tau="tau.{}", time="time", step=1e-3, ex
         ({"time": "Time", "step": 1.0}, {"time": {"column": "Time", "factor": 1e-3}}),
         ({"time": "timestamp", "step": 1e6}, {"time": {"column": "timestamp", "factor": 1e-9}}),
         ({"time": "t"}, {"time": "t"}),
+        ({"time": "stamp_ms", "step": 1.0}, {"time": {"column": "stamp_ms", "factor": 1e-3}}),
+        ({"time": "Time [s]"}, {"time": "Time [s]"}),
         ({"tau": "tau_J{i}"}, {"tau": "tau_J{i}"}),
         ({"q": "Position{i1}"}, {"q": "Position{i1}"}),
         ({"q": "actual_q_{i}", "qd": "dq[{i}]"}, {"q": "actual_q_{i}", "qd": "dq[{i}]"}),

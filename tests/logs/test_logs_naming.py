@@ -67,6 +67,13 @@ def test_factors():
     assert naming.sensors["wrist"]["mz"] == Column("w_mz", 9.81)
 
 
+def test_a_list_has_a_column_for_each_axis():
+    log = {"sensors": {"base": ["Fx", {"column": "Fy", "factor": 9.81}, "Fz", "Tx", "Ty", "Tz"]}}
+    base = parse_naming(describe(["a"], ["base"], log)).sensors["base"]
+    assert base["fx"] == Column("Fx") and base["fy"] == Column("Fy", 9.81)
+    assert [base[axis].name for axis in ("mx", "my", "mz")] == ["Tx", "Ty", "Tz"]
+
+
 def test_factors_are_applied(tmp_path):
     log = {"time": {"column": "ms", "factor": 0.001}, "tau": {"factor": -2.0}}
     log["sensors"] = {"hand": {"column": "{sensor}_{axis}", "factor": 10.0}}
@@ -100,6 +107,7 @@ def test_topics():
         ({"tau": {"factor": 0}}, "must be a number other than 0"),
         ({"sensors": {"bose": "x"}}, "log.sensors: unknown key 'bose'; known: base (did you"),
         ({"sensors": {"base": {"Fx": "x", "fy": "y"}}}, "log.sensors.base: unknown key 'Fx'"),
+        ({"sensors": {"base": ["x"]}}, "log.sensors.base: has 1 columns for 6 axes"),
         ({"sensors": {"base": "ft"}}, "column 'ft' is used for fx of base, fy of base"),
         ({"topics": {"joints": "/x"}}, "log.topics: unknown key 'joints'"),
         ({"topics": {"wrench": {"base": 1}}}, "log.topics.wrench.base: must be a name, not 1"),

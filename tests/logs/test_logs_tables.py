@@ -278,6 +278,7 @@ def test_one_missing_torque(tmp_path):
     header = COLUMNS.replace("tau.j2", "torque2")
     text = problems(write_csv(tmp_path / "log.csv", *rows(3), header=header))
     assert "missing column 'tau.j2'" in text and "no joint torques" not in text
+    assert text.endswith("; joints without a torque signal have `torque: none`")
 
 
 @pytest.mark.parametrize("ending", ["csv", "parquet"])

@@ -249,6 +249,32 @@ def test_a_mass_from_a_missing_mesh_is_an_error(tmp_path):
         load_mechanism(write(tmp_path, body, MESH))
 
 
+def test_a_missing_mesh_that_no_geom_uses_is_no_matter(tmp_path):
+    body = f'<body name="b">{INERTIAL}<geom size=".1"/></body>'
+    assert load_mechanism(write(tmp_path, body, MESH)).warnings == ()
+
+
+def test_other_meshes_are_kept_where_one_is_missing(tmp_path, monkeypatch):
+    """The path is relative, as on a command line."""
+    folder = tmp_path / "arm"
+    (folder / "meshes").mkdir(parents=True)
+    corners = "v 0 0 0\nv .1 0 0\nv 0 .2 0\nv 0 0 .3\n"
+    (folder / "meshes" / "tet.obj").write_text(corners + "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n")
+    body = f"""<body name="b">{INERTIAL}<geom type="mesh" mesh="m"/></body>
+        <body name="c" pos="1 0 0"><geom type="mesh" mesh="tet"/></body>"""
+    assets = '<compiler meshdir="meshes"/>' + MESH.replace("/>", '/><mesh file="tet.obj"/>', 1)
+    write(folder, body, assets)
+    monkeypatch.chdir(tmp_path)
+    mechanism = load_mechanism("arm/robot.xml")
+    (warning,) = mechanism.warnings
+    assert "gone.stl" in warning and "arm/arm" not in warning
+    assert len(mechanism.links["c"].collision) == 1
+    (folder / "meshes" / "tet.obj").unlink()
+    with pytest.raises(InputError) as error:
+        load_mechanism("arm/robot.xml")
+    assert str(error.value).count("robot.xml") == 1
+
+
 def test_a_truncated_mesh_is_a_warning(tmp_path):
     (tmp_path / "gone.stl").write_bytes(b"\0" * 80 + b"\5\0\0\0")
     body = f'<body name="b">{INERTIAL}<geom type="mesh" mesh="m"/></body>'

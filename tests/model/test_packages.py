@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from touchline.model import packages
-from touchline.model.packages import PackageMissingError, resolve
+from touchline.model.packages import PackageMissingError, package_folder, resolve
 
 
 @pytest.fixture
@@ -94,3 +95,11 @@ sys.exit(f"imported: {heavy}" if heavy else 0)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_folder_is_absolute_where_package_dirs_is_not(tmp_path, monkeypatch):
+    """Else xacro would look for it from the including file's folder."""
+    (tmp_path / "ws" / "arm").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path)
+    found = package_folder("arm", Path("ws/arm/urdf"), [Path("ws")])
+    assert found == tmp_path / "ws" / "arm"

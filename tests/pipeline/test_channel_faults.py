@@ -289,3 +289,22 @@ def test_a_joint_without_position_and_velocity_is_not_made_up():
     assert np.all(estimate.health[AT : AT + 100] & tl.Health.MISSING)
     assert np.isfinite(estimate.segment_wrench[-1]).all()
     assert {c.sample for c in pipeline.faults if c.fault == tl.Fault.NONE} == {AT + 100}
+
+
+def test_a_wild_position_comes_back_in_a_recording_of_short_parts():
+    """Where a joint stands after a pause nobody knows: nothing speaks against what it reports."""
+    s = in_motion("ur5")
+    rng = np.random.default_rng(2)
+    s.q[AT : AT + 100, 2] += rng.uniform(0.5, 3.0, 100)
+    pipeline = tl.Pipeline(robot_named("ur5"))
+    parts = 6
+    for part in range(parts):  # of 0.4 s, 1 s apart, each in a posture of its own
+        rows = slice(AT - 400, AT + 50) if part == 0 else slice(AT + 100, AT + 500)
+        time = s.time[rows] + 1.4 * part
+        q = s.q[rows] + 0.3 * part * np.ones(6)
+        tau, wrench = exact_loads(robot_named("ur5"), time, q, s.qd[rows])
+        pipeline.run(time, q, s.qd[rows], tau, wrench)
+        wild = [c.channel for c in pipeline.faults if c.fault == "wild"]
+        assert part > 0 or wild == ["q.elbow_joint"]
+    result = pipeline.update(time[-1] + 1e-3, q[-1], s.qd[rows][-1], tau[-1], wrench[-1])
+    assert result.faults == ()

@@ -13,6 +13,7 @@ from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
 
 ENOUGH = 50  # samples before a constant signal is called dead
+MOST = 40.0  # %; a signal at half the rate of the rows misses half, drop-outs hardly so much
 FEW = 0.005  # of the samples may be missing, late or at the end of the range
 RUN = 5  # samples in a row with exactly one value: held, where noise would change them
 STUCK = 100  # samples in a row, and none so long elsewhere, before a live signal is called stuck
@@ -140,7 +141,8 @@ class SignalTable:
             findings.find(f"{column}: no value in the whole recording")
         elif self.missing[i] > few:
             share = 100 * self.missing[i] / self.samples
-            findings.find(f"{column}: missing in {share:.1f} % of the samples")
+            slow = "; interpolate what is sampled more slowly than the rows" if share > MOST else ""
+            findings.find(f"{column}: missing in {share:.1f} % of the samples{slow}")
         if self.infinite[i]:
             findings.find(f"{column}: infinite in {self.infinite[i]} samples")
         if self.at_range[i] <= few:

@@ -13,7 +13,7 @@ from touchline.model.description import AXES
 from touchline.model.guess import force_torque_links
 from touchline.model.mechanism import Mechanism
 
-TIME = ("time", "timestamp", "stamp", "t", "seconds", "time_s", "timestamp_s")
+TIME = re.compile(r"(time|timestamp|stamp|t|seconds)[ _(\[]*(s|sec|ms|us|ns)?[)\]]?", re.I)
 NAMES = {
     "q": ("q", "pos", "position", "positions", "joint_position", "actual_q", "q_actual"),
     "qd": ("qd", "dq", "vel", "velocity", "velocities", "joint_velocity", "actual_qd", "qdot"),
@@ -132,7 +132,7 @@ def _in_table(
 
 
 def _time(columns: dict[str, np.ndarray], log: dict[str, Any], statements: list[str]) -> None:
-    names = [name for name in columns if name.lower() in TIME]
+    names = [name for name in columns if TIME.fullmatch(name)]
     if not names:
         statements.append("no column was recognized as the time")
         return
@@ -235,4 +235,5 @@ def _first_with_mass(mechanism: Mechanism) -> str:
 
 
 def _told(sensor: FoundSensor) -> str:
-    return f"sensor {sensor.name} ({sensor.source}) carries {sensor.link}: {sensor.why}"
+    source = sensor.source or ", ".join(sensor.columns.values())
+    return f"sensor {sensor.name} ({source}) carries {sensor.link}: {sensor.why}"

@@ -115,7 +115,8 @@ def _missing_problems(
         problems.append(
             f"{path}: missing column {pick.column.name!r}{did_you_mean(pick.column.name, present)}"
         )
-    problems.append(
-        f"{path}: columns present: {listing(present)}; other names are given under `log`"
-    )
+    told = "other names are given under `log`"
+    if any(pick.signal == "tau" for pick in missing):
+        told += "; joints without a torque signal have `torque: none`"
+    problems.append(f"{path}: columns present: {listing(present)}; {told}")
     return problems

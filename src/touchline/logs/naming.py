@@ -13,6 +13,7 @@ where the factor turns logged units into SI and may be negative.
       sensors:
         SENSOR: COLUMN                   # a pattern with {axis} and perhaps {sensor}
         OTHER: {fx: COLUMN, ...}         # or by axis; `factor` beside them counts for all
+        THIRD: [COLUMN, ...]             # or one per axis, in the order of the sensor's `axes`
       topics:                            # rosbag2
         joint_states: /joint_states
         wrench: {SENSOR: /topic, ...}
@@ -149,7 +150,12 @@ def _sensor_columns(
 ) -> dict[str, Column]:
     key, default = f"log.sensors.{sensor}", "{sensor}.{axis}"
     shared, entries = 1.0, dict.fromkeys(axes, value)
-    if isinstance(value, dict) and not value.keys() <= {"column", "factor"}:
+    if isinstance(value, list):
+        if len(value) != len(axes):
+            reader.problem(key, f"has {len(value)} columns for {len(axes)} axes")
+            value = [None] * len(axes)
+        entries = dict(zip(axes, value, strict=True))
+    elif isinstance(value, dict) and not value.keys() <= {"column", "factor"}:
         by_axis = reader.mapping(key, value, [*axes, "factor"])
         shared = reader.factor(key, by_axis.pop("factor", 1.0))
         entries = {axis: by_axis.get(axis) for axis in axes}

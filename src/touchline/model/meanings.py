@@ -263,7 +263,7 @@ MEANINGS: dict[str, tuple[str, str, str]] = {
     "log.sensors": (
         "mapping SENSOR: column pattern",
         "N, Nm",
-        "Wrenches; `{axis}` stands for fx to mz; or a column for each axis.",
+        "Wrenches; `{axis}` stands for fx to mz; or a list with a column for each axis.",
     ),
     "log.topics": (
         "mapping",

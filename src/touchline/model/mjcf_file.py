@@ -46,9 +46,10 @@ def _compiled(mujoco: Any, path: Path) -> tuple[Any, list[LostMesh]]:
         message = " ".join(str(error).split())
     try:
         spec = mujoco.MjSpec.from_file(str(path))
-        lost = _leave_out_meshes(spec, path)
-        if lost:
-            return spec.compile(), lost
+        lost = _leave_out_meshes(spec, path)  # none where no geom is made of a missing mesh
+        return spec.compile(), lost
+    except InputError:
+        raise
     except ValueError as error:
         message = " ".join(str(error).split())
     raise InputError(f"{path}: MuJoCo cannot read it: {message}") from None
@@ -60,7 +61,7 @@ def _leave_out_meshes(spec: Any, path: Path) -> list[LostMesh]:
     for index, body in enumerate(spec.bodies):
         body.name = body.name or f"body_{index}"
     for mesh in [mesh for mesh in spec.meshes if mesh.file]:
-        problem = _problem(spec, mesh.file, path)
+        problem = _problem(spec, mesh.file)
         if problem is None:
             continue
         for geom in [geom for geom in spec.geoms if geom.meshname == mesh.name]:
@@ -76,7 +77,8 @@ def _leave_out_meshes(spec: Any, path: Path) -> list[LostMesh]:
     return lost
 
 
-def _problem(spec: Any, file: str, path: Path) -> str | None:
-    found = path.parent / (spec.modelfiledir or "") / (spec.meshdir or "") / file
+def _problem(spec: Any, file: str) -> str | None:
+    """Return what is wrong with a mesh; the model's folder is as given, maybe relative."""
+    found = Path(spec.modelfiledir or "") / (spec.meshdir or "") / file
     problem = mesh_problem(found) if found.is_file() else f"no such file: {found}"
     return f"mesh '{file}': {problem}" if problem else None

@@ -99,7 +99,7 @@ def _resolve_package(rest: str, folder: Path, package_dirs: Sequence[Path]) -> P
 
 
 def package_folder(package: str, folder: Path, package_dirs: Sequence[Path] = ()) -> Path:
-    """Return the folder of a package, as `$(find NAME)` of a xacro in `folder` means it.
+    """Return the absolute folder of a package, as `$(find NAME)` of a xacro in `folder` means it.
 
     Raises:
         PackageMissingError: it is nowhere.
@@ -108,7 +108,7 @@ def package_folder(package: str, folder: Path, package_dirs: Sequence[Path] = ()
     roots += [Path(entry) for entry in package_dirs if _is_package(Path(entry), package)]
     for root in (*roots, *_around(package, folder), *installed_shares(package)):
         if root.is_dir():
-            return root
+            return root.absolute()  # a relative one xacro takes from the including file's folder
     raise _missing(package, package_dirs)
 
 

@@ -35,6 +35,7 @@ from touchline.report.event_pictures import EventPoses
 from touchline.report.event_windows import EventWindows
 from touchline.report.facts import watch_warnings
 from touchline.report.faint import faint_lines
+from touchline.report.faulty import FaultyChannels
 from touchline.report.outcome import Analysis, Report
 from touchline.report.outputs import (
     ANALYSIS,
@@ -47,6 +48,7 @@ from touchline.report.outputs import (
 )
 from touchline.report.statistics import Statistics
 from touchline.result.event import Event
+from touchline.result.fault import FaultChange
 from touchline.result.kinds import Watch
 from touchline.result.standing import standing_lines, unlike_told
 
@@ -133,6 +135,7 @@ def analyze_as(
             warnings = bandwidth_warnings(bandwidths(model, bandwidth), run.period)
             warnings += [*recording.warnings, *model.warnings, *run.pipeline.skin.lost]
             warnings += watch_warnings(model, run.statistics)
+            warnings += run.faulty.lines()
             warnings += standing_lines(run.pipeline.standing)
             warnings += [f"check: {line}" for line in found]
             analysis = run.finish(log, out, method, bandwidth, warnings, recording.losses)
@@ -220,6 +223,7 @@ class _Part:
     watch: NDArray[np.int8]
     contacts: ContactTable
     events: list[Event]
+    faults: tuple[FaultChange, ...]
 
 
 def _ahead(parts: Iterator[_Part], threads: int) -> Iterator[_Part]:
@@ -250,6 +254,7 @@ class _Run:
         robot = pipeline.robot
         self._outputs = Outputs(draft, robot, pipeline.skin)
         self.statistics = Statistics.of(len(robot.joint_names), len(robot.segment_names))
+        self.faulty = FaultyChannels()
         self._curves = Curves(pipeline, self.period, beside)
         self._poses = EventPoses()
         columns = {
@@ -262,13 +267,15 @@ class _Run:
         """Lead the next samples through the pipeline."""
         pipeline, signals = self.pipeline, (samples.q, samples.qd, samples.tau, samples.wrench)
         found = pipeline.run(samples.time, *signals)
-        return _Part(samples, *found, pipeline.watch, pipeline.contacts, pipeline.events)
+        told = pipeline.watch, pipeline.contacts, pipeline.events, pipeline.faults
+        return _Part(samples, *found, *told)
 
     def add(self, part: _Part) -> Mask:
         """Keep what there is to tell of a part; returns (N,) whether something was felt at each."""
         samples, events, time = part.samples, part.events, part.samples.time
         estimate, detection = part.estimate, part.detection
         self.statistics.add(time, estimate, detection, part.watch)
+        self.faulty.add(time, part.faults)
         if self._report != "none":
             values = self._curves.values(samples, estimate, detection)
             self._curves.traces.add(time, values)

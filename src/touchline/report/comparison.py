@@ -33,17 +33,23 @@ def compare_log(events: Sequence[Event], log: Path) -> list[Comparison]:
 
 
 def compare(events: Sequence[Event], truth: Sequence[TrueContact]) -> list[Comparison]:
-    """Finds for each true contact the event nearest to it among those of its time."""
-    left = list(events)
-    comparisons = []
-    for contact in truth:
-        begin, end = contact.time[0], contact.time[-1]
-        near = [e for e in left if begin <= e.detected <= min(end, begin + MATCH)]
-        event = min(near, key=lambda e: _mismatch(contact, e), default=None)
-        if event is not None:
-            left.remove(event)
-        comparisons.append(_comparison(contact, event))
-    return comparisons
+    """Finds for each true contact the event nearest to it among those of its time.
+
+    The nearest pairs are found first, so that no contact takes the event of another.
+    """
+    pairs = [
+        (_mismatch(contact, event), row, event)
+        for row, contact in enumerate(truth)
+        for event in events
+        if contact.time[0] <= event.detected <= min(contact.time[-1], contact.time[0] + MATCH)
+    ]
+    found: dict[int, Event] = {}
+    taken: set[int] = set()
+    for _, row, event in sorted(pairs, key=lambda pair: pair[0]):
+        if row not in found and event.id not in taken:
+            found[row] = event
+            taken.add(event.id)
+    return [_comparison(contact, found.get(row)) for row, contact in enumerate(truth)]
 
 
 def _mismatch(contact: TrueContact, event: Event) -> float:

@@ -373,13 +373,13 @@ class ChannelGates {
   }
 
   // A wild channel comes back after some usual steps; a position after the way that its joint has
-  // come by its speed, or for good as another one.
+  // come by its speed, or for good as another one. Where that way is not known any more it waits less.
   void wait_for_calm(std::size_t c) {
     const bool calm = ratio_[c] <= 1.0 && lives(c, last_[c]);
     if (c < at_.qd()) {
       if (near(c)) return take(c);
       since_[c] = calm ? since_[c] + 1 : 0;
-      if (since_[c] >= return_) take(c);
+      if (since_[c] >= (blind_[c] < tuning_.way_blind ? return_ : tuning_.good)) take(c);
       return;
     }
     if (!calm && c < at_.tau()) drift_[c - at_.qd()] = 0.0;

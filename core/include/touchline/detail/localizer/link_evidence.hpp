@@ -69,7 +69,7 @@ class LinkEvidence {
   // A touch begins.
   void begin() {
     resting_.end();
-    weight_ = 0.0;
+    weight_ = peak_ = 0.0;
     known_ = walking_ = false;
     ++revision_;
   }
@@ -100,7 +100,8 @@ class LinkEvidence {
     return last >= 0 && segments[last].sensor < 0 ? last : -1;
   }
 
-  // The mean of the step and of the posture, strong samples weighing most.
+  // The mean of the step and of the posture, of samples that are not much weaker than those before. An
+  // arm that yields springs back when a push ends: what is left speaks of another posture and no touch.
   void add(const double* torque, const double* q) {
     double square = 0.0, way = 0.0;
     for (std::size_t j = 0; j < mean_.size(); ++j) {
@@ -108,8 +109,10 @@ class LinkEvidence {
       square += step_[j] * step_[j];
       if (weight_ > 0.0) way = std::max(way, std::fabs(q[j] - q_[j]));
     }
-    weight_ *= std::max(0.0, 1.0 - period_ / settings_.step_memory) *
-               std::exp(-way / settings_.turned);
+    const double kept = std::max(0.0, 1.0 - period_ / settings_.step_memory);
+    peak_ = std::max(kept * peak_, square);
+    if (square < settings_.strong_share * settings_.strong_share * peak_) return;
+    weight_ *= kept * std::exp(-way / settings_.turned);
     weight_ += square;
     const double part = weight_ > 0.0 ? square / weight_ : 1.0;
     for (std::size_t j = 0; j < mean_.size(); ++j) {
@@ -242,7 +245,7 @@ class LinkEvidence {
 
   // The step [Nm] and the posture, as means.
   std::vector<double> mean_, q_, step_;
-  double weight_ = 0.0;
+  double weight_ = 0.0, peak_ = 0.0;  // the sum of squares, and the largest of late [Nm2]
 
   // The walk at hand: the step that it weighs, the rows, and what has been found.
   std::vector<double> walked_, covariance_, design_, sums_;  // the covariance: its factor
