@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
 #include <cstring>
 #include <limits>
 #include <memory>
@@ -135,17 +134,16 @@ class Mesh {
   }
 
   // The point of the surface nearest to `p`, if nearer than `limit`. `near`: the place of a triangle
-  // that may be near: then there is less to search.
-  SurfacePoint nearest_to_point(const Vec3& p,
-                                double limit = std::numeric_limits<double>::infinity(),
-                                int near = -1) const {
+  // that may be near: then there is less to search. `looked` grows by the number of places that were
+  // looked into: what it took, on any machine.
+  SurfacePoint nearest_to_point(const Vec3& p, double limit, int near, int& looked) const {
     SurfacePoint best;
     best.distance = limit;
     if (empty()) return best;
     if (near >= 0) {
       const Triangle& tri = triangles()[near];
-      if (std::fabs(dot(tri.normal, p - tri.a)) < best.distance && offer(tri, nearest_on(tri, p), p, best))
-        best.place = near;
+      const bool may = std::fabs(dot(tri.normal, p - tri.a)) < best.distance;
+      if (may && offer(tri, nearest_on(tri, p), p, best)) best.place = near;
       if (best.distance < kTouching) return best;
     }
     struct Entry {
@@ -158,6 +156,7 @@ class Mesh {
       const Entry entry = stack[--size];
       const double far = best.distance * best.distance;
       if (entry.bound >= far) continue;
+      ++looked;
       if (entry.child < 0) {
         offer_leaf(~entry.child, p, best);
         continue;
@@ -179,6 +178,12 @@ class Mesh {
       push(first);
     }
     return best;
+  }
+  SurfacePoint nearest_to_point(const Vec3& p,
+                                double limit = std::numeric_limits<double>::infinity(),
+                                int near = -1) const {
+    int looked = 0;
+    return nearest_to_point(p, limit, near, looked);
   }
 
  private:
@@ -250,6 +255,8 @@ class Mesh {
   // Triangles side by side; what is beyond the last one repeats it.
   struct TriangleLanes {
     BasicVec3<Lanes> a, ab, ac, normal;
+    int place, count;  // of the first in `triangles`; how many there are
+    int face[kLanes];
   };
 
   // The directions of all normals in a box: within an angle of a cosine about an axis.
@@ -334,6 +341,7 @@ class Mesh {
         for (int i = 0; i < box.count; i += kLanes)
           side_by_side.push_back(lanes_of(box.next + i, std::min(kLanes, box.count - i)));
       }
+      first.push_back(static_cast<int>(side_by_side.size()));
     }
 
     // The fours of a box and of all in it; how it is called in `Four::child`.
@@ -364,8 +372,11 @@ class Mesh {
 
     TriangleLanes lanes_of(int begin, int count) const {
       TriangleLanes out{};
+      out.place = begin;
+      out.count = count;
       for (int k = 0; k < kLanes; ++k) {
         const Triangle& t = triangles[begin + std::min(k, count - 1)];
+        out.face[k] = t.face;
         for (const auto& [to, from] : {std::pair{&out.a, &t.a}, std::pair{&out.ab, &t.ab},
                                        std::pair{&out.ac, &t.ac}, std::pair{&out.normal, &t.normal}}) {
           set_lane(to->x, k, from->x);
@@ -450,7 +461,7 @@ class Mesh {
     std::vector<Four> fours;
     int root = 0;  // as in `Four::child`
     std::vector<TriangleLanes> side_by_side;  // of the leaves
-    std::vector<int> first;                   // of them, per box
+    std::vector<int> first;  // of them, per box; and their number
   };
 
   static std::vector<Triangle> triangles_of(const std::vector<Vec3>& vertices,
@@ -581,21 +592,20 @@ class Mesh {
 
   // The triangles of a leaf, side by side; each as if alone and in their order, to the last bit.
   void offer_leaf(int box, const Vec3& p, SurfacePoint& best) const {
-    const Box& leaf = tree_->boxes[box];
-    const Triangle* const own = triangles().data() + leaf.next;
-    const TriangleLanes* side = tree_->side_by_side.data() + tree_->first[box];
-    for (int first = 0; first < leaf.count; first += kLanes, ++side) {
-      const int count = std::min(kLanes, leaf.count - first);
+    const TriangleLanes* const all = tree_->side_by_side.data();
+    const TriangleLanes* const end = all + tree_->first[box + 1];
+    for (const TriangleLanes* side = all + tree_->first[box]; side != end; ++side) {
       const BasicVec3<Lanes> ap = many(p) - side->a;
       const Lanes above = dot(side->normal, ap), plane = larger(above, -above);
       if (!any_below(plane, all_lanes(best.distance))) continue;
       const BasicVec3<Lanes> point = nearest_on(*side, ap), way = point - many(p);
       const Lanes distance = root(dot(way, way));
-      for (int k = 0; k < count; ++k) {
+      for (int k = 0; k < side->count; ++k) {
         if (!(lane(plane, k) < best.distance && lane(distance, k) < best.distance)) continue;
-        const Triangle& tri = own[first + k];
-        best = {lane(distance, k), tri.face, leaf.next + first + k,
-                {lane(point.x, k), lane(point.y, k), lane(point.z, k)}, tri.normal};
+        const auto at = [k](const BasicVec3<Lanes>& v) {
+          return Vec3{lane(v.x, k), lane(v.y, k), lane(v.z, k)};
+        };
+        best = {lane(distance, k), side->face[k], side->place + k, at(point), at(side->normal)};
       }
     }
   }
