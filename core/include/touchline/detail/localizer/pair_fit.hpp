@@ -23,8 +23,8 @@ class PairFit {
       : view_(view), settings_(settings), cone_(std::atan(settings.friction)) {}
 
   // The forces at given points that explain best, in closed form; where they are `bound`, with what
-  // is beyond the friction cones.
-  void solve_forces(Pair& s, bool bound) {
+  // is beyond the friction cones, unless even without they cost as much as `worth`.
+  void solve_forces(Pair& s, bool bound, double worth = std::numeric_limits<double>::infinity()) {
     set_forces(s.ends);
     double A[36], g[6];
     std::copy_n(A_, 36, A);
@@ -37,7 +37,8 @@ class PairFit {
     if (!cholesky<6>(L)) return;
     solve_cholesky<6>(L, x);
     judge(A, g, x, s);
-    for (int turn = 0; bound && turn < kTurns && s.cost > s.chi2 + kBeyond; ++turn) {
+    const auto matter = [&] { return s.chi2 < worth && s.cost > s.chi2 + kBeyond + kPart * s.chi2; };
+    for (int turn = 0; bound && turn < kTurns && matter(); ++turn) {
       std::copy(A, A + 36, L);
       std::copy(g, g + 6, x);
       add_cones(s, L, 6, x);
@@ -101,7 +102,8 @@ class PairFit {
 
  private:
   static constexpr int kTurns = 3;  // of the cones, linearized anew: a bound on time
-  static constexpr double kBeyond = 0.01;  // cost of the cones that is not worth a turn
+  // Cost of the cones that is not worth a turn: so much, and a part of the misfit.
+  static constexpr double kBeyond = 0.01, kPart = 0.01;
 
   double prior(int i) const {
     const double scale = i < 6 ? settings_.force_scale : settings_.place_scale;

@@ -16,7 +16,7 @@ namespace touchline {
 
 class PairParts {
  public:
-  static constexpr int kMost = 256;  // room: parts
+  static constexpr int kMost = 64;  // room: parts
 
   // A point that is one of a pair that explains, in the frame of its node.
   struct Part {
@@ -59,11 +59,10 @@ class PairParts {
   void work(int units) {
     while (working() && units > 0) {
       if (descent_.working()) {
-        units -= kStep * descent_.work((units + kStep - 1) / kStep);
-        if (!descent_.working()) take(descent_.pair());
+        units -= descent_.work(units);
+        if (!descent_.working()) units -= take(descent_.pair());
       } else {
-        units -= kBegin;
-        begin_next();
+        units -= begin_next();
       }
     }
   }
@@ -80,18 +79,21 @@ class PairParts {
 
  private:
   static constexpr int kWaiting = 4096, kSteps = 12;  // room: pairs that wait; steps of each
-  // Units of work: a step, and the beginning of a descent.
-  static constexpr int kStep = 3, kBegin = 1;
+  // Units of work: the beginning of a descent beside another one, or elsewhere, where no cache has the
+  // mesh.
+  static constexpr int kBegin = 8, kElsewhere = 60;
   static constexpr double kHopeless = 100.0;  // cost from which nothing is brought to where it explains
+  static constexpr double kLittle = 2.0;      // of cost: a part is told by its place, not by its cost
+  static constexpr double kFirst = 5e4;       // cost at the beginning, from which it soon explains
   static constexpr double kWindow = 13.0;     // of cost: 99 % of chi2 with four degrees of freedom
   // Cost of the cones through which a walk goes on, and which still tells: faces are flat where
   // links are round.
   static constexpr double kPassed = 16.0, kTold = 4.0;
-  static constexpr double kApart = 0.012;   // parts nearer than this are one [m]
-  static constexpr double kStride = 0.022;  // from one to the next [m]
+  static constexpr double kApart = 0.02;    // parts nearer than this are one [m]
+  static constexpr double kStride = 0.034;  // from one to the next [m]
   // So near to a part, in parts of what they are apart, a walk need not go: what else goes with it is
   // met by way of its other end.
-  static constexpr double kBeside = 0.83;
+  static constexpr double kBeside = 1.0;
   static constexpr double kReach = 0.03;  // around each part there may be more, at least so far [m]
   static constexpr double kWider = 1.5;  // each time there are too many parts
   static constexpr double kWide = 1.5;   // times what parts are apart: between them there are more
@@ -103,10 +105,12 @@ class PairParts {
 
   enum class Stage { none, walks, done };
 
-  // The next pair to descend from: solutions, then starts, then what is beside those that explain.
-  void begin_next() {
+  // The next pair to descend from: solutions, then starts, then what is beside those that explain. The
+  // units of work of it.
+  int begin_next() {
     Task task;
     task.held = -1;
+    int done = kElsewhere;
     if (next_solution_ < search_->count()) {
       task.pair = moved((*search_)[next_solution_++]);
     } else if (search_->starts().plausible(next_start_, task.pair, task.held)) {
@@ -115,12 +119,14 @@ class PairParts {
       task = waiting_[head_];
       head_ = (head_ + 1) % kWaiting;
       --waits_;
-      if (is_known(task.pair.ends[task.held], kBeside * apart_)) return;
+      done = kBegin;
+      if (is_known(task.pair.ends[task.held], kBeside * apart_)) return done;
     } else {
       stage_ = Stage::done;
-      return;
+      return kBegin;
     }
-    descent_.begin(task.pair, {kSteps, kHopeless, 0.0}, true, task.held);
+    descent_.begin(task.pair, {kSteps, kHopeless, kLittle, kFirst}, true, task.held);
+    return done;
   }
 
   // Has a pair been met that explains, one end of which is so near [m]?
@@ -146,15 +152,18 @@ class PairParts {
     if (waits_ < kWaiting) waiting_[(head_ + waits_++) % kWaiting] = {pair, held};
   }
 
-  void take(const Pair& s) {
-    if (!(s.chi2 < std::min(limit_, best_ + kWindow)) || s.cost - s.chi2 > kPassed) return;
+  // Where a descent has come to; the units of work of it.
+  int take(const Pair& s) {
+    if (!(s.chi2 < std::min(limit_, best_ + kWindow)) || s.cost - s.chi2 > kPassed) return 0;
     best_ = std::min(best_, s.cost);
     cone_ = std::min(cone_, s.cost - s.chi2);
     bool fresh[2];
     for (int k = 0; k < 2; ++k) fresh[k] = add(s, k);
+    int done = 0;
     for (int k = 0; k < 2; ++k) {
-      if (fresh[k]) walk_on(s, k);
+      if (fresh[k]) walk_on(s, k, done);
     }
+    return done;
   }
 
   // One end of a pair; is it new?
@@ -196,8 +205,8 @@ class PairParts {
     }
   }
 
-  // To all sides of one end.
-  void walk_on(const Pair& s, int k) {
+  // To all sides of one end; adds what it took to `looked`.
+  void walk_on(const Pair& s, int k, int& looked) {
     const double stride = std::max(kStride, apart_);
     Vec3 ways[2];
     tangents(s.ends[k].normal, ways[0], ways[1]);
@@ -205,7 +214,7 @@ class PairParts {
       Pair next = s;
       PairEnd& e = next.ends[k];
       const Vec3 target = e.point + (i % 2 ? stride : -stride) * ways[i / 2];
-      const SurfacePoint p = view_.nearest(e.surface, e.body, target, stride, e.place);
+      const SurfacePoint p = view_.nearest(e.surface, e.body, target, stride, e.place, looked);
       if (p.face < 0) continue;
       e.point = p.point;
       e.normal = p.normal;

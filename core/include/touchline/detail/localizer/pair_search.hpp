@@ -72,11 +72,12 @@ class PairSearch {
   static constexpr double kSame = 0.01;    // solutions nearer than this are one [m]
   static constexpr double kWindow = 25.0;  // of cost: beyond it a solution weighs nothing
   static constexpr double kHopeless = 100.0;  // cost from which nothing is brought to where it explains
+  static constexpr double kFirst = 5e4;       // cost at the beginning, from which it soon explains
   static constexpr double kLittle = 0.02;     // of cost: not worth a step
 
-  // Units of work: a step of a descent, its beginning, where a force enters its body, the evidence of
-  // a solution, another view.
-  static constexpr int kStep = 3, kBegin = 1, kEntries = 10, kWeight = 12, kView = 20;
+  // Units of work: the beginning of a descent, where no cache has the mesh; where a force enters its body;
+  // the evidence of a solution; another view.
+  static constexpr int kBegin = 60, kEntries = 110, kWeight = 150, kView = 110;
 
   // From points spread over the links, by descents, to solutions. What was measured in the meantime
   // moves them a little; with other entries of their forces they are weighed by that.
@@ -133,14 +134,14 @@ class PairSearch {
   template <class Pairs>
   int descend(int units, const Pairs& from) {
     if (!descent_.working()) {
-      descent_.begin(from[next_++], {kSteps, kHopeless, kLittle}, false);
+      descent_.begin(from[next_++], {kSteps, kHopeless, kLittle, kFirst}, false);
       return kBegin;
     }
-    const int steps = descent_.work((units + kStep - 1) / kStep);
+    const int done = descent_.work(units);
     const Pair& s = descent_.pair();
     if (!descent_.working() && s.cost < chi2_limit(view_.rows(), settings_.pitch_limit) + kWindow)
       add(s);
-    return kStep * steps;
+    return done;
   }
 
   // From now on by what is measured now.

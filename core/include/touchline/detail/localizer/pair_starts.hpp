@@ -116,8 +116,8 @@ class PairStarts {
   static constexpr int kPerBodies = 4;         // pairs that are kept of two bodies
   static constexpr int kFollowed = 24;         // and of all
   // Units of work: a pair of bodies that is given up, or prepared; and how many points of one body are
-  // a unit more beside a point of the other. Not blocks: how wide they are depends on the processor.
-  static constexpr int kGivenUp = 2, kPrepared = 12, kTried = 24;
+  // a unit beside a point of the other. Not blocks: how wide they are depends on the processor.
+  static constexpr int kGivenUp = 10, kPrepared = 40, kTried = 4;
   static constexpr double kSpacing = 0.02;     // of what a point stands for [m], one sigma
   static constexpr double kSoft = 0.3;         // of the friction cone of such a point [rad]
   static constexpr double kApart = 0.03;       // pairs nearer than this are one [m]

@@ -115,10 +115,11 @@ class PairView {
     }
   }
   // The point of a surface nearest to a point of the world, in world; `face` is -1 beyond `limit`.
-  // `near`: the place of a triangle in the mesh that may be near, if known.
-  SurfacePoint nearest(int surface, int body, const Vec3& target, double limit,
-                       int near = -1) const {
-    SurfacePoint p = (*surfaces_)[surface].mesh.nearest_to_point(to_body(target, body), limit, near);
+  // `near`: the place of a triangle in the mesh that may be near, if known. `looked`: see `Mesh`.
+  SurfacePoint nearest(int surface, int body, const Vec3& target, double limit, int near,
+                       int& looked) const {
+    SurfacePoint p =
+        (*surfaces_)[surface].mesh.nearest_to_point(to_body(target, body), limit, near, looked);
     p.point = to_world(p.point, body);
     p.normal = turn_to_world(p.normal, body);
     return p;

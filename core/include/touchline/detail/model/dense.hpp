@@ -56,19 +56,33 @@ inline void solve_lower_rows(const double* l, int n, double* x, int done = 0) {
   }
 }
 
+// Loops of compile-time bounds written out: a small factor then stays in registers.
+#if defined(__clang__)
+#define TOUCHLINE_UNROLL _Pragma("unroll")
+#elif defined(__GNUC__)
+#define TOUCHLINE_UNROLL _Pragma("GCC unroll 16")
+#else
+#define TOUCHLINE_UNROLL
+#endif
+
 // The same for sizes that are known when it is compiled: operations that do not wait for each other
 // stand together. The last bits differ.
 template <int n>
 bool cholesky(double* a, double tolerance = 1e-13) {
   double column[n], diagonal[n];
+  TOUCHLINE_UNROLL
   for (int i = 0; i < n; ++i) diagonal[i] = a[i * n + i];
+  TOUCHLINE_UNROLL
   for (int j = 0; j < n; ++j) {
     const double d = a[j * n + j];
     if (!(d > tolerance * diagonal[j])) return false;
     const double root = std::sqrt(d), inverse = 1.0 / root;
     a[j * n + j] = root;
+    TOUCHLINE_UNROLL
     for (int i = j + 1; i < n; ++i) column[i] = a[i * n + j] *= inverse;
+    TOUCHLINE_UNROLL
     for (int i = j + 1; i < n; ++i) {
+      TOUCHLINE_UNROLL
       for (int k = j + 1; k <= i; ++k) a[i * n + k] -= column[i] * column[k];
     }
   }
@@ -79,16 +93,23 @@ bool cholesky(double* a, double tolerance = 1e-13) {
 template <int n>
 void solve_cholesky(const double* l, double* x) {
   double inverse[n];
+  TOUCHLINE_UNROLL
   for (int i = 0; i < n; ++i) inverse[i] = 1.0 / l[i * n + i];
+  TOUCHLINE_UNROLL
   for (int i = 0; i < n; ++i) {
     x[i] *= inverse[i];
+    TOUCHLINE_UNROLL
     for (int k = i + 1; k < n; ++k) x[k] -= l[k * n + i] * x[i];
   }
+  TOUCHLINE_UNROLL
   for (int i = n - 1; i >= 0; --i) {
     x[i] *= inverse[i];
+    TOUCHLINE_UNROLL
     for (int k = 0; k < i; ++k) x[k] -= l[i * n + k] * x[i];
   }
 }
+
+#undef TOUCHLINE_UNROLL
 
 // The inverse of a lower factor, in `out`, with zeros above; its product with a vector takes no
 // division.

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
 #include <cstring>
 #include <limits>
 #include <memory>
@@ -135,20 +134,56 @@ class Mesh {
   }
 
   // The point of the surface nearest to `p`, if nearer than `limit`. `near`: the place of a triangle
-  // that may be near: then there is less to search.
+  // that may be near: then there is less to search. `looked` grows by the number of places that were
+  // looked into: what it took, on any machine.
+  SurfacePoint nearest_to_point(const Vec3& p, double limit, int near, int& looked) const {
+    SurfacePoint best;
+    best.distance = limit;
+    if (empty()) return best;
+    if (near >= 0) {
+      const Triangle& tri = triangles()[near];
+      const bool may = std::fabs(dot(tri.normal, p - tri.a)) < best.distance;
+      if (may && offer(tri, nearest_on(tri, p), p, best)) best.place = near;
+      if (best.distance < kTouching) return best;
+    }
+    struct Entry {
+      double bound;
+      int child;  // as in `Four`
+    } stack[2 * kDepth];
+    int size = 0;
+    stack[size++] = {0.0, tree_->root};
+    while (size > 0) {
+      const Entry entry = stack[--size];
+      const double far = best.distance * best.distance;
+      if (entry.bound >= far) continue;
+      ++looked;
+      if (entry.child < 0) {
+        offer_leaf(~entry.child, p, best);
+        continue;
+      }
+      const Four& four = tree_->fours[entry.child];
+      double bound[Four::kBoxes];
+      four.outside(p, bound);
+      const auto push = [&](int i) {
+        stack[size] = {bound[i], four.child[i]};
+        size += bound[i] < far;
+      };
+      // The nearer half is visited first, and in each half the nearer box.
+      const int one = bound[4] > bound[5] ? 2 : 0, other = 2 - one;
+      const int first = one + (bound[one] > bound[one + 1]);
+      const int third = other + (bound[other] > bound[other + 1]);
+      push(2 * other + 1 - third);
+      push(third);
+      push(2 * one + 1 - first);
+      push(first);
+    }
+    return best;
+  }
   SurfacePoint nearest_to_point(const Vec3& p,
                                 double limit = std::numeric_limits<double>::infinity(),
                                 int near = -1) const {
-    const PointLanes lanes(p);
-    return nearest(
-        limit, near, [&](const Box& b) { return outside(lanes, b); },
-        [](double distance) { return distance * distance; },
-        [](const Box&, double) { return true; },
-        [&](const Triangle& tri, SurfacePoint& best) {
-          if (std::fabs(dot(tri.normal, p - tri.a)) < best.distance &&
-              offer(tri, nearest_on(tri, p), p, best))
-            best.place = static_cast<int>(&tri - triangles().data());
-        });
+    int looked = 0;
+    return nearest_to_point(p, limit, near, looked);
   }
 
  private:
@@ -166,6 +201,62 @@ class Mesh {
     BasicVec3<float> low, high;  // rounded outwards: half of the memory, where time goes
     int next;   // a leaf's first triangle, or an inner box's second child (the first follows it)
     int count;  // triangles of a leaf; 0: an inner box
+  };
+
+  // Four boxes side by side: the children of the two children of an inner box, those two behind them.
+  // Where one of the two is a leaf, it stands there alone.
+  struct Four {
+    static constexpr int kBoxes = 8;  // room: the last two are none
+    float low[3][kBoxes], high[3][kBoxes];
+    int child[4];  // another four, or ~ the number of a leaf's box
+
+    void put(int i, const Box& box) {
+      const float* const ends[2] = {&box.low.x, &box.high.x};
+      for (int axis = 0; axis < 3; ++axis) {
+        low[axis][i] = ends[0][axis];
+        high[axis][i] = ends[1][axis];
+      }
+    }
+    // No point is as near as to this.
+    void put_none(int i) {
+      for (int axis = 0; axis < 3; ++axis) {
+        low[axis][i] = kInfinity;
+        high[axis][i] = -kInfinity;
+      }
+    }
+
+    // The square of how far a point is outside of each of the six.
+    void outside(const Vec3& p, double* out) const {
+      const double at[3] = {p.x, p.y, p.z};
+      for (int i = 0; i < 6; i += kLanes) {
+        Lanes sum{};
+        for (int axis = 0; axis < 3; ++axis) {
+          const Lanes x = all_lanes(at[axis]);
+          const Lanes beyond = larger(floats(low[axis] + i) - x, x - floats(high[axis] + i));
+          const Lanes d = larger(beyond, Lanes{});
+          sum = axis == 0 ? d * d : sum + d * d;
+        }
+        store_lanes(sum, out + i);
+      }
+    }
+
+   private:
+    static Lanes floats(const float* from) {
+#if defined(__GNUC__) || defined(__clang__)
+      float __attribute__((vector_size(kLanes * sizeof(float)))) v;
+      std::memcpy(&v, from, sizeof v);
+      return __builtin_convertvector(v, Lanes);
+#else
+      return *from;
+#endif
+    }
+  };
+
+  // Triangles side by side; what is beyond the last one repeats it.
+  struct TriangleLanes {
+    BasicVec3<Lanes> a, ab, ac, normal;
+    int place, count;  // of the first in `triangles`; how many there are
+    int face[kLanes];
   };
 
   // The directions of all normals in a box: within an angle of a cosine about an axis.
@@ -244,6 +335,56 @@ class Mesh {
         while (boxes[begin].count == 0) ++begin;
         faces[i] = facing(boxes[begin].next, boxes[end].next + boxes[end].count);
       }
+      root = boxes.empty() ? 0 : gather(0);
+      for (const Box& box : boxes) {
+        first.push_back(static_cast<int>(side_by_side.size()));
+        for (int i = 0; i < box.count; i += kLanes)
+          side_by_side.push_back(lanes_of(box.next + i, std::min(kLanes, box.count - i)));
+      }
+      first.push_back(static_cast<int>(side_by_side.size()));
+    }
+
+    // The fours of a box and of all in it; how it is called in `Four::child`.
+    int gather(int box) {
+      if (boxes[box].count > 0) return ~box;
+      const int index = static_cast<int>(fours.size());
+      fours.push_back({});
+      Four four{};
+      const int halves[2] = {box + 1, boxes[box].next};
+      for (int half = 0; half < 2; ++half) {
+        const int own = halves[half];
+        const bool leaf = boxes[own].count > 0;
+        const int of[2] = {leaf ? own : own + 1, boxes[own].next};
+        four.put(4 + half, boxes[own]);
+        for (int i = 0; i < 2; ++i) {
+          const int at = 2 * half + i;
+          if (leaf && i == 1) {
+            four.put_none(at);
+            continue;
+          }
+          four.put(at, boxes[of[i]]);
+          four.child[at] = gather(of[i]);
+        }
+      }
+      fours[index] = four;
+      return index;
+    }
+
+    TriangleLanes lanes_of(int begin, int count) const {
+      TriangleLanes out{};
+      out.place = begin;
+      out.count = count;
+      for (int k = 0; k < kLanes; ++k) {
+        const Triangle& t = triangles[begin + std::min(k, count - 1)];
+        out.face[k] = t.face;
+        for (const auto& [to, from] : {std::pair{&out.a, &t.a}, std::pair{&out.ab, &t.ab},
+                                       std::pair{&out.ac, &t.ac}, std::pair{&out.normal, &t.normal}}) {
+          set_lane(to->x, k, from->x);
+          set_lane(to->y, k, from->y);
+          set_lane(to->z, k, from->z);
+        }
+      }
+      return out;
     }
 
     Facing facing(int begin, int end) const {
@@ -317,6 +458,10 @@ class Mesh {
     std::vector<Triangle> triangles;
     std::vector<Box> boxes;
     std::vector<Facing> faces;  // per box
+    std::vector<Four> fours;
+    int root = 0;  // as in `Four::child`
+    std::vector<TriangleLanes> side_by_side;  // of the leaves
+    std::vector<int> first;  // of them, per box; and their number
   };
 
   static std::vector<Triangle> triangles_of(const std::vector<Vec3>& vertices,
@@ -445,41 +590,27 @@ class Mesh {
     return true;
   }
 
-  // How far `v` is outside of a range; without a branch, which would be taken at random.
-  static double outside(double v, double low, double high) {
-    return std::max(0.0, std::max(low - v, v - high));
-  }
-
-  // A point, its three numbers side by side where there is room.
-  struct PointLanes {
-    explicit PointLanes(const Vec3& p) : point(p) {
-      if constexpr (kLanes == 4) set_lane(lanes, 0, p.x), set_lane(lanes, 1, p.y), set_lane(lanes, 2, p.z);
+  // The triangles of a leaf, side by side; each as if alone and in their order, to the last bit.
+  void offer_leaf(int box, const Vec3& p, SurfacePoint& best) const {
+    const TriangleLanes* const all = tree_->side_by_side.data();
+    const TriangleLanes* const end = all + tree_->first[box + 1];
+    for (const TriangleLanes* side = all + tree_->first[box]; side != end; ++side) {
+      const BasicVec3<Lanes> ap = many(p) - side->a;
+      const Lanes above = dot(side->normal, ap), plane = larger(above, -above);
+      if (!any_below(plane, all_lanes(best.distance))) continue;
+      const BasicVec3<Lanes> point = nearest_on(*side, ap), way = point - many(p);
+      const Lanes distance = root(dot(way, way));
+      for (int k = 0; k < side->count; ++k) {
+        if (!(lane(plane, k) < best.distance && lane(distance, k) < best.distance)) continue;
+        const auto at = [k](const BasicVec3<Lanes>& v) {
+          return Vec3{lane(v.x, k), lane(v.y, k), lane(v.z, k)};
+        };
+        best = {lane(distance, k), side->face[k], side->place + k, at(point), at(side->normal)};
+      }
     }
-    Vec3 point;
-    Lanes lanes{};
-  };
-
-  // The square of how far a point is outside of a box.
-  static double outside(const PointLanes& p, const Box& b) {
-#if defined(__AVX__) && (defined(__GNUC__) || defined(__clang__))
-    using Floats = float __attribute__((vector_size(16)));
-    static_assert(offsetof(Box, high) == 3 * sizeof(float) && sizeof(Box) == 8 * sizeof(float));
-    Floats low, high;  // the last number of the one, and the first of the other, are not used
-    std::memcpy(&low, &b.low.x, sizeof low);
-    std::memcpy(&high, &b.low.z, sizeof high);
-    high = __builtin_shufflevector(high, high, 1, 2, 3, 3);
-    const Lanes beyond = larger(__builtin_convertvector(low, Lanes) - p.lanes,
-                                p.lanes - __builtin_convertvector(high, Lanes));
-    const Lanes d = larger(beyond, Lanes{}), square = d * d;
-    return square[0] + square[1] + square[2];
-#else
-    const Vec3 d{outside(p.point.x, b.low.x, b.high.x), outside(p.point.y, b.low.y, b.high.y),
-                 outside(p.point.z, b.low.z, b.high.z)};
-    return dot(d, d);
-#endif
   }
 
-  // The same for several triangles side by side, each of which is offered as far as `limit`.
+  // `nearer_to_line` of several triangles side by side, each of which is offered as far as `limit`.
   template <class Visit>
   static void nearer_to_line(const Triangle* const* some, int count, const ForceLine& line,
                              double limit, Visit&& visit) {
@@ -583,6 +714,29 @@ class Mesh {
       return tri.a + tri.ab + ((d4 - d3) / ((d4 - d3) + (d5 - d6))) * (tri.ac - tri.ab);
     const double scale = 1.0 / (va + vb + vc);
     return tri.a + (vb * scale) * tri.ab + (vc * scale) * tri.ac;
+  }
+
+  // The same of several side by side, `ap` from each one's corner: all regions, of which one counts.
+  static BasicVec3<Lanes> nearest_on(const TriangleLanes& tri, const BasicVec3<Lanes>& ap) {
+    using Many = BasicVec3<Lanes>;
+    const Lanes zero = all_lanes(0.0);
+    const Many bp = ap - tri.ab, cp = ap - tri.ac, b = tri.a + tri.ab;
+    const Lanes d1 = dot(tri.ab, ap), d2 = dot(tri.ac, ap), d3 = dot(tri.ab, bp),
+                d4 = dot(tri.ac, bp), d5 = dot(tri.ab, cp), d6 = dot(tri.ac, cp);
+    const Lanes va = d3 * d6 - d5 * d4, vb = d5 * d2 - d1 * d6, vc = d1 * d4 - d3 * d2;
+    const Lanes scale = all_lanes(1.0) / (va + vb + vc);
+    Many at = tri.a + (vb * scale) * tri.ab + (vc * scale) * tri.ac;
+    const auto choose = [&at](const auto& here, const Many& x) {
+      at = {here ? x.x : at.x, here ? x.y : at.y, here ? x.z : at.z};
+    };
+    choose((va <= zero) & (d4 - d3 >= zero) & (d5 - d6 >= zero),
+           b + ((d4 - d3) / ((d4 - d3) + (d5 - d6))) * (tri.ac - tri.ab));
+    choose((vb <= zero) & (d2 >= zero) & (d6 <= zero), tri.a + (d2 / (d2 - d6)) * tri.ac);
+    choose((d6 >= zero) & (d5 <= d6), tri.a + tri.ac);
+    choose((vc <= zero) & (d1 >= zero) & (d3 <= zero), tri.a + (d1 / (d1 - d3)) * tri.ab);
+    choose((d3 >= zero) & (d4 <= d3), b);
+    choose((d1 <= zero) & (d2 <= zero), tri.a);
+    return at;
   }
 
   static Vec3 exact(const BasicVec3<float>& v) { return {v.x, v.y, v.z}; }
