@@ -114,8 +114,8 @@ def test_a_push_as_a_lost_sensor_comes_back_is_felt_until_its_end_and_placed(pus
     said, _ = with_fault(pushed_sara, "NaN", "base.fx", "free")
     assert [e.segment for e in said.events] == ["base"]
     assert said.events[0].body == pushed_sara[1].body
-    assert said.events[0].body_probability > 0.9
-    assert said.events[0].cleared > RELEASED
+    assert (said.events[0].body_probability or 0.0) > 0.9
+    assert (said.events[0].cleared or np.inf) > RELEASED
 
 
 @pytest.mark.parametrize("name", ["NaN", "rail", "stuck", "garbage", "sensor garbage"])
