@@ -93,6 +93,71 @@ def test_what_stands_still_is_told_within_50_ms(listened, name):
     assert outcome.told <= 0.05 and outcome.named
 
 
+@pytest.fixture(scope="module")
+def pushed_sara():
+    recording = record(tl.load_robot("sara"), 1)
+    pipeline = tl.Pipeline(recording.robot)
+    return pipeline, recording, listen(pipeline, recording.samples)
+
+
+def with_fault(listened, fault, channel, phase):
+    """What is said of a recording with it."""
+    pipeline, recording, _ = listened
+    where = channel_named(recording.robot, channel)
+    rng = np.random.default_rng(0)
+    faulty, end = injected(recording.samples, fault_named(fault), where, PHASES[phase], rng)
+    return listen(pipeline, faulty), end
+
+
+def test_a_push_as_a_lost_sensor_comes_back_is_felt_until_its_end_and_placed(pushed_sara):
+    """Only joints feel its first moments: what they have then is no offset, and no friction."""
+    said, _ = with_fault(pushed_sara, "NaN", "base.fx", "free")
+    assert [e.segment for e in said.events] == ["base"]
+    assert said.events[0].body == pushed_sara[1].body
+    assert (said.events[0].body_probability or 0.0) > 0.9
+    assert (said.events[0].cleared or np.inf) > RELEASED
+
+
+@pytest.mark.parametrize("name", ["NaN", "rail", "stuck", "garbage", "sensor garbage"])
+@pytest.mark.parametrize("phase", ["free", "contact"])
+def test_estimates_are_back_five_time_constants_after_a_fault(pushed_sara, name, phase):
+    pipeline, recording, healthy = pushed_sara
+    channel = channel_named(recording.robot, "wrist" if name.startswith("sensor") else "wrist.fy")
+    outcome = judge(
+        pipeline, recording, healthy, fault_named(name), channel, (phase, PHASES[phase])
+    )
+    assert outcome.recovery <= 0.051
+
+
+@pytest.mark.parametrize("name", ["noisy", "garbage"])
+def test_a_wild_torque_that_passes_by_chance_counts_only_once_it_is_over(pushed_sara, name):
+    said, end = with_fault(pushed_sara, name, "tau.joint2", "free")
+    time = pushed_sara[1].samples.time
+    lost = (time > PHASES["free"] + 0.03) & (time < end + 0.04)  # by then it is told
+    joint = pushed_sara[1].robot.joint_names.index("joint2")
+    assert not said.estimate.joint_settled[lost, joint].any()
+
+
+def test_axes_that_are_swapped_beside_a_push_are_named_within_moments(pushed_sara):
+    pipeline, recording, healthy = pushed_sara
+    channel = channel_named(recording.robot, "handle")
+    phase = ("contact", PHASES["contact"])
+    outcome = judge(pipeline, recording, healthy, fault_named("swapped axes"), channel, phase)
+    assert outcome.named and outcome.told < 0.05
+    assert outcome.wrong == outcome.collisions == 0
+
+
+def test_what_a_wrong_speed_begins_before_it_is_told_has_no_sure_place_and_is_no_collision():
+    robot = tl.load_robot("sara-full")
+    recording = record(robot, 2)
+    listened = tl.Pipeline(robot), recording, None
+    said, _ = with_fault(listened, "speed zero", "qd.joint1", "free")
+    began = [e for e in said.events if e.detected < PUSHED]
+    assert began != []
+    for event in began:
+        assert event.level == "contact" and (event.body_probability or 0.0) <= 0.5
+
+
 def test_the_tables_count_what_was_missed(listened):
     pipeline, recording, healthy = listened
     channel = channel_named(recording.robot, "tau.joint2")

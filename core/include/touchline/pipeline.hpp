@@ -89,6 +89,11 @@ class Pipeline {
     suspicions_[g].extend(observer_.time(), since, until);
   }
 
+  // What a joint's torque, or a sensor, had last is not believed: with the next sample its estimates
+  // begin anew, even where the gap is short.
+  void begin_torque_anew(std::size_t j) { observer_.begin_torque_anew(j); }
+  void begin_sensor_anew(std::size_t s) { observer_.begin_sensor_anew(s); }
+
   // The posterior over surfaces of the only contact of the last sample; takes milliseconds and
   // allocates. Throws std::invalid_argument where there are several or none.
   std::vector<SurfaceCell> region() const { return localizer_.region(); }
@@ -189,17 +194,22 @@ class Pipeline {
           const double began = event != nullptr ? event->detected : sample.time;
           const bool unsure = suspicions_[segment].lasts(sample.time) ||
                               suspicions_[segment].covers(classifier_.blow(g));
-          const bool doubted = reports[k].doubted || suspicions_[segment].meets(sample.time, began);
+          const bool since_begun = suspicions_[segment].meets(sample.time, began);
+          const bool doubted = reports[k].doubted || since_begun;
           const bool known = event != nullptr && event->level == ContactLevel::collision;
           const bool later = began > classifier_.blow(g) + tuning_.classifier.decide_within;
           fill(contact, g, k, estimate);
           if (doubted || later || (unsure && !known)) contact.level = ContactLevel::contact;
           if (doubted) touchline::doubt(contact);
-          contact.event = recorder_.add(reports[k].serial, contact, doubted, reports.share(k),
-                                        sample.time, sample.q, estimate.tau_ext(), normalized);
+          contact.event =
+              recorder_.add(reports[k].serial, contact, doubted, since_begun, reports.share(k),
+                            sample.time, sample.q, estimate.tau_ext(), normalized);
         }
       }
       for (Localizer::Memory* memory : localizer_.ended()) {
+        const LastingEvent* event = recorder_.of(memory->serial);
+        if (event != nullptr && suspicions_[segment].meets(sample.time, event->detected))
+          recorder_.doubt_all_of(memory->serial);
         recorder_.end(*memory, sample.time);
         memory->serial = -1;
       }

@@ -181,12 +181,36 @@ class RedundantPipeline {
   // A sample of which the gates believe `judged`.
   Result take(const Sample& judged, const std::vector<Fault>& faults, const double* ratios) {
     const Sample believed = contradicted_ ? without_contradicted(judged) : judged;
+    if (!gates_.all_sound()) {
+      begin_anew();
+      doubt_news(faults, judged.time);
+    }
     find_absent(believed);
     const bool whole = healthy();
     const Result result = whole ? whole_.update(believed) : step(believed);
     if (whole) watch_parity(result, believed.time);
     else parity_.forget();
     return with_faults(result, faults, ratios);
+  }
+
+  // Of channels that pass again while they are still told nothing goes on from what they had.
+  void begin_anew() {
+    const ChannelLayout& at = gates_.layout();
+    for (std::size_t c = at.tau(); c < at.count(); ++c) {
+      if (!gates_.begins_to_pass(c)) continue;
+      const bool torque = c < at.wrench();
+      const std::size_t i = torque ? c - at.tau() : (c - at.wrench()) / 6;
+      torque ? whole_.begin_torque_anew(i) : whole_.begin_sensor_anew(i);
+      for (const std::unique_ptr<Second>& second : stand_ins_) {
+        if (torque) {
+          second->pipeline.begin_torque_anew(i);
+        } else if (second->without[i] == 0) {
+          const std::vector<int>& own = second->given.sensors;
+          const auto found = std::find(own.begin(), own.end(), static_cast<int>(i));
+          second->pipeline.begin_sensor_anew(static_cast<std::size_t>(found - own.begin()));
+        }
+      }
+    }
   }
 
   // Is what the whole robot made of a sample contradictory? Then from the next sample on some
@@ -279,6 +303,17 @@ class RedundantPipeline {
       else if (moved == Moved::alone) doubt_where_felt(c, time, kNever);  // it is no collision
       before_[c] = told[c];
       changing_ = changing_ || told[c] != Fault::none;
+    }
+  }
+
+  // The same of what the gates tell now, before anything is made of the sample: what begins with it,
+  // or was about to become a collision, is doubted, too.
+  void doubt_news(const std::vector<Fault>& faults, double time) {
+    for (std::size_t c = 0; c < faults.size(); ++c) {
+      const Moved moved = gates_.moved_lately(c);
+      const bool news = is_wrong(faults[c]) && faults[c] != before_[c];
+      if (moved == Moved::wrongly || news) doubt_where_felt(c, time, time - kUntold);
+      else if (moved == Moved::alone) doubt_where_felt(c, time, kNever);
     }
   }
 
@@ -461,11 +496,15 @@ class RedundantPipeline {
            renumbered_.empty() && waiting_.empty();
   }
 
-  // Is a six-axis sensor without a usable reading?
+  // Is a six-axis sensor without a reading that counts? One that settles again has yet to.
   bool absent(const Sample& sample, std::size_t s) const {
     const SensorRow& sensor = whole_.robot().sensors[s];
     double sum = 0.0;
-    for (int i = 0; i < 6; ++i) sum += sensor.axes[i] ? std::fabs(sample.wrench[6 * s + i]) : 0.0;
+    for (int i = 0; i < 6; ++i) {
+      if (!sensor.axes[i]) continue;
+      if (gates_.passes(gates_.layout().wrench() + 6 * s + i)) return true;
+      sum += std::fabs(sample.wrench[6 * s + i]);
+    }
     return !(sum < kAbsurd);
   }
   void find_absent(const Sample& sample) {

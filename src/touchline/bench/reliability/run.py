@@ -238,8 +238,8 @@ is not the touched one, and is not what the healthy recording says either.
 ```
 
 *Recovery* lasts from the fault's last sample until health is as without the fault. After 5/K, 50
-ms, the estimates have forgotten what was left out. A wild channel counts again after 10 usual
-samples; these 10 ms come on top.
+ms, the estimates have forgotten what was left out. A wild channel is told for 10 usual samples
+more, but the estimates begin with the first of these.
 
 What a layout cannot tell, `touchline check ROBOT` lists as its parity space, and so does the table.
 Of signs, scales, delays and biases these runs are counted apart. There an error looks like contacts

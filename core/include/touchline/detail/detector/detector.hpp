@@ -567,8 +567,10 @@ class Detector {
   }
 
   // By how much a row has changed within the last moments, and what motions change it by at most in them
-  // [N or Nm].
-  double quick(std::size_t i) const { return std::fabs(samples_[i].residual - states_.trend[i]); }
+  // [N or Nm]. One that is known anew has no last moments: its mean is of before it was lost.
+  double quick(std::size_t i) const {
+    return states_.known[i] > 0.0 ? std::fabs(samples_[i].residual - states_.trend[i]) : 0.0;
+  }
   double creep(std::size_t i) const {
     return tuning_.creep_share * std::fabs(states_.trend[i] - states_.baseline[i]);
   }
@@ -588,11 +590,12 @@ class Detector {
   }
 
   // Has a sensor's wrench stepped over its limit? Friction in joints, whichever moves them, does not
-  // load a sensor: what began with joints that hardly move is a push after all.
+  // load a sensor: what began with joints that hardly move is a push after all. So is what began while
+  // the sensor was lost, if it shows a load when it is known again.
   bool pushed(std::size_t g) const {
     for (std::size_t i = first_[g]; i < first_[g + 1]; ++i) {
       if (rows_[i].component < 0 || std::fabs(normalized_[i]) < limits_[i]) continue;
-      if (quick(i) >= creep(i)) return true;
+      if (!(states_.known[i] > 0.0) || quick(i) >= creep(i)) return true;
     }
     return false;
   }
@@ -933,11 +936,18 @@ class Detector {
     return spreads_[i].beyond(meters_.sigma(i), tuning_);
   }
 
+  // Is any row of a segment lost that was known before? Its baseline stays where it was averaged.
+  bool any_lost(std::size_t g) const {
+    for (std::size_t i = first_[g]; i < first_[g + 1]; ++i)
+      if (states_.started[i] != 0 && !samples_[i].known) return true;
+    return false;
+  }
+
   // Drifts of the rows, from where the arm was while the baselines were averaged. Of one that is not
   // as told at least what motion had shown before the present event.
   void follow_drift(const double* q, double dt) {
     for (std::size_t g = 0; g < segments_.size(); ++g) {
-      if (levels_[g] == 0 && !segments_[g].pending && quiet_[g] > 0.0) {
+      if (levels_[g] == 0 && !segments_[g].pending && quiet_[g] > 0.0 && !any_lost(g)) {
         const double tau = std::min(quiet_[g], settings_.times.baseline);
         baseline_posture_.average(g, q, std::min(1.0, dt / tau));
       }

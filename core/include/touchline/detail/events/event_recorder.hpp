@@ -70,15 +70,17 @@ class EventRecorder {
     crowded_ = false;
   }
 
-  // Takes what is said of a contact; returns the number of its event.
-  int add(int serial, const Contact& c, bool doubted, double share, double time, const double* q,
-          const Span<double>& tau_ext, const Span<double>& normalized) {
+  // Takes what is said of a contact; returns the number of its event. `doubted`: one faulty channel
+  // may be the cause of this sample; `since_begun`: and of all of the event so far.
+  int add(int serial, const Contact& c, bool doubted, bool since_begun, double share, double time,
+          const double* q, const Span<double>& tau_ext, const Span<double>& normalized) {
     LastingEvent& e = lasting(serial, c.segment, time);
     double wrench[6];
     std::copy_n(c.wrench, 6, wrench);
     if (share < 1.0) wrench[0] = c.force.x, wrench[1] = c.force.y, wrench[2] = c.force.z;
     add_peaks(e, wrench, q, tau_ext);
     if (add_rows(e, share, wrench, normalized) && doubted) ++e.doubted;
+    if (since_begun) e.doubted = e.count;
     if (c.unknowns > 0) {
       e.apart = true;
       e.undetermined_status = c.status;
@@ -96,6 +98,13 @@ class EventRecorder {
       if (e.lasts && e.serial == serial) return &e;
     }
     return nullptr;
+  }
+
+  // One faulty channel may be the cause of all of the event of a contact.
+  void doubt_all_of(int serial) {
+    for (LastingEvent& e : events_) {
+      if (e.lasts && e.serial == serial) e.doubted = e.count;
+    }
   }
 
   // The event of a contact ends.

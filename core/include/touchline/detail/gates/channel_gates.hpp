@@ -37,6 +37,9 @@
 namespace touchline {
 
 // A channel is at another level, and no other one bears that out.
+// Does a channel that is told reach the estimates?
+enum class Passes { no, begins, goes_on };
+
 enum class Moved {
   no,
   alone,   // a joint torque: a push may do that, but not within one sample as a blow
@@ -79,6 +82,8 @@ class ChannelGates {
         far_(at_.joints),
         since_(at_.count()),
         calm_(at_.count()),
+        passes_(at_.count(), Passes::no),
+        early_(at_.count(), 0),
         fault_(at_.count(), Fault::none) {
     set_floors(robot);
     memory_ = std::min(1.0, period_ / tuning_.memory);
@@ -106,7 +111,8 @@ class ChannelGates {
     time_ = sample.time;
     gather(sample);
     const bool gap = !(dt < tuning_.step_periods * period_);
-    if (!measure(dt) || !all_sound_ || absurd_ || gap) settle(dt, gap);
+    const bool usual = measure(dt);
+    if (!usual || !all_sound_ || absurd_ || gap) settle(dt, gap);
     learn();
     track(dt, gap);
     if (!gap) compare_speeds(dt);
@@ -121,6 +127,12 @@ class ChannelGates {
   // Has channel c jumped twice of late since the last call, or been taken at another level, which no
   // other one bears out?
   Moved take_moved(std::size_t c) { return std::exchange(moved_[c], Moved::no); }
+  // The same, and it may be asked again.
+  Moved moved_lately(std::size_t c) const { return moved_[c]; }
+  // Does a channel that is told reach the estimates again, which have yet to settle? They begin anew
+  // with the first such sample.
+  bool passes(std::size_t c) const { return passes_[c] != Passes::no; }
+  bool begins_to_pass(std::size_t c) const { return passes_[c] == Passes::begins; }
   // Per channel; ratio: of its last step over what is believed at once.
   const std::vector<Fault>& faults() const { return fault_; }
   const std::vector<double>& ratios() const { return ratio_; }
@@ -129,6 +141,7 @@ class ChannelGates {
   static constexpr double kNever = std::numeric_limits<double>::quiet_NaN();
   static constexpr double kShortest = 1e-6;    // [s] of a period
   static constexpr double kAgain = 0.5;        // [s] within which a second jump is no accident
+  static constexpr double kSettles = 4.0;      // [1/K] that a filter waits at least before it counts
   int samples(double seconds, int least) const {
     return std::max(least, static_cast<int>(std::lround(std::min(seconds / period_, 1e6))));
   }
@@ -136,6 +149,9 @@ class ChannelGates {
   // A step that the filters make less of than the threshold of a contact can begin no event.
   void set_floors(const Robot& robot) {
     const auto share = [this](double bandwidth) { return 1.0 - std::exp(-bandwidth * period_); };
+    const auto early = [this](double bandwidth) {
+      return tuning_.good * period_ * bandwidth <= kSettles;
+    };
     std::vector<double> contact(at_.count(), 0.0);
     const Tree tree(robot.nodes, robot.gravity);
     const Layout layout(tree, robot.joints, robot.sensors);
@@ -155,6 +171,7 @@ class ChannelGates {
       const double least = std::max(contact[at_.tau() + j], tuning_.least_step_torque);
       if (joint.measured())
         floor_[at_.tau() + j] = least / share(joint.bandwidth) / std::fabs(joint.gain);
+      early_[at_.tau() + j] = early(joint.bandwidth);
     }
     for (std::size_t c = at_.wrench(); c < at_.count(); c += 3) {  // axes of the log may be turned
       const SensorRow& sensor = robot.sensors[(c - at_.wrench()) / 6];
@@ -168,6 +185,7 @@ class ChannelGates {
       }
       const double smallest = axis == 0 ? tuning_.least_step_force : tuning_.least_step_torque;
       for (int i = 0; i < 3; ++i) {
+        early_[c + i] = early(sensor.bandwidth);
         if (sensor.axes[axis + i])
           floor_[c + i] = std::max(least, smallest) / share(sensor.bandwidth);
       }
@@ -255,6 +273,7 @@ class ChannelGates {
 
   void judge(std::size_t c, double dt) {
     const double x = now_[c];
+    const Passes passed = std::exchange(passes_[c], Passes::no);
     if (x != x) return c < at_.tau() ? leave(c, Fault::absent) : take(c);
     switch (fault_[c]) {
       case Fault::none:
@@ -272,10 +291,12 @@ class ChannelGates {
         hold(c, dt);
         return;
       case Fault::spike: return go_on_holding(c, dt);
-      case Fault::wild: return wait_for_calm(c);
+      case Fault::wild: return wait_for_calm(c, passed);
       case Fault::absent: return near(c) ? take(c) : leave(c, Fault::wild);
       case Fault::stuck:
-        if (now_[c] == last_[c] || ++since_[c] < tuning_.changes) return;
+        if (now_[c] == last_[c]) return;
+        if (early_[c] != 0) passes_[c] = after(passed);
+        if (++since_[c] < tuning_.changes) return;
         return c >= at_.tau() || near(c) ? take(c) : leave(c, Fault::wild);
       case Fault::step:
         calm_[c] = ratio_[c] > 1.0 ? tuning_.sure : std::max(calm_[c] - 1, 0);
@@ -351,6 +372,10 @@ class ChannelGates {
     tracked_at_ = time_;
   }
 
+  static Passes after(Passes before) {
+    return before == Passes::no ? Passes::begins : Passes::goes_on;
+  }
+
   void go_on_holding(std::size_t c, double dt) {
     const double x = now_[c];
     if (ratio_[c] <= 1.0) return take(c);
@@ -368,13 +393,16 @@ class ChannelGates {
     }
     if (c >= at_.qd() && c < at_.tau() && borne_out(c, dt)) return take(c);
     if (++since_[c] < held_most_) return hold(c, dt);
+    candidate_[c] = last_[c];  // where it was good
     leave(c, stays && c >= at_.tau() ? Fault::stuck : Fault::wild);
     last_[c] = x;
   }
 
   // A wild channel comes back after some usual steps; a position after the way that its joint has
   // come by its speed, or for good as another one. Where that way is not known any more it waits less.
-  void wait_for_calm(std::size_t c) {
+  // A torque or an axis reaches the filters before that, from its first usual step on, or where it was
+  // before: they settle meanwhile, and count after that.
+  void wait_for_calm(std::size_t c, Passes passed) {
     const bool calm = ratio_[c] <= 1.0 && lives(c, last_[c]);
     if (c < at_.qd()) {
       if (near(c)) return take(c);
@@ -384,6 +412,8 @@ class ChannelGates {
     }
     if (!calm && c < at_.tau()) drift_[c - at_.qd()] = 0.0;
     since_[c] = calm && (c >= at_.tau() || near(c)) ? since_[c] + 1 : 0;
+    const bool returned = std::fabs(now_[c] - candidate_[c]) <= gate(c);
+    if (early_[c] != 0 && (since_[c] > 0 || returned)) passes_[c] = after(passed);
     if (since_[c] >= tuning_.good) take(c);
   }
 
@@ -394,6 +424,7 @@ class ChannelGates {
   // The reading counts again.
   void take(std::size_t c) {
     fault_[c] = Fault::none;
+    passes_[c] = Passes::no;
     since_[c] = 0;
     evidence_[c] = run_[c] = 0.0;
     if (c < at_.tau()) drift_[c % at_.joints] = 0.0;
@@ -419,7 +450,7 @@ class ChannelGates {
       const bool same = c == other || (c >= first && other >= first && (other - first) / 6 == sensor);
       if (!same && moves(other) && ratio_[other] > tuning_.equal * ratio_[c]) return true;
     }
-    return c >= first && !witnessed(c) && one_force(sensor);
+    return c >= first && !witnessed(c) && one_force(sensor, c);
   }
 
   // Is there a sensor inboard that feels all that this channel can feel, and is it believed?
@@ -459,16 +490,16 @@ class ChannelGates {
     return !(shown + tuning_.moves * mean_[j] / dt < tuning_.borne_out * jump);
   }
 
-  // Is the step of a sensor that of one force on a link: no moment along it, none beyond reach,
-  // and not along one axis alone?
-  bool one_force(std::size_t sensor) const {
+  // Is the step of a sensor that of one force on a link: no moment along it, none beyond reach, and
+  // not along axis c alone? What moves the others far less is another load, or motion.
+  bool one_force(std::size_t sensor, std::size_t c) const {
     const std::size_t first = at_.wrench() + 6 * sensor;
     double d[6];
     int moving = 0;
     for (int i = 0; i < 6; ++i) {
       if (!watched(first + i)) return false;
       d[i] = now_[first + i] - last_[first + i];
-      moving += moves(first + i) ? 1 : 0;
+      moving += moves(first + i) && ratio_[first + i] > tuning_.equal * ratio_[c] ? 1 : 0;
     }
     const double force = std::hypot(d[0], d[1], d[2]), moment = std::hypot(d[3], d[4], d[5]);
     const double along = std::fabs(d[0] * d[3] + d[1] * d[4] + d[2] * d[5]);
@@ -637,7 +668,7 @@ class ChannelGates {
 
   Sample believed(double time) {
     for (std::size_t c = 0; c < at_.count(); ++c)
-      out_[c] = fault_[c] == Fault::none || fault_[c] == Fault::spike ? now_[c] : kNever;
+      out_[c] = fault_[c] == Fault::none || fault_[c] == Fault::spike || passes(c) ? now_[c] : kNever;
     for (std::size_t j = 0; j < at_.joints; ++j) {
       const std::size_t v = at_.qd() + j;
       const bool way = usable(j), speed = usable(v);
@@ -668,6 +699,8 @@ class ChannelGates {
   std::vector<Moved> moved_;    // see `take_moved`
   std::vector<int> far_;
   std::vector<int> since_, calm_;  // samples, of what a fault waits for
+  std::vector<Passes> passes_;
+  std::vector<char> early_;   // may it, since the filters wait for longer? Of torques and wrenches
   std::vector<Fault> fault_;
   double time_ = kNever, memory_ = 0.0, rate_ = 0.0, kept_ = 0.0;
   int seen_ = 0, warm_up_ = 0, held_most_ = 1, silent_ = 0, return_ = 0, dwell_ = 0, refusals_ = 0;

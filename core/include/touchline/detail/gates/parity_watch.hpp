@@ -91,7 +91,7 @@ class ParityWatch {
     time_ = time;
     const bool goes_on = dt > 0.0 && dt < tuning_.step_periods * period_;
     if (!goes_on || (result.health & kSettling) != 0) return begin_anew();
-    for (const Pair& pair : pairs_) compare(pair, result, dt, contradicted);
+    for (Pair& pair : pairs_) compare(pair, result, dt, contradicted);
     for (const Bare& bare : bare_) compare_joint(bare, result, dt, contradicted, unsure);
     for (std::size_t i = 0; i < innermost_.size(); ++i)
       compare_couple(innermost_[i], witnesses_[i], result, dt, contradicted);
@@ -105,16 +105,36 @@ class ParityWatch {
 
  private:
   static constexpr double kShortest = 1e-6;  // [s] of a period: no division by zero
+  // Beside a contact between the two sensors: a hand there gives way to another one, but not by just as
+  // much. So many thresholds must be wrong, that noise is less than a tenth of it; and that part may be
+  // left, three times what filters that turn leave.
+  static constexpr double kClear = 2.0, kLeft = 0.1;
 
   struct Pair {
     int inner, outer;  // segments
+    // What both had while the outer one felt nothing [thresholds]: a contact that lasts between them
+    // hides no fault that begins beside it.
+    double own[6] = {}, between[6] = {};
+    bool touched = false;  // was there such a contact?
   };
 
   struct Bare {
     int row, outer;  // of a joint; the segment of the sensor right behind it
   };
 
-  void begin_anew() { std::fill(since_.begin(), since_.end(), 0.0); }
+  void begin_anew() {
+    std::fill(since_.begin(), since_.end(), 0.0);
+    for (Pair& pair : pairs_) refer(pair, nullptr, nullptr);
+  }
+
+  // What a pair has now is what it had before; null: nothing, as of the baselines.
+  static void refer(Pair& pair, const double* own, const double* between) {
+    pair.touched = own != nullptr;
+    for (int i = 0; i < 6; ++i) {
+      pair.own[i] = own != nullptr ? own[i] : 0.0;
+      pair.between[i] = between != nullptr ? between[i] : 0.0;
+    }
+  }
 
   // Has a relation been broken for long enough?
   bool broken(std::size_t channel, bool now, double dt) {
@@ -125,36 +145,41 @@ class ParityWatch {
     return true;
   }
 
-  // The load of a segment since its baseline, in its sensor's frame [N, Nm].
-  Spatial load_of(int segment, const Result& result) const {
+  // The load of a segment in its sensor's frame [N, Nm], from what it has of each axis [thresholds].
+  Spatial load_of(int segment, const double* shares) const {
     double w[6];
-    for (int i = 0; i < 6; ++i) {
-      const int row = first_[segment] + i;
-      w[i] = result.normalized[row] * rows_[row].contact;
-    }
+    for (int i = 0; i < 6; ++i) w[i] = shares[i] * rows_[first_[segment] + i].contact;
     return load(w);
   }
 
+  static double largest_size(const double* shares) {
+    return std::fabs(shares[largest(shares)]);
+  }
+
   template <class Contradicted>
-  void compare(const Pair& pair, const Result& result, double dt, Contradicted&& contradicted) {
+  void compare(Pair& pair, const Result& result, double dt, Contradicted&& contradicted) {
     const Layout& layout = observer_.layout();
     const int inner = layout.segments[pair.inner].sensor, outer = layout.segments[pair.outer].sensor;
     const std::size_t first = at_.wrench() + 6 * static_cast<std::size_t>(outer);
-    const double* own = result.normalized.data() + first_[pair.outer];
-    const double* between = result.normalized.data() + first_[pair.inner];
-    double most = 0.0, felt = 0.0;
-    for (int i = 0; i < 6; ++i) {
-      most = std::max(most, std::fabs(own[i]));
-      felt = std::max(felt, std::fabs(between[i]));
+    const double* all_own = result.normalized.data() + first_[pair.outer];
+    const double* all_between = result.normalized.data() + first_[pair.inner];
+    if (largest_size(all_own) < tuning_.parity_noise) {
+      const bool touched = largest_size(all_between) > tuning_.parity_noise;
+      touched ? refer(pair, all_own, all_between) : refer(pair, nullptr, nullptr);
     }
-    bool now = most > 1.0 && felt > tuning_.parity_noise &&
-        result.estimate.segment_settled(pair.inner) &&
+    double own[6], between[6];
+    for (int i = 0; i < 6; ++i) {
+      own[i] = all_own[i] - pair.own[i];
+      between[i] = all_between[i] - pair.between[i];
+    }
+    bool now = largest_size(own) > 1.0 && largest_size(between) > tuning_.parity_noise &&
+               result.estimate.segment_settled(pair.inner) &&
                result.estimate.segment_settled(pair.outer);
     if (now) {
       double seen[6];
       store(wrench_to_child(observer_.sensor_pose(inner),
                             wrench_to_parent(observer_.sensor_pose(outer),
-                                             load_of(pair.outer, result))),
+                                             load_of(pair.outer, own))),
             seen);
       double size2 = 0.0, left2 = 0.0;
       for (int i = 0; i < 6; ++i) {
@@ -162,9 +187,11 @@ class ParityWatch {
         size2 += x * x;
         left2 += left * left;
       }
-      now = size2 > tuning_.parity_clear * tuning_.parity_clear &&
-            left2 < std::max(tuning_.parity_left * tuning_.parity_left * size2,
-                tuning_.parity_noise * tuning_.parity_noise);
+      const double clear = pair.touched ? kClear : tuning_.parity_clear;
+      now = size2 > clear * clear &&
+            left2 < (pair.touched ? kLeft * kLeft * size2
+                                  : std::max(tuning_.parity_left * tuning_.parity_left * size2,
+                                             tuning_.parity_noise * tuning_.parity_noise));
     }
     const int axis = now ? only_axis(outer, own) : -1;
     const int other = now && axis < 0 ? swapped_axis(pair.outer, own) : -1;
@@ -262,7 +289,7 @@ class ParityWatch {
     bool now = result.estimate.segment_settled(g) &&
                std::max({std::fabs(x[3]), std::fabs(x[4]), std::fabs(x[5])}) > tuning_.parity_clear;
     if (now) {
-      const Spatial w = load_of(g, result);
+      const Spatial w = load_of(g, x);
       double unsure = 0.0;  // of its force [N]
       for (int i = 0; i < 3; ++i) unsure = std::max(unsure,
           tuning_.parity_noise * rows_[first_[g] + i].contact);

@@ -127,6 +127,8 @@ class Balances {
   void forget() {
     for (Group& group : groups_) group.time = kNaN;
   }
+  // Group g does not go on from its last value.
+  void forget(std::size_t g) { groups_[g].time = kNaN; }
 
  private:
   static void difference(const double* __restrict p, const double* __restrict p_before,

@@ -4,6 +4,7 @@
 // Theory: docs/theory.md, section 2.4.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
@@ -88,6 +89,36 @@ class Channels {
       regular &= balances.book(this->segment(g), present, now);
     }
     return regular;
+  }
+
+  // What a joint's torque, or a sensor, had last is not believed: nothing goes on from it.
+  void begin_torque_anew(std::size_t j) {
+    balances.forget(joint(j));
+    for (const std::size_t filter : {external(j), own(j), parity(j)}) filters.forget(filter);
+  }
+  void begin_sensor_anew(std::size_t s) {
+    const int own_sensor = static_cast<int>(s);
+    balances.forget(sensor(s));
+    if (kinds_[s] == SensorFilter::local) balances.forget(local(s));
+    if (kinds_[s] != SensorFilter::none) filters.forget(sensor_filter(s));
+    for (std::size_t g = 0; g < segments_; ++g) {
+      const Segment& part = layout_.segments[g];
+      const std::vector<int>& outer = part.successors;
+      if (part.sensor != own_sensor &&
+          std::find(outer.begin(), outer.end(), own_sensor) == outer.end())
+        continue;
+      balances.forget(segment(g));
+      filters.forget(segment_filter(g));
+    }
+    const auto uses = [own_sensor](const std::vector<Projection>& pairs) {
+      return std::any_of(pairs.begin(), pairs.end(),
+                         [own_sensor](const Projection& pair) { return pair.sensor == own_sensor; });
+    };
+    for (std::size_t j = 0; j < joints_.size(); ++j) {
+      if (uses(layout_.source_sensors[j])) filters.forget(external(j));
+      if (uses(layout_.outboard_sensors[j])) filters.forget(own(j));
+      if (uses(layout_.inboard_sensors[j])) filters.forget(parity(j));
+    }
   }
 
   // After `book` and the balance: what each filter does with this sample.

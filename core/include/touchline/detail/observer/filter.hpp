@@ -68,7 +68,7 @@ class Filters {
 
   bool settled(std::size_t g, const Instant& now) const {
     return groups_[g].present &&
-           now.time - groups_[g].since >= tuning_.settled_steps / bandwidth(g);
+           now.time - groups_[g].since >= tuning_.settled_steps / bandwidth(g) - kRounding;
   }
 
   // Does group g go on after a gap since `earlier`?
@@ -166,6 +166,8 @@ class Filters {
 
   void run() { step(keep_.data(), input_.data(), value_.data(), value_.size()); }
 
+  // Group g does not go on from its last value.
+  void forget(std::size_t g) { groups_[g].time = kNaN; }
   void forget() {
     for (Group& group : groups_) group.time = kNaN;
     doubtful_ = false;
@@ -174,6 +176,7 @@ class Filters {
 
  private:
   static constexpr std::size_t kMostRows = 6;  // of a group
+  static constexpr double kRounding = 1e-6;    // [s] of stamps: four units of a Unix time in doubles
 
   double bandwidth(std::size_t g) const { return bandwidths_[groups_[g].bandwidth]; }
   double pole_of(std::size_t handle, double dt) const {

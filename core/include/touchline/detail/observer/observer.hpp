@@ -125,6 +125,10 @@ class Observer {
     forget();
   }
 
+  // What a joint's torque, or a sensor, had last is not believed: its filters begin anew.
+  void begin_torque_anew(std::size_t j) { channels_.begin_torque_anew(j); }
+  void begin_sensor_anew(std::size_t s) { channels_.begin_sensor_anew(s); }
+
   const RowLayout& row_layout() const { return row_; }
   const Layout& layout() const { return layout_; }
   const Tree& tree() const { return tree_; }

@@ -51,12 +51,15 @@ class LoneChannel {
     all_ = 0.0;
     for (int i = 0; i < size; ++i) all_ += rows_[i] * rows_[i];
     if (free > 0 && all_ < chi2_limit(size - free, kArrival)) return {};  // they explain it alone
-    most_ = 0.0;
+    most_ = next_ = 0.0;
     best_ = {};
     visit_channels(g, [this](int channel, int other) { weigh(channel, other); });
     const double left = all_ - most_;
     const double limit = chi2_limit(std::max(1, size - 1 - free), kNoise);
-    if (!best_.any() || left > limit + kShape * kShape * all_ || left > kLeft * all_) return {};
+    // A load that noise nearly hides fits every channel, and a clear one none but the faulty one.
+    const bool clear = most_ - next_ > kOnly * kOnly && left < kFair * most_;
+    if (!best_.any() || left > limit + kShape * kShape * all_ || (left > kLeft * all_ && !clear))
+      return {};
     return borne_out() ? best_ : Suspect{};
   }
 
@@ -93,6 +96,9 @@ class LoneChannel {
   static constexpr double kShape = 0.03;  // and this part of it: filters turn with the arm
   // Of the squared size: what one channel leaves of a contact that noise, or a gap, nearly hides.
   static constexpr double kLeft = 0.1;
+  // Or sigmas by which no other channel explains as much. What is left may then be this part of what it
+  // explains: ten rows of noise beside a load of five sigmas are less than half.
+  static constexpr double kOnly = 3.0, kFair = 0.5;
 
   // Calls `visit(channel, other)` for all that segment g feels, with what one unit of it does to the
   // rows in `column_`; `other`: of swapped axes, else -1.
@@ -155,8 +161,14 @@ class LoneChannel {
       along += column_[i] * rows_[i];
       square += column_[i] * column_[i];
     }
-    if (!(square > 0.0) || along * along <= most_ * square) return;
-    most_ = along * along / square;
+    if (!(square > 0.0)) return;
+    const double explained = along * along / square;
+    if (!(explained > most_)) {
+      next_ = std::max(next_, explained);
+      return;
+    }
+    next_ = most_;
+    most_ = explained;
     best_ = {channel, other, along / square};
   }
 
@@ -197,7 +209,8 @@ class LoneChannel {
   std::vector<double> out_until_;  // per channel [s]
   bool any_out_ = false;
   std::vector<double> rows_, column_;  // to the scale of the noise
-  double all_ = 0.0, most_ = 0.0;      // squared lengths: of the rows, and along the best channel
+  // Squared lengths: of the rows, along the best channel, and along the one after it.
+  double all_ = 0.0, most_ = 0.0, next_ = 0.0;
   Suspect best_;
 };
 
