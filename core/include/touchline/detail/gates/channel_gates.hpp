@@ -36,10 +36,10 @@
 
 namespace touchline {
 
-// A channel is at another level, and no other one bears that out.
 // Does a channel that is told reach the estimates?
 enum class Passes { no, begins, goes_on };
 
+// A channel is at another level, and no other one bears that out.
 enum class Moved {
   no,
   alone,   // a joint torque: a push may do that, but not within one sample as a blow
