@@ -302,10 +302,10 @@ def identify(
     Example: touchline bench identify --arms sara-full --runs 10
 
     Simulated arms follow the motion of `touchline calibrate --plan`. Their inertias are 1.5 % off,
-    and they carry a payload that the model lacks. Seven kinds of arms: without further errors, with
-    a sensor's frame 2 degrees and 5 mm off, a bias of 2 N, friction of 1 Nm, a delay of 5 ms,
-    friction that falls, or gains of currents that are off. Friction falls with speed to 1 Nm, from
-    1.3 to 2.2 Nm. Gains are 0.7 to 1.4 times the described ones, beside 1 to 5 Nm of friction in
+    and they carry a payload that the model lacks. Six kinds of arms: without further errors, with a
+    sensor's frame 2 degrees and 5 mm off, a bias of 2 N, friction of 1 Nm, a delay of 5 ms, or
+    friction that falls. It falls with speed to 1 Nm, from 1.3 to 2.2 Nm. Of a seventh kind gains of
+    currents are off. Gains are 0.7 to 1.4 times the described ones, beside 1 to 5 Nm of friction in
     each motor; then a payload is there only where a sensor weighs it.
     Each line has a figure's error and how many runs are within the goal. For real arms: what is
     left of the residuals on motion that played no part.

@@ -15,12 +15,12 @@ class PairDescent {
  public:
   PairDescent(const PairView& view, PairFit& fit) : view_(view), fit_(fit) {}
 
-  // When it ends: after so many steps. Where the cost is `hopeless`, from a third of them on, and before
-  // where a step leaves more than a tenth of what was allowed, `first` at the beginning. Where all that a
-  // step can better leaves it hopeless. And where that, or what a step has bettered, is `little`.
+  // When it ends: after so many steps. After a third of them where the cost is `hopeless`, at once where
+  // all that a step can better leaves it twice as large. And where that, or what a step has bettered, is
+  // `little`.
   struct Ends {
     int most;
-    double hopeless, little, first;
+    double hopeless, little;
   };
 
   // From where. `bound`: do the friction cones guide it too, or do they only judge where it ends?
@@ -32,7 +32,6 @@ class PairDescent {
     held_ = held;
     steps_ = 0;
     damping_ = 1e-3;
-    allowed_ = ends.first;
     working_ = true;
     fit_.solve_forces(pair_, bound_);
     fit_.information_at_hand(pair_, H_, g_, bound_);
@@ -57,7 +56,6 @@ class PairDescent {
   static constexpr int kStep = 9;  // units of work of a step, beside those of looking for its surface
   static constexpr double kHold = 5e-3;      // of an end that is held, one sigma of a step [m]
   static constexpr double kFarthest = 0.04;  // that a step goes [m]
-  static constexpr double kFall = 0.1;       // part of what a cost may be that is left by a step
 
   // One step more; false if it was the last one.
   bool improve() {
@@ -75,9 +73,7 @@ class PairDescent {
     } else {
       damping_ *= 8.0;
     }
-    allowed_ = std::max(ends_.hopeless, kFall * allowed_);
-    const bool late = steps_ >= ends_.most / 3;
-    const bool hopeless = pair_.cost > (late ? ends_.hopeless : allowed_);
+    const bool hopeless = steps_ >= ends_.most / 3 && pair_.cost > ends_.hopeless;
     if (hopeless || ++steps_ == ends_.most || !(damping_ < 1e6)) return false;
     if (moved) fit_.information_at_hand(pair_, H_, g_, bound_);
     return true;
@@ -96,7 +92,7 @@ class PairDescent {
     solve_cholesky<n>(H, x);
     double gain = 0.0;  // at most
     for (int i = 0; i < n; ++i) gain += 2.0 * g_[i] * x[i];
-    if (gain < ends_.little || (steps_ > 0 && pair_.cost - gain > ends_.hopeless)) return 0.0;
+    if (gain < ends_.little || (steps_ > 0 && pair_.cost - gain > 2.0 * ends_.hopeless)) return 0.0;
     double length = 0.0;
     for (int k = 0; k < 2; ++k) {
       PairEnd& e = s.ends[k];
@@ -122,7 +118,7 @@ class PairDescent {
   Pair pair_;
   Ends ends_{};
   int held_ = -1, steps_ = 0, looked_ = 0;
-  double damping_ = 0.0, allowed_ = 0.0;
+  double damping_ = 0.0;
   bool bound_ = false, working_ = false;
   // Of the pair that is left: its information and the gradient, as `PairFit` has them.
   double H_[PairFit::kUnknowns * PairFit::kUnknowns], g_[PairFit::kUnknowns];

@@ -72,7 +72,6 @@ class PairSearch {
   static constexpr double kSame = 0.01;    // solutions nearer than this are one [m]
   static constexpr double kWindow = 25.0;  // of cost: beyond it a solution weighs nothing
   static constexpr double kHopeless = 100.0;  // cost from which nothing is brought to where it explains
-  static constexpr double kFirst = 5e4;       // cost at the beginning, from which it soon explains
   static constexpr double kLittle = 0.02;     // of cost: not worth a step
 
   // Units of work: the beginning of a descent, where no cache has the mesh; where a force enters its body;
@@ -134,7 +133,7 @@ class PairSearch {
   template <class Pairs>
   int descend(int units, const Pairs& from) {
     if (!descent_.working()) {
-      descent_.begin(from[next_++], {kSteps, kHopeless, kLittle, kFirst}, false);
+      descent_.begin(from[next_++], {kSteps, kHopeless, kLittle}, false);
       return kBegin;
     }
     const int done = descent_.work(units);
