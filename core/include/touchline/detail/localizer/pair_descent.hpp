@@ -15,12 +15,13 @@ class PairDescent {
  public:
   PairDescent(const PairView& view, PairFit& fit) : view_(view), fit_(fit) {}
 
-  // When it ends: after so many steps. After a third of them where the cost is `hopeless`, at once where
-  // all that a step can better leaves it twice as large. And where that, or what a step has bettered, is
-  // `little`.
+  // When it ends: after so many steps. Where the cost is `hopeless`, from a third of them on. Before that
+  // a step must not leave more than a part of what was allowed: `soon` at the beginning, or the cost that
+  // it begins with. It ends where all that a step can better leaves it twice as large as hopeless. And
+  // where that, or what a step has bettered, is `little`.
   struct Ends {
     int most;
-    double hopeless, little;
+    double hopeless, little, soon;
   };
 
   // From where. `bound`: do the friction cones guide it too, or do they only judge where it ends?
@@ -34,6 +35,7 @@ class PairDescent {
     damping_ = 1e-3;
     working_ = true;
     fit_.solve_forces(pair_, bound_);
+    allowed_ = std::max(ends.soon, pair_.cost);
     fit_.information_at_hand(pair_, H_, g_, bound_);
   }
   void drop() { working_ = false; }
@@ -55,6 +57,7 @@ class PairDescent {
  private:
   static constexpr int kStep = 9;  // units of work of a step, beside those of looking for its surface
   static constexpr double kHold = 5e-3;      // of an end that is held, one sigma of a step [m]
+  static constexpr double kFall = 0.3;       // part of what a cost may be that is left by a step
   static constexpr double kFarthest = 0.04;  // that a step goes [m]
 
   // One step more; false if it was the last one.
@@ -73,7 +76,9 @@ class PairDescent {
     } else {
       damping_ *= 8.0;
     }
-    const bool hopeless = steps_ >= ends_.most / 3 && pair_.cost > ends_.hopeless;
+    allowed_ = std::max(ends_.hopeless, kFall * allowed_);
+    const bool late = steps_ >= ends_.most / 3;
+    const bool hopeless = pair_.cost > (late ? ends_.hopeless : allowed_);
     if (hopeless || ++steps_ == ends_.most || !(damping_ < 1e6)) return false;
     if (moved) fit_.information_at_hand(pair_, H_, g_, bound_);
     return true;
@@ -118,7 +123,7 @@ class PairDescent {
   Pair pair_;
   Ends ends_{};
   int held_ = -1, steps_ = 0, looked_ = 0;
-  double damping_ = 0.0;
+  double damping_ = 0.0, allowed_ = 0.0;
   bool bound_ = false, working_ = false;
   // Of the pair that is left: its information and the gradient, as `PairFit` has them.
   double H_[PairFit::kUnknowns * PairFit::kUnknowns], g_[PairFit::kUnknowns];

@@ -84,6 +84,7 @@ class PairParts {
   static constexpr int kBegin = 8, kElsewhere = 60;
   static constexpr double kHopeless = 100.0;  // cost from which nothing is brought to where it explains
   static constexpr double kLittle = 2.0;      // of cost: a part is told by its place, not by its cost
+  static constexpr double kSoon = 5e4;        // cost of a beginning from which it soon explains
   static constexpr double kWindow = 13.0;     // of cost: 99 % of chi2 with four degrees of freedom
   // Cost of the cones through which a walk goes on, and which still tells: faces are flat where
   // links are round.
@@ -124,7 +125,7 @@ class PairParts {
       stage_ = Stage::done;
       return kBegin;
     }
-    descent_.begin(task.pair, {kSteps, kHopeless, kLittle}, true, task.held);
+    descent_.begin(task.pair, {kSteps, kHopeless, kLittle, kSoon}, true, task.held);
     return done;
   }
 

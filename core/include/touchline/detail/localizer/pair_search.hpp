@@ -73,6 +73,7 @@ class PairSearch {
   static constexpr double kWindow = 25.0;  // of cost: beyond it a solution weighs nothing
   static constexpr double kHopeless = 100.0;  // cost from which nothing is brought to where it explains
   static constexpr double kLittle = 0.02;     // of cost: not worth a step
+  static constexpr double kEver = std::numeric_limits<double>::infinity();  // any cost may still fall
 
   // Units of work: the beginning of a descent, where no cache has the mesh; where a force enters its body;
   // the evidence of a solution; another view.
@@ -133,7 +134,7 @@ class PairSearch {
   template <class Pairs>
   int descend(int units, const Pairs& from) {
     if (!descent_.working()) {
-      descent_.begin(from[next_++], {kSteps, kHopeless, kLittle}, false);
+      descent_.begin(from[next_++], {kSteps, kHopeless, kLittle, kEver}, false);
       return kBegin;
     }
     const int done = descent_.work(units);
