@@ -82,16 +82,16 @@ def test_the_description_is_in_the_page(page):
 
 def test_moments_ignore_what_is_not_known():
     moments = Moments(2)
-    values = np.array([[1.0, np.nan], [-3.0, 2.0], [9.0, 4.0]])
-    where = np.repeat([[True], [True], [False]], 2, axis=1)
-    moments += Moments.of(values[:1], where[:1])
-    moments += Moments.of(values[1:], where[1:])
+    columns = np.array([[1.0, -3.0, 9.0], [np.nan, 2.0, 4.0]])
+    used = np.array([[True, True, False]] * 2)
+    moments += Moments.of(columns[:, :1], used[:, :1])
+    moments += Moments.of(columns[:, 1:], used[:, 1:])
     np.testing.assert_allclose(moments.rms, [np.sqrt(5.0), 2.0])
     np.testing.assert_allclose(moments.mean, [-1.0, 2.0])
     np.testing.assert_allclose(moments.largest, [3.0, 2.0])
-    nothing = Moments.of(values, np.zeros((3, 2), bool))
+    nothing = Moments.of(columns, np.zeros((2, 3), bool))
     assert np.isnan([nothing.rms, nothing.mean, nothing.largest]).all()
-    whole = Moments.of(values[:, :1], where[:, :1] | True)
+    whole = Moments.of(columns[:1], np.ones((1, 3), bool))
     np.testing.assert_allclose([whole.mean[0], whole.largest[0]], [7.0 / 3.0, 9.0])
 
 

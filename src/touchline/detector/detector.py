@@ -3,10 +3,11 @@
 
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import reduce
 
 import numpy as np
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Mask
 from touchline.detector.residual_noise import native_noise
 from touchline.detector.thresholds import Thresholds, make_thresholds
 from touchline.model.robot import Robot
@@ -39,6 +40,12 @@ class Detection(Value):
     normalized: Array
     drift: Array
     quiet: Array
+
+    @property
+    def touched(self) -> Mask:
+        """Whether any segment feels something, for each of N samples (N,)."""
+        # Segment by segment: numpy's own reduction of short rows takes 60 times as long.
+        return reduce(np.logical_or, self.levels.T, np.zeros(len(self.levels), bool))
 
 
 @dataclass(frozen=True)

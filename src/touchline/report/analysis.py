@@ -286,7 +286,7 @@ class _Run:
         self._outputs.pressed(time, samples.q, estimate)
         self._outputs.events(events)
         self._outputs.postures(time, samples.q)
-        return np.any(detection.levels, axis=1, keepdims=True)[:, 0]
+        return detection.touched
 
     def finish(
         self,

@@ -4,6 +4,7 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ ESTIMATES, CONTACTS, POSTURES = "estimates.parquet", "contacts.parquet", "postur
 EVENTS, ANALYSIS, REPORT = "events.json", "analysis.json", "report.html"
 NAMES = (ESTIMATES, CONTACTS, POSTURES, EVENTS, ANALYSIS, REPORT)
 LONGEST = 10.0  # s; the first seconds of a longer touch tell its widget no more
+REST = 100.0  # times as long as `events.json` took to write, until it is written again
 MOST = 500  # samples of a touch that are looked at
 CONTACT_SCHEMA = {"time": "f8", "health": "u4"} | contact_schema()
 
@@ -121,9 +123,10 @@ class Outputs:
         self._estimates = EstimateWriter(directory, *names)
         self._contacts = TableWriter(directory / CONTACTS, CONTACT_SCHEMA)
         self._postures = PostureWriter(directory / POSTURES, robot)
-        self._written: list[Any] | None = None
+        self._written: list[Any] = []
+        self._write_next = 0.0  # by the clock, at the earliest
         self._lines: dict[int, str] = {}  # of events that have ended, which change no more
-        self.events([])
+        _write_lines(self.directory / EVENTS, [])
 
     def estimates(self, time: np.ndarray, estimate: Estimate) -> None:
         """Append the estimates of N samples."""
@@ -146,11 +149,14 @@ class Outputs:
         self._contacts.write(rows | table.columns())
 
     def events(self, events: Sequence[Event]) -> None:
-        """Bring `events.json` up to date: an event is in it as soon as it begins."""
+        """Bring `events.json` up to date: an event is in it soon after it is known."""
         state = [(event.cleared, event.level) for event in events]
-        if state != self._written:
-            _write_lines(self.directory / EVENTS, [self._told(event) for event in events])
-            self._written = state
+        told = [self._told(event) for event in events]  # in time: what tells of widgets goes on
+        began = monotonic()
+        if state != self._written and began >= self._write_next:
+            _write_lines(self.directory / EVENTS, told)
+            ended = monotonic()
+            self._written, self._write_next = state, ended + REST * (ended - began)
 
     def _told(self, event: Event) -> str:
         line = self._lines.get(event.id)

@@ -22,22 +22,20 @@ class Moments:
         self._largest = np.zeros(columns)
 
     @classmethod
-    def of(cls, values: Array, where: Mask) -> "Moments":
-        """Those of rows (N, c) where (N, c) is true."""
-        moments = cls(values.shape[1])
-        known = where.any(axis=0)
-        if not known.any():
+    def of(cls, columns: Array, used: Mask) -> "Moments":
+        """Those of columns (c, N), each in one piece, where (c, N) is true."""
+        moments = cls(len(columns))
+        if not columns.size:
             return moments
-        # Column by column, in memory too: a segment without a sensor has no wrench at all.
-        columns, used = np.ascontiguousarray(values.T[known]), where.T[known]
-        moments.count[known] = len(values)
-        if not (used.all() and np.isfinite(columns).all()):
+        moments.count[:] = columns.shape[1]
+        squares = np.einsum("ij,ij->i", columns, columns)
+        if not (used.all() and np.isfinite(squares).all()):
             used = used & np.isfinite(columns)
             columns = np.where(used, columns, 0.0)
-            moments.count[known] = used.sum(axis=1)
-        moments._sum[known] = columns.sum(axis=1)
-        moments._squares[known] = np.einsum("ij,ij->i", columns, columns)
-        moments._largest[known] = np.maximum(columns.max(axis=1), -columns.min(axis=1))
+            moments.count[:] = np.count_nonzero(used, axis=1)
+            squares = np.einsum("ij,ij->i", columns, columns)
+        moments._sum, moments._squares = columns.sum(axis=1), squares
+        moments._largest = np.maximum(columns.max(axis=1), -columns.min(axis=1))
         return moments
 
     def __iadd__(self, other: "Moments") -> "Moments":
@@ -137,24 +135,26 @@ class Statistics:
         health = estimate.health
         settled = (health & Health.SETTLING) == 0
         seen = watch if settled.all() else watch[settled]
-        for state in range(len(Watch)):
-            self.watch[:, state] += np.count_nonzero(seen == state, axis=0)
+        for segment, states in enumerate(seen.T):
+            self.watch[segment] += np.bincount(states, minlength=len(Watch))
         self.clock.add(time)
         self.healthy += int((health == 0).sum())
         any_of = int(np.bitwise_or.reduce(health, initial=0))
         for bit in Health:
             if bit & any_of:
                 self.health[bit] += int(np.count_nonzero(health & bit))
-        touched = np.any(detection.levels, axis=1)
+        touched = detection.touched
+        any_touch = bool(touched.any())
         wrench = estimate.segment_wrench.reshape(len(time), -1)
-        of_wrenches = np.repeat(estimate.segment_settled, 6, axis=1)
-        for values, settled, all_of, without_touch in (
-            (estimate.tau_ext, estimate.joint_settled, self.torque, self.quiet_torque),
+        of_wrenches = np.repeat(estimate.segment_settled.T, 6, axis=0)
+        for values, used, all_of, without_touch in (
+            (estimate.tau_ext, estimate.joint_settled.T, self.torque, self.quiet_torque),
             (wrench, of_wrenches, self.wrench, self.quiet_wrench),
         ):
-            if touched.any():
-                all_of += Moments.of(values[touched], settled[touched])
-                values, settled = values[~touched], settled[~touched]
-            moments = Moments.of(values, settled)
+            columns = np.array(values.T, order="C")
+            if any_touch:
+                all_of += Moments.of(*(np.compress(touched, of, 1) for of in (columns, used)))
+                columns, used = (np.compress(~touched, of, 1) for of in (columns, used))
+            moments = Moments.of(columns, used)
             all_of += moments
             without_touch += moments
