@@ -9,7 +9,7 @@ import pytest
 import touchline as tl
 from touchline.bench.reliability.campaign import Kept, Part, run_all
 from touchline.bench.reliability.judge import judge, listen
-from touchline.bench.reliability.run import tables, untold_channels
+from touchline.bench.reliability.run import Health, Plan, healthy_motion, tables, untold_channels
 from touchline.check.parity import parity_of
 from touchline.errors import InputError
 from touchline.simulation.contacts import Profile, ScriptedContact
@@ -165,9 +165,17 @@ def test_the_tables_count_what_was_missed(listened):
         judge(pipeline, recording, healthy, fault_named(name), channel, ("free", PHASES["free"]))
         for name in ("spike", "delay")
     ]
-    text, missed = tables(outcomes, 1.0, ["sara: tau.joint1 stuck"] * 2)
+    text, missed = tables(outcomes, Health(1.0, 40, ("sara: tau.joint1 stuck",) * 2))
     assert "delay, tau" in text and "spike, tau" in text
+    assert "false reports in 1.00 h of healthy motion, 40 pushes" in text
     assert missed
+
+
+def test_healthy_arms_are_pushed_every_few_seconds(monkeypatch):
+    monkeypatch.setattr("touchline.trials.recordings.ROBOTS", ("sara",))
+    healthy = healthy_motion(Plan(healthy=0.15))
+    assert healthy.hours == pytest.approx(9.0 / 3600.0) and healthy.pushes == 3
+    assert not healthy.reports
 
 
 def test_what_the_layout_cannot_tell_is_counted_apart(listened):
@@ -183,7 +191,8 @@ def test_what_the_layout_cannot_tell_is_counted_apart(listened):
         )
         for name in ("wrist.fz", "tau.joint2")
     ]
-    text, _ = tables([replace(outcome, told=9.0, harmless=False) for outcome in outcomes], 1.0, [])
+    late = [replace(outcome, told=9.0, harmless=False) for outcome in outcomes]
+    text, _ = tables(late, Health(1.0, 40, ()))
     lines = {" ".join(line.split()) for line in text.splitlines()}
     assert "and in 1 runs that the layout cannot tell none 0.0 %" in lines
     assert "sara-full delay wrist.fz 1 of 1 the layout cannot" in lines

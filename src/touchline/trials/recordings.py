@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Healthy recordings: a simulated arm that moves, and is pushed once."""
+"""Healthy recordings: a simulated arm that moves, and is pushed once or every few seconds."""
 
 from dataclasses import dataclass, replace
 
@@ -21,6 +21,9 @@ PUSHED, RELEASED = 0.9, 1.4  # s
 PHASES = {"free": 0.6, "onset": PUSHED, "contact": 1.15, "release": RELEASED}  # s: a fault begins
 DRAWS = 1000  # points that are tried
 OUTBOARD = 4  # so many of the outermost links are pushed: all layouts feel these
+EVERY = 3.0  # s from push to push, where there are many
+MANY_OUTBOARD = 6  # so many links are pushed then
+LASTS, FORCES, RISES = (0.2, 1.2), (8.0, 40.0), (0.005, 0.08)  # s, N, s: of the many
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,7 @@ def record(robot: Robot, seed: int, pushed: bool = True, seconds: float = SECOND
     rng = np.random.default_rng([seed, 11])
     settings = Run(seed=seed, noise=SensorNoise(), model_error=MODEL_ERROR, physics=2000.0)
     free = scripted(robot, [], seconds, SPEED, settings).samples
-    at = _reachable(robot, free, rng)
+    at = _reachable(robot, free, (PUSHED, RELEASED), OUTBOARD, rng)
     profile = Profile(PUSHED, RELEASED - PUSHED - 0.04, 0.02, 0.02)
     push = ScriptedContact(at.link, at.point, -FORCE * at.normal, profile, force_frame="link")
     samples = scripted(robot, [push], seconds, SPEED, settings).samples if pushed else free
@@ -90,15 +93,33 @@ def record(robot: Robot, seed: int, pushed: bool = True, seconds: float = SECOND
     return Recording(robot, seed, samples, body)
 
 
-def _reachable(robot: Robot, free: Samples, rng: np.random.Generator) -> SurfacePoint:
-    """A point that a finger reaches from outside in all postures of the push."""
+def record_pushes(robot: Robot, seed: int, seconds: float) -> tuple[Samples, int]:
+    """The arm swings and is pushed every few seconds, by forces, times and rises at random.
+
+    Returns the samples, and how many pushes there are.
+    """
+    rng = np.random.default_rng([seed, 12])
+    settings = Run(seed=seed, noise=SensorNoise(), model_error=MODEL_ERROR, physics=2000.0)
+    free = scripted(robot, [], seconds, SPEED, settings).samples
+    pushes = []
+    for begin in np.arange(1.0, seconds - LASTS[1] - 0.1, EVERY):
+        lasts, force, rise = (rng.uniform(*span) for span in (LASTS, FORCES, RISES))
+        at = _reachable(robot, free, (begin, begin + lasts), MANY_OUTBOARD, rng)
+        profile = Profile(float(begin), max(0.0, lasts - 2 * rise), rise, rise)
+        push = ScriptedContact(at.link, at.point, -force * at.normal, profile, force_frame="link")
+        pushes.append(push)
+    return scripted(robot, pushes, seconds, SPEED, settings).samples, len(pushes)
+
+
+def _reachable(
+    robot: Robot, free: Samples, span: tuple[float, float], links: int, rng: np.random.Generator
+) -> SurfacePoint:
+    """A point of the outermost links that a finger reaches all the time from here to there [s]."""
     surface = TouchableSurface(robot)
-    poses = [
-        robot.T_world_links(q)
-        for q in free.q[(free.time >= PUSHED) & (free.time <= RELEASED)][:: max(1, len(free) // 25)]
-    ]
+    postures = free.q[(free.time >= span[0]) & (free.time <= span[1])]
+    poses = [robot.T_world_links(q) for q in postures[:: max(1, len(free) // 25)]]
     for _ in range(DRAWS):
-        at = surface.draw(rng, structure_links(robot)[-OUTBOARD:])
+        at = surface.draw(rng, structure_links(robot)[-links:])
         for T in poses:
             surface.place(T)
             R, p = T[at.link][:3, :3], T[at.link][:3, 3]

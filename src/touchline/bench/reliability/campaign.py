@@ -3,11 +3,13 @@
 
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, fields
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -20,6 +22,7 @@ from touchline.pipeline.pipeline import Pipeline
 from touchline.trials.faults import FAULTS, Channel, FaultType, cases_of, channels_of
 from touchline.trials.recordings import PHASES, record, robot_named
 
+_P, _R = TypeVar("_P"), TypeVar("_R")
 NUMBERS = tuple(
     field.name for field in fields(Outcome) if field.name not in ("robot", "fault", "channel")
 )
@@ -128,19 +131,22 @@ def run_part(part: Part, folder: Path | None) -> list[Outcome]:
 
 def run_all(parts: Sequence[Part], folder: Path | None, processes: int) -> Iterator[Outcome]:
     """Of all recordings, on so many processes; in the order of `parts`."""
-    from tqdm import tqdm
-
     if folder is not None:
         Kept(folder)  # a folder of another build is told before anything runs
+    for outcomes in spread(partial(run_part, folder=folder), parts, processes):
+        yield from outcomes
+
+
+def spread(work: Callable[[_P], _R], parts: Sequence[_P], processes: int) -> Iterator[_R]:
+    """What comes of each part, on so many processes; in the order of `parts`."""
+    from tqdm import tqdm
+
+    bar = partial(tqdm, total=len(parts), desc="reliability", disable=None, leave=False)
     if processes <= 1 or len(parts) <= 1:
-        for part in tqdm(parts, desc="reliability", disable=None, leave=False):
-            yield from run_part(part, folder)
+        yield from map(work, bar(parts))
         return
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        futures = {pool.submit(run_part, part, folder): part for part in parts}
-        done = as_completed(futures)
-        for _ in tqdm(done, total=len(parts), desc="reliability", disable=None, leave=False):
+        futures = [pool.submit(work, part) for part in parts]
+        for _ in bar(as_completed(futures)):
             pass
-    found = {part: future.result() for future, part in futures.items()}
-    for part in parts:
-        yield from found[part]
+    yield from (future.result() for future in futures)
