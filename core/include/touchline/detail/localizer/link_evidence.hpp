@@ -46,12 +46,14 @@ class LinkEvidence {
     found_.resize(surfaces.bodies(segment_).size());
     shares_.resize(found_.size());
     sums_.resize(found_.size());
+    body_areas_.resize(found_.size());
     for (std::size_t b = 0; b < surfaces.bodies(segment_).size(); ++b) {
       for (int s : surfaces.bodies(segment_)[b].surfaces) {
         const int count = static_cast<int>(surfaces.samples(s).size());
         for (int i = 0; i < count; ++i) patches_.push_back({static_cast<int>(b), s, i});
         for (const Triangle& t : surfaces[s].mesh.triangles())
           areas_[s] += 0.5 * norm(cross(t.ab, t.ac)) / std::max(count, 1);
+        body_areas_[b] += count * areas_[s];
       }
     }
     const double samples = std::max(1.0, std::ceil(settings.walk / period));
@@ -89,6 +91,8 @@ class LinkEvidence {
 
  private:
   static constexpr double kNone = -std::numeric_limits<double>::infinity();
+  // Of the way to where two bodies are alike, no unit: rounding must not decide which is the first.
+  static constexpr double kShort = 0.95;
 
   struct Patch {
     int body, surface, sample;
@@ -150,7 +154,8 @@ class LinkEvidence {
       for (int k = 0; k <= i; ++k)
         covariance_[i * rows_ + k] +=
             resting_.scatter(std::max(joints_[i], joints_[k]), std::min(joints_[i], joints_[k]));
-      covariance_[i * (rows_ + 1)] += crosstalk_ * crosstalk_ * largest * largest;
+      const double offset = settings_.offset_doubt * resting_.mean(joints_[i]);
+      covariance_[i * (rows_ + 1)] += crosstalk_ * crosstalk_ * largest * largest + offset * offset;
     }
     if (!cholesky(covariance_.data(), rows_, 1e-15)) return;
     std::fill(sums_.begin(), sums_.end(), 0.0);
@@ -164,16 +169,43 @@ class LinkEvidence {
     for (std::size_t k = 0; k < each_ && next_ < patches_.size(); ++k) look(patches_[next_++]);
     if (next_ < patches_.size()) return;
     walking_ = false;
-    double all = 0.0;
-    for (double sum : sums_) all += sum;
+    double all = 0.0, even = 0.0;
+    for (std::size_t b = 0; b < sums_.size(); ++b) {
+      all += sums_[b];
+      if (sums_[b] > 0.0) even += sums_[b] / body_areas_[b];
+    }
     if (!(all > 0.0)) return;
+    const double way = toward_links(all, even);
     for (std::size_t b = 0; b < sums_.size(); ++b) {
       if (sums_[b] > 0.0) shares_[b] = found_[b];
       shares_[b].node = surfaces_.bodies(segment_)[b].node;
-      shares_[b].share = sums_[b] / all;
+      shares_[b].share = by_area(b, all) + way * (by_link(b, even) - by_area(b, all));
     }
     known_ = true;
     ++revision_;
+  }
+
+  // The probability of a body if any area is touched alike, and if any link is. `all`, `even`: the sum
+  // of the evidence, and of its means over links.
+  double by_area(std::size_t b, double all) const { return sums_[b] / all; }
+  double by_link(std::size_t b, double even) const {
+    return sums_[b] > 0.0 ? sums_[b] / body_areas_[b] / even : 0.0;
+  }
+
+  // Hands may choose a point of the arm, any area alike, or first a link, any link alike. How far from
+  // the one to the other the body that areas name is least sure, and yet the first.
+  double toward_links(double all, double even) const {
+    std::size_t top = 0;
+    for (std::size_t b = 1; b < sums_.size(); ++b) top = sums_[b] > sums_[top] ? b : top;
+    const double loss = by_area(top, all) - by_link(top, even);
+    if (!(loss > 0.0)) return 0.0;
+    double way = 1.0;
+    for (std::size_t b = 0; b < sums_.size(); ++b) {
+      const double gain = by_link(b, even) - by_area(b, all) + loss;
+      if (b != top && gain > 0.0)
+        way = std::min(way, kShort * (by_area(top, all) - by_area(b, all)) / gain);
+    }
+    return way;
   }
 
   // What the rows say of a contact on the body of `node`.
@@ -241,6 +273,7 @@ class LinkEvidence {
 
   std::vector<Patch> patches_;  // of all bodies, body by body
   std::vector<double> areas_;   // of one patch, by surface [m2]
+  std::vector<double> body_areas_;  // of all patches of a body [m2]
   std::size_t each_ = 0;        // patches in a sample
 
   // The step [Nm] and the posture, as means.

@@ -120,6 +120,10 @@ struct LocalizerTuning {
   // bent by all that its joint carries, and a hand is no point. Half: too sure of the link. Double:
   // links are told apart less often.
   double crosstalk = 1.5;
+  // One sigma of a joint's torque, in parts of what it shows at rest: friction and payloads change
+  // as the arm gives way. Half: too sure of links where there is friction. Double: arms that are
+  // off, but steadily, tell links apart less often.
+  double offset_doubt = 0.5;
   // All patches are looked at within so long [s]. Half: twice the time in a sample. Double: bodies
   // get their probability 30 ms later.
   double walk = 0.03;
@@ -183,6 +187,7 @@ struct LocalizerTuning {
     v("looks", "1", t.looks);
     v("smoothness", "m2", t.smoothness);
     v("crosstalk", "1", t.crosstalk);
+    v("offset_doubt", "1", t.offset_doubt);
     v("walk", "s", t.walk);
     v("step_memory", "s", t.step_memory);
     v("turned", "rad", t.turned);
