@@ -57,7 +57,8 @@ int main() {
       Beside beside{{(1.0 / norm(one)) * one, {}}, {0.0, 0.0}};
       beside.axis[1] = cross(line.direction, beside.axis[0]);
       const auto all = [](double) { return 1.0; };
-      mesh.around(line, beside, limit, steep, all, [&](const SurfacePoint& p) {
+      int boxes = 0;
+      mesh.around(line, beside, limit, steep, boxes, all, [&](const SurfacePoint& p) {
         const Vec3 off = p.point - line.origin;
         const double way = norm(off - dot(off, line.direction) * line.direction);
         const double a = dot(beside.axis[0], off), b = dot(beside.axis[1], off);
@@ -68,7 +69,8 @@ int main() {
       // Weighed, none is left out whose nearest point is less far; the bound shrinks as it may.
       beside.weight[0] = 4.0, beside.weight[1] = 90.0;
       double most = 0.5, least = 1e300;
-      mesh.around(line, beside, limit, steep, [&](double) { return most; }, [&](const SurfacePoint& p) {
+      const auto within = [&](double) { return most; };
+      mesh.around(line, beside, limit, steep, boxes, within, [&](const SurfacePoint& p) {
         if (seen[p.face] != p.distance) ++wrong;
         least = std::min(least, weighed[p.face]);
         weighed.erase(p.face);

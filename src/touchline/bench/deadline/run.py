@@ -6,7 +6,7 @@ The same input goes three times through a new pipeline, and of each update the l
 What the machine does to one of them it rarely does to all; what the update needs comes back.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import count
 from time import thread_time_ns
@@ -18,10 +18,12 @@ from touchline.bench.tables import Row, aligned
 from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
 from touchline.numbers import check_least
+from touchline.pipeline.pipeline import Pipeline
 from touchline.trials.arms import TIERS
 from touchline.trials.cell import Begin, Cell
+from touchline.trials.interactions import ARM_SPEED, InteractionSampler
 from touchline.trials.scene import arm_and_skin, make_pipeline, make_scene
-from touchline.trials.touches import Signals, resting_signals
+from touchline.trials.touches import Signals, TouchSampler, resting_signals
 
 BUDGET = 125.0  # us: the observer runs at 8 kHz on the robot (Iskandar et al., ICRA 2021)
 REPEATS = 3
@@ -29,6 +31,7 @@ TIER = 1  # of noise
 IDLE = 1.0  # s of a run without contact
 WEAK = (2.0, 5.0)  # N: what many places of several links explain, and
 SPEED = 0.5  # rad/s of every joint meanwhile
+KINDS = ("contact", "collision")  # of two hands that clamp a link, in turn
 HEAD: Row = (
     "arm", "contacts", "begin", "force", "motion",
     "updates", "median", "p99", "p99.9", "p99.99", "max", f"over {BUDGET:g} us", "first update",
@@ -63,12 +66,11 @@ class Line:
         )  # fmt: skip
 
 
-def update_times(robot: Robot, skin: Skin, signals: Signals, repeats: int = REPEATS) -> Array:
+def update_times(make: Callable[[], Pipeline], signals: Signals, repeats: int = REPEATS) -> Array:
     """Least CPU time [us] of each update (N,), over repeats of the same signals.
 
     Args:
-        robot: the robot.
-        skin: its surfaces.
+        make: makes a new pipeline.
         signals: N samples.
         repeats: how often they go through a new pipeline.
     """
@@ -76,7 +78,7 @@ def update_times(robot: Robot, skin: Skin, signals: Signals, repeats: int = REPE
     samples = list(zip(s.time.tolist(), s.q, s.qd, s.tau, s.wrench, strict=True))
     least = np.full(len(samples), np.inf)
     for _ in range(repeats):
-        update = make_pipeline(robot, skin).update
+        update = make().update
         for i, sample in enumerate(samples):
             begin = thread_time_ns()
             update(*sample)
@@ -86,7 +88,7 @@ def update_times(robot: Robot, skin: Skin, signals: Signals, repeats: int = REPE
 
 
 def lines(arms: tuple[str, ...], updates: int, seed: int = 0) -> Iterator[Line]:
-    """Every arm with 0 to 4 contacts, one by one or at the same instant; weak ones in motion.
+    """Every arm with 0 to 4 contacts, apart or at the same instant; weak ones and clamps in motion.
 
     Args:
         arms: names of arms of the localization benchmark.
@@ -108,19 +110,48 @@ def lines(arms: tuple[str, ...], updates: int, seed: int = 0) -> Iterator[Line]:
             yield _line(Cell(arm, contacts, TIER, begin=begin), updates, seed)
         for force in WEAK:
             yield _line(Cell(arm, 1, TIER, speed=SPEED, force=force), updates, seed)
+        yield _clamped(arm, updates, seed)
 
 
 def _line(cell: Cell, updates: int, seed: int) -> Line:
     robot, skin = arm_and_skin(cell.arm, cell.tier)
-    times: list[Array] = []
-    for run in count():
-        times.append(update_times(robot, skin, _signals(cell, robot, run, seed)))
-        if sum(len(part) for part in times) >= updates:
-            break
+    times = _times(
+        lambda: make_pipeline(robot, skin),
+        (_signals(cell, robot, run, seed) for run in count()),
+        updates,
+    )
     begin = cell.timing if cell.contacts > 1 else ""
     first = np.array([part[0] for part in times])
     force = f"{cell.force:g} N" if cell.contacts else ""
     return Line(cell.arm, cell.contacts, begin, force, cell.motion, np.concatenate(times), first)
+
+
+def _clamped(arm: str, updates: int, seed: int) -> Line:
+    """Two forces of the same strength on two sides, on an arm whose inertias are not as told."""
+    robot, skin = arm_and_skin(arm, TIER)
+    times = _times(
+        lambda: Pipeline(robot, skin=skin),
+        (_clamp(robot, skin, run, seed) for run in count()),
+        updates,
+    )
+    first = np.array([part[0] for part in times])
+    motion = f"<= {ARM_SPEED:g} rad/s"
+    return Line(arm, 2, "clamped", "varies", motion, np.concatenate(times), first)
+
+
+def _times(make: Callable[[], Pipeline], runs: Iterator[Signals], updates: int) -> list[Array]:
+    times: list[Array] = []
+    for signals in runs:
+        times.append(update_times(make, signals))
+        if sum(len(part) for part in times) >= updates:
+            break
+    return times
+
+
+def _clamp(robot: Robot, skin: Skin, run: int, seed: int) -> Signals:
+    chance = np.random.default_rng([seed, run, 3])
+    sampler = InteractionSampler(robot, TouchSampler(skin, chance), chance)
+    return sampler.draw(KINDS[run % len(KINDS)], "structure", True).signals
 
 
 def _signals(cell: Cell, robot: Robot, run: int, seed: int) -> Signals:
@@ -138,7 +169,7 @@ def main(updates: int, arms: tuple[str, ...], seed: int = 0) -> None:
 
     rows: list[Row] = [HEAD]
     done = tqdm(
-        lines(arms, updates, seed), total=(8 + len(WEAK)) * len(arms), desc="deadline", disable=None
+        lines(arms, updates, seed), total=(9 + len(WEAK)) * len(arms), desc="deadline", disable=None
     )
     rows += [line.row() for line in done]
     print(aligned(rows, text_columns=(0, 2, 4)))

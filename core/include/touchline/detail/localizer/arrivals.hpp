@@ -40,17 +40,36 @@ class Arrivals {
     s.state.enter(Tracking::newcomer);
   }
 
-  // One sample more of it: fills the reports. `read()` takes the measurement anew.
+  // One sample more of it: fills the reports. `read()` takes the measurement anew. Searches take at most
+  // about so many units of work; returns what is left of them.
   template <class Read>
-  void follow(SegmentContacts& s, const SegmentSample& now, Read&& read) {
+  int follow(SegmentContacts& s, const SegmentSample& now, int units, Read&& read) {
+    left_ = units;
     now_ = now;
+    follow(s, read);
+    return std::max(0, left_);
+  }
+
+  // What may have arrived instead of a contact.
+  const Suspect& suspect() const { return suspect_; }
+
+ private:
+  static constexpr int kSlides = 2, kFree = 4;  // parts of the work left: for slides, beside free forces
+
+  template <class Read>
+  void follow(SegmentContacts& s, Read&& read) {
+    const SegmentSample& now = now_;
     suspect_ = {};
     Reference& before = s.known.before;
     before.contacts.creep(std::max(0.0, now.time - before.time), now.bandwidth, settings_, 1.0);
     before.time = now.time;
     before.contacts.age(now.bandwidth, now.time, settings_);
     if (subsided(s)) return;
-    switch (slides_.follow(s, now, read)) {
+    const int for_slides = left_ / kSlides;
+    int left = for_slides;
+    const Slides::Outcome outcome = slides_.follow(s, now, left, read);
+    left_ -= for_slides - left;
+    switch (outcome) {
       case Slides::Outcome::none:
         s.state.enter(Tracking::newcomer);
         break;
@@ -83,10 +102,6 @@ class Arrivals {
     }
   }
 
-  // What may have arrived instead of a contact.
-  const Suspect& suspect() const { return suspect_; }
-
- private:
   // Has it been placed for a while, and has it lasted?
   bool is_found(SegmentContacts& s, const Answer& a) const {
     Unexplained& u = s.unexplained;
@@ -95,7 +110,7 @@ class Arrivals {
       return false;
     }
     if (!u.placed) u.placed = now_.time;
-    return now_.time - *u.placed >= now_.brief() &&
+    return !a.searching && now_.time - *u.placed >= now_.brief() &&
            now_.time - u.since >= settings_.young * now_.brief() &&
            s.known.contacts.count < SegmentContacts::kMost;
   }
@@ -186,7 +201,10 @@ class Arrivals {
                s.unexplained.age.follow(load, now_.bandwidth, now_.time, settings_.oldest);
     freed_ = false;
     suspect_ = lone_.find(now_.segment);
-    return answer_ = single_.locate(now_.segment, new_lag_, measurement_);
+    const Ask ask{Ask::kRemainder, false, false, left_ - left_ / kFree};
+    answer_ = single_.locate(now_.segment, new_lag_, measurement_, ask);
+    left_ -= single_.units();
+    return answer_;
   }
 
   // A channel that explains alone what the known contacts leave, their forces free.
@@ -204,7 +222,10 @@ class Arrivals {
     const JointEstimate& known = s.known.before.contacts;
     read();
     fit_.take_out(known, Change::of_forces(known.count, settings_.force_scale), measurement_);
-    const Answer& freed = single_.locate_beside_free_forces(now_.segment, new_lag_, measurement_);
+    const Ask ask{Ask::kFreed, false, false, left_};
+    const Answer& freed =
+        single_.locate_beside_free_forces(now_.segment, new_lag_, measurement_, ask);
+    left_ -= single_.units();
     if (!placed(freed)) return;
     const int node = single_.surfaces()[freed.candidates[0].surface].node;
     freed_ = rank(known, node) >= 3 * known.count + JointEstimate::kEach;
@@ -259,6 +280,7 @@ class Arrivals {
   Answer answer_;
   bool freed_ = false;  // was it found with the forces of the known contacts free?
   double new_lag_ = 0.0;
+  int left_ = 0;  // units of work, in the sample at hand
   Suspect suspect_;
 };
 

@@ -127,7 +127,7 @@ class JointFit {
     know(1.0, factor_);
     double x[kSize];
     std::copy(b_, b_ + n_, x);
-    if (!cholesky(factor_, n_, 1e-15)) return std::numeric_limits<double>::infinity();
+    if (!factor(factor_, n_)) return std::numeric_limits<double>::infinity();
     solve_cholesky(factor_, n_, x);
     double cost = square_;
     for (int i = 0; i < n_; ++i) cost -= b_[i] * x[i];
@@ -141,7 +141,7 @@ class JointFit {
     if (!prior(estimate, change)) return;
     double* P = factor_;
     know(independence, P);
-    if (!invert(P, n, work_)) return;
+    if (!invert_all(P, n)) return;
     double x[kSize];
     for (int i = 0; i < n; ++i) {
       x[i] = 0.0;
@@ -162,7 +162,7 @@ class JointFit {
   void judge(JointEstimate& estimate) {
     if (!prior(estimate, Change::none())) return;
     know(1.0, factor_);
-    if (!invert(factor_, n_, work_)) return;
+    if (!invert_all(factor_, n_)) return;
     std::copy(factor_, factor_ + n_ * n_, estimate.covariance);
     estimate.spread(settings_);
   }
@@ -180,7 +180,7 @@ class JointFit {
     }
     std::copy(estimate.covariance, estimate.covariance + n * n, factor_);
     for (int i = 0; i < n; ++i) factor_[i * (n + 1)] += change.added[i];
-    if (!cholesky(factor_, n, 1e-15)) return false;
+    if (!factor(factor_, n)) return false;
     for (int k = 0; k < n; ++k) {
       double* column = loose_.data() + k * rows;
       for (int r = 0; r < rows; ++r) {
@@ -245,7 +245,7 @@ class JointFit {
   bool prior(const JointEstimate& estimate, const Change& change) {
     std::copy(estimate.covariance, estimate.covariance + n_ * n_, prior_);
     for (int i = 0; i < n_; ++i) prior_[i * (n_ + 1)] += change.added[i];
-    return invert(prior_, n_, work_);
+    return invert_all(prior_, n_);
   }
 
   // And with a part of the sample: the lower triangle.
@@ -304,6 +304,26 @@ class JointFit {
         surfaces_[k.surface].mesh.nearest_to_point(k.point + along * s + across * t,
             settings_.surface_reach);
     if (p.face >= 0) estimate.follow(c, p);
+  }
+
+  // Of all unknowns of so many contacts: their sizes are known.
+  bool invert_all(double* a, int n) {
+    switch (n) {
+      case kEach: return invert_by_rows<kEach>(a);
+      case 2 * kEach: return invert_by_rows<2 * kEach>(a);
+      case 3 * kEach: return invert_by_rows<3 * kEach>(a);
+      case 4 * kEach: return invert_by_rows<4 * kEach>(a);
+      default: return invert(a, n, work_);
+    }
+  }
+  static bool factor(double* a, int n) {
+    switch (n) {
+      case kEach: return cholesky_by_rows<kEach>(a, 1e-15);
+      case 2 * kEach: return cholesky_by_rows<2 * kEach>(a, 1e-15);
+      case 3 * kEach: return cholesky_by_rows<3 * kEach>(a, 1e-15);
+      case 4 * kEach: return cholesky_by_rows<4 * kEach>(a, 1e-15);
+      default: return cholesky(a, n, 1e-15);
+    }
   }
 
   const Posture& posture_;

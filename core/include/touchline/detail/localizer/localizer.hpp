@@ -101,7 +101,7 @@ class Localizer {
     said_ = 1;
     last_ = &single_.answer();
     if (!measurement_.read(g, row, normalized)) return single_.clear();
-    return single_.locate(g, lag, measurement_, false, true);
+    return single_.locate(g, lag, measurement_, {Ask::kSole, false, true});
   }
 
   // Takes a sample [row of the observer] at `time` [s] in which nothing touches segment g.

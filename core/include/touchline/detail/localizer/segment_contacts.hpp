@@ -37,6 +37,7 @@ struct Touched {
     int known;
   };
   std::optional<Search> searched;
+  bool two = false;  // have two been looked for?
 };
 
 // Suspected: since when one contact has explained all [s], and since when and until when it was not

@@ -29,9 +29,9 @@ class Slides {
 
   // Has one contact moved along its body, no faster than contacts slide? Of several the one that
   // explains best. Then all are reported, also where a sample says otherwise in between; once it
-  // rests they are known from where it does.
+  // rests they are known from where it does. `left`: units of work, of which it takes what it needs.
   template <class Read>
-  Outcome follow(SegmentContacts& s, const SegmentSample& now, Read&& read) {
+  Outcome follow(SegmentContacts& s, const SegmentSample& now, int& left, Read&& read) {
     const JointEstimate& before = s.known.before.contacts;
     Slide& slide = s.unexplained.slide;
     const double time = now.time, brief = now.brief(), since = s.unexplained.since;
@@ -46,7 +46,9 @@ class Slides {
         fit_.take_out(others_, Change::none(), measurement_);
       }
       const double lag = before.count > 1 ? before.known[c].lag : now.lag;
-      const Answer& a = single_.locate(now.segment, lag, measurement_);
+      const Ask ask{Ask::kSlides + c, false, false, left / (before.count - c)};
+      const Answer& a = single_.locate(now.segment, lag, measurement_, ask);
+      left -= single_.units();
       const bool can = within_reach(before.known[c], a, single_.surfaces(), way, settings_);
       const double never = chi2_limit(measurement_.size(), settings_.slide_never);
       slide.against[c] += passed * (can ? a.chi2 : never);
@@ -70,7 +72,7 @@ class Slides {
     reports_.add(before.known[slider].serial, slide.place);
     const bool anew = slide.slider != slider || !slide.rests;
     slide.slider = slider;
-    if (!found) return Outcome::slides;
+    if (!found || answer_.searching) return Outcome::slides;
     read();
     if (before.count == 1) {  // nothing is held: any sample tells where it is
       if (time - since < settings_.young * brief) return Outcome::slides;

@@ -17,6 +17,7 @@
 #include "touchline/detail/localizer/reports.hpp"
 #include "touchline/detail/localizer/segment_contacts.hpp"
 #include "touchline/detail/localizer/twins.hpp"
+#include "touchline/detail/localizer/work_share.hpp"
 #include "touchline/detail/place/lone_channel.hpp"
 #include "touchline/detail/place/past.hpp"
 #include "touchline/detail/place/single_contact.hpp"
@@ -36,6 +37,7 @@ class Tracks {
         reports_(single.surfaces()),
         pasts_(segments, Past(measurement.posture().nodes().size(), settings.past_worn)),
         looked_(segments),
+        share_(settings.search_work, 1.0),
         arrivals_(single, measurement, settings, fit_, known_, reports_, lone_, period),
         merging_(single.surfaces(), settings, fit_, known_, reports_),
         twins_(single.surfaces(), measurement, settings, fit_, known_, reports_, rows, segments,
@@ -59,6 +61,7 @@ class Tracks {
   // Segment g is touched anew.
   int begin(int g) {
     pasts_[g].restart();
+    single_.forget(g);
     return reports_.next();
   }
 
@@ -81,6 +84,10 @@ class Tracks {
     double time = -kAbsurd, size = 0.0;
   };
   static constexpr double kLook = 0.005;  // [s] between second looks: a suspect lasts four of them
+  // Of the work of a sample each known contact but the first costs what arrives beside them so many
+  // units. Such a part is left for it at least. Where a pair is looked for one contact has such a part,
+  // and where one was so many times the work.
+  static constexpr int kEachKnown = 80, kLeast = 3, kBesidePair = 2, kAlone = 3;
 
   void report(int serial, const Answer& answer) { reports_.add(serial, answer); }
   void report(const KnownContact& k) { reports_.add(k); }
@@ -99,7 +106,8 @@ class Tracks {
       return;
     }
     if (!measurement_.can_be_followed() || settings_.first_entry) {
-      report(s.touched.first, single_.locate(g, 0.0, measurement_, again(s), true));
+      const Ask ask{Ask::kSole, again(s), true};
+      report(s.touched.first, single_.locate(g, 0.0, measurement_, ask));
       return;
     }
     now_.lag =
@@ -134,15 +142,26 @@ class Tracks {
 
   template <class Read>
   void arrive(SegmentContacts& s, Read&& read) {
-    arrivals_.follow(s, now_, read);
+    const int units = share_.take(now_.time);
+    const int beside = units - kEachKnown * (s.known.contacts.count - 1);
+    const int most = std::max(beside, units / kLeast);
+    share_.give_back(units - most + arrivals_.follow(s, now_, most, read));
     suspect_ = arrivals_.suspect();
   }
 
   // The segment's contact, if it has only one.
   const Answer& locate(SegmentContacts& s) {
     const Past& past = pasts_[now_.segment];
-    return past.known() ? single_.locate(now_.segment, past, measurement_, again(s))
-                        : single_.locate(now_.segment, now_.lag, measurement_, again(s));
+    const bool shared = s.touched.two && !s.state.is(Tracking::single);
+    const int own = shared ? share_.take(now_.time) : 0;
+    const int units = !shared                        ? Ask::kAll
+                      : s.state.is(Tracking::pair) ? own / kBesidePair
+                                                     : std::min(own, Ask::kAll / kAlone) * kAlone;
+    const Ask ask{Ask::kSole, again(s), false, units};
+    const Answer& a = past.known() ? single_.locate(now_.segment, past, measurement_, ask)
+                                   : single_.locate(now_.segment, now_.lag, measurement_, ask);
+    if (shared) share_.give_back(own - std::min(own, single_.units()));
+    return a;
   }
 
   // --- none is known yet: suspected, pair ---
@@ -154,7 +173,7 @@ class Tracks {
       s.suspected.explained.reset();
       return;
     }
-    if (a.status == Status::not_separable) return twins_.follow(s, a, now_);
+    if (a.status == Status::not_separable) return twins_.follow(s, a, now_, single_.units());
     report(s.touched.first, a);
     if (!placed(a)) {
       s.suspected.explained.reset();
@@ -163,7 +182,8 @@ class Tracks {
     if (s.state.is(Tracking::pair)) twins_.forget(s);
     if (!s.suspected.explained) {
       s.suspected.explained = now_.time;
-    } else if (now_.time - *s.suspected.explained >= settings_.young * now_.brief()) {
+    } else if (!a.searching &&
+               now_.time - *s.suspected.explained >= settings_.young * now_.brief()) {
       settle(s, a);
     }
   }
@@ -294,6 +314,7 @@ class Tracks {
   Reports reports_;
   std::vector<Past> pasts_;  // per segment: of its whole wrench
   std::vector<Look> looked_;  // per segment
+  WorkShare share_;
   Arrivals arrivals_;
   Merging merging_;
   Twins twins_;

@@ -33,12 +33,14 @@ class Twins {
   }
 
   // One contact explains nothing, from the beginning: looks for two, again and again while their
-  // forces rise, then ever more rarely. All of that takes many samples.
-  void follow(SegmentContacts& s, const Answer& one, const SegmentSample& now) {
+  // forces rise, then ever more rarely. All of that takes many samples. `spent`: units of work on the one
+  // contact in this sample, which are missing here.
+  void follow(SegmentContacts& s, const Answer& one, const SegmentSample& now, int spent) {
     Together& two = s.together;
     Work& work = *work_[now.segment];
     if (!s.state.is(Tracking::pair)) {
       s.state.enter(Tracking::pair);
+      s.touched.two = true;
       s.suspected.explained.reset();
       two = Together{};
       two.since = two.next_search = now.time;
@@ -47,6 +49,7 @@ class Twins {
       work.search.drop();
       work.parts.drop();
     }
+    spent_ = spent;
     go_on(s, work, one, now);
     if (!two.separable) {
       end_second(two);
@@ -78,6 +81,8 @@ class Twins {
   }
 
  private:
+  static constexpr int kLeast = 4;  // so large a part of its work a sample does in any case
+
   void end_second(Together& two) {
     if (two.second) reports_.end(*two.second);
     two.second.reset();
@@ -101,9 +106,9 @@ class Twins {
     } else if (work.search.done() && !two.taken) {
       take(s, work, one, now);
     } else if (work.parts.working()) {
-      work.parts.work(share_.take(now.time));
+      work.parts.work(units(now));
     } else if (work.search.working()) {
-      work.search.work(share_.take(now.time), now, measurement_);
+      work.search.work(units(now), now, measurement_);
     } else if (two.taken && !two.separable && !two.walking &&
                work.search.begun() - two.since >= settings_.risen * now.brief()) {
       two.walking = true;
@@ -114,6 +119,11 @@ class Twins {
                                  now.time + settings_.search_growth * (now.time - two.since));
       work.search.begin(now, measurement_);
     }
+  }
+
+  int units(const SegmentSample& now) {
+    const int own = share_.take(now.time);
+    return std::max(own - spent_, own / kLeast);
   }
 
   // Takes the outcome of a search over.
@@ -160,6 +170,7 @@ class Twins {
   std::vector<std::unique_ptr<Work>> work_;  // per segment
   PairAnswer said_;
   WorkShare share_;
+  int spent_ = 0;
   Answer answer_;
 };
 

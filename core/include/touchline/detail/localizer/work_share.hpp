@@ -29,6 +29,9 @@ class WorkShare {
     return own;
   }
 
+  // In the same sample: so many of those that were taken last are not needed.
+  void give_back(int units) { left_ += units; }
+
  private:
   static constexpr double kMost = 1e9;  // units in a sample: a bound on integers
 

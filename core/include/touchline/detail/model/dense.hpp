@@ -28,6 +28,30 @@ inline bool cholesky(double* a, int n, double tolerance = 1e-13) {
   return true;
 }
 
+// The same for sizes that are known when it is compiled, to the last bit: each element goes through the
+// same operations, but those of a row stand side by side. What is above the diagonal has no meaning.
+template <int n>
+bool cholesky_by_rows(double* a, double tolerance) {
+  double diagonal[n];
+  for (int i = 0; i < n; ++i) diagonal[i] = a[i * n + i];
+  for (int j = 0; j < n; ++j) {
+    const double d = a[j * n + j];
+    if (!(d > tolerance * diagonal[j])) return false;
+    const double root = std::sqrt(d);
+    double column[n] = {};
+    for (int i = j + 1; i < n; ++i) column[i] = a[i * n + j] / root;
+    for (int i = j + 1; i < n; ++i) {
+      const double factor = column[i];
+      double row[n];
+      for (int k = 0; k < n; ++k) row[k] = a[i * n + k] - factor * column[k];
+      for (int k = 0; k < n; ++k) a[i * n + k] = row[k];
+      a[i * n + j] = factor;
+    }
+    a[j * n + j] = root;
+  }
+  return true;
+}
+
 // x = L^-1 x, for element i at x[i * stride].
 inline void solve_lower(const double* l, int n, double* x, int stride = 1) {
   for (int i = 0; i < n; ++i) {
@@ -152,6 +176,32 @@ inline bool invert(double* a, int n, double* work) {
       for (int k = i; k < n; ++k) s += work[k * n + i] * work[k * n + j];
       a[i * n + j] = a[j * n + i] = s;
     }
+  }
+  return true;
+}
+
+// The same for sizes that are known when it is compiled, to the last bit.
+template <int n>
+bool invert_by_rows(double* a) {
+  if (!cholesky_by_rows<n>(a, 1e-15)) return false;
+  double W[n][n];  // the inverse of the factor, with zeros above
+  for (int i = 0; i < n; ++i) {
+    double row[n] = {};
+    row[i] = 1.0;
+    for (int k = 0; k < i; ++k) {
+      const double factor = a[i * n + k];
+      for (int j = 0; j < n; ++j) row[j] -= factor * W[k][j];
+    }
+    const double diagonal = a[i * n + i];
+    for (int j = 0; j < n; ++j) W[i][j] = row[j] / diagonal;
+  }
+  for (int i = 0; i < n; ++i) {
+    double row[n] = {};
+    for (int k = i; k < n; ++k) {
+      const double factor = W[k][i];
+      for (int j = 0; j < n; ++j) row[j] += factor * W[k][j];
+    }
+    for (int j = 0; j <= i; ++j) a[i * n + j] = a[j * n + i] = row[j];
   }
   return true;
 }

@@ -109,16 +109,17 @@ class Mesh {
   // Calls `visit(SurfacePoint)` for the point nearest to the line of each triangle that is nearer
   // to it than `limit` and stands against it: at a cosine above `steep`. Triangles of which every
   // point is at a weighed square of `most(cosine)` or more are left out; that may shrink meanwhile, and
-  // is nowhere more than at cosine 1.
+  // is nowhere more than at cosine 1. `looked`: as in `nearest_to_point`.
   template <class Most, class Visit>
-  void around(const ForceLine& line, const Beside& beside, double limit, double steep, Most&& most,
-              Visit&& visit) const {
+  void around(const ForceLine& line, const Beside& beside, double limit, double steep, int& looked,
+              Most&& most, Visit&& visit) const {
     const Cutoff cutoff(line, beside);
     const double square = limit * limit;
     const Triangle* some[kLanes];
-    int count = 0;
+    int count = 0, boxes = 0, near = 0;
     visit_triangles(
         [&](const Box& box, int index) {
+          ++boxes;
           return cutoff.may_hold(box, square, most(1.0)) &&
                  tree_->faces[index].may_stand_against(line.direction, steep);
         },
@@ -126,11 +127,13 @@ class Mesh {
           const double cosine = -dot(tri.normal, line.direction);
           if (!(cosine > steep) || !cutoff.may_hold(tri, square, most(cosine))) return;
           some[count++] = &tri;
+          ++near;
           if (count < kLanes) return;
           nearer_to_line(some, count, line, limit, visit);
           count = 0;
         });
     if (count > 0) nearer_to_line(some, count, line, limit, visit);
+    looked += boxes + kNearLooked * near;
   }
 
   // The point of the surface nearest to `p`, if nearer than `limit`. `near`: the place of a triangle
@@ -188,6 +191,7 @@ class Mesh {
 
  private:
   static constexpr int kLeaf = 4, kDepth = 64;  // triangles of a leaf; room for the stack
+  static constexpr int kNearLooked = 2;  // places: a triangle near a line takes as long as so many boxes
   static constexpr float kInfinity = std::numeric_limits<float>::infinity();
   static constexpr double kTouching = 1e-9;  // nearer than this nothing nearer is looked for [m]
   static constexpr double kFar = std::numeric_limits<double>::infinity();

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The explanations of one contact on a segment: all entries of the line of force action into all
 // its links, or the nearest surface where the line misses. Where there is no line they are sampled
-// points, improved on the mesh. No allocation per sample.
+// points, improved on the mesh. What a sample has no work left for, the next ones do. No allocation per
+// sample.
 // Theory: docs/theory.md, section 5.6.
 #pragma once
 
@@ -19,6 +20,20 @@
 
 namespace touchline {
 
+// What is asked of a search.
+struct Ask {
+  static constexpr int kAll = std::numeric_limits<int>::max();
+  // What for: a search that is cut short goes on from where the last one for the same purpose has come.
+  // For the sole contact of a segment, for one more beside the known ones, the same where their forces
+  // are free, and for where each known one has slid.
+  static constexpr int kSole = 0, kRemainder = 1, kFreed = 2, kSlides = 3, kCourses = 7;
+
+  int course = kSole;
+  bool again = false;  // does what was found by a search a moment ago serve once more?
+  bool whole = false;  // is all that comes nearest found also where no point of any body can explain?
+  int units = kAll;    // of work (`PlaceTuning::search_work`)
+};
+
 class Explanations {
  public:
   Explanations(const Observer& observer, const Posture& posture,
@@ -32,8 +47,11 @@ class Explanations {
     for (int g = 0; g < observer.row_layout().segments; ++g)
       most = std::max(most, surfaces_.bodies(g).size());
     views_.resize(most);
-    starts_.resize(observer.row_layout().segments);
-    for (std::vector<Start>& starts : starts_) starts.reserve(kMost);
+    for (int g = 0; g < observer.row_layout().segments; ++g) {
+      for (int c = 0; c < Ask::kCourses; ++c)
+        courses_.emplace_back(surfaces_.bodies(g).size(), surfaces_.all().size());
+    }
+    first_.resize(most);
     candidates_.resize(kMost);
     missed_.resize(surfaces_.all().size(), -1);
   }
@@ -41,21 +59,23 @@ class Explanations {
   Explanations(const Explanations&) = delete;
   Explanations& operator=(const Explanations&) = delete;
 
-  // Finds all that may explain segment g; `measurement` has read it. `mean(node)`: where a body was
-  // when it felt what the wrench speaks of, and `doubt`: what is not known of that.
-  // `again`: what was found by a search a moment ago serves once more. `whole`: also where no point
-  // of any body can explain, all that comes nearest to it is found.
+  // Searches on segment g begin anew.
+  void forget(int g) {
+    for (int c = 0; c < Ask::kCourses; ++c) courses_[g * Ask::kCourses + c].forget();
+  }
+
+  // Finds what may explain segment g; `measurement` has read it. `mean(node)`: where a body was when
+  // it felt what the wrench speaks of, and `doubt`: what is not known of that.
   template <class MeanOf>
-  void find(int g, MeanOf&& mean, const Doubt& doubt, Measurement& measurement, bool again,
-            bool whole) {
-    count_ = used_ = 0;
-    found_ = &starts_[g];
-    again_ = again;
-    if (!again) found_->clear();
+  void find(int g, MeanOf&& mean, const Doubt& doubt, Measurement& measurement, const Ask& ask) {
+    count_ = used_ = units_ = 0;
+    complete_ = true;
+    course_ = &courses_[g * Ask::kCourses + ask.course];
     best_ = std::numeric_limits<double>::infinity();
     for (const Body& body : surfaces_.bodies(g)) {
-      View& view = views_[used_++];
+      View& view = views_[used_];
       view = View{};
+      view.body = used_++;
       view.node = body.node;
       view.surfaces = &body.surfaces;
       view.q = measurement.quadratic(body.node);
@@ -70,21 +90,22 @@ class Explanations {
       std::sort(views_.begin(), views_.begin() + used_,
                 [](const View& a, const View& b) { return a.least < b.least; });
     }
-    if (!whole && !possible(measurement.size())) return;
+    if (!ask.whole && !possible(measurement.size())) {
+      if (!ask.again) course_->forget();
+      return;
+    }
     for (int i = 0; i < used_; ++i) {
       View& view = views_[i];
       if (!(view.least < best_ + settings_.cost_window)) continue;
       if (view.line && !view.found) view.find_line();
       if (view.line && view.floor < best_ + settings_.cost_window) enter(view);
     }
-    // What must be searched for costs more, so it comes last and only where it may matter.
-    for (int i = 0; i < used_; ++i) {
-      View& view = views_[i];
-      if (!(view.floor < best_ + settings_.relevant)) continue;
-      if (view.line) beside(view);
-      if (!measurement.has_wrench()) search(view);
-    }
+    search(ask, measurement.has_wrench());
   }
+
+  // Has all been looked at once, in this sample or in the last ones, that may explain?
+  bool complete() const { return complete_; }
+  int units() const { return units_; }  // of work that the search took
 
   int count() const { return count_; }
   const Candidate* begin() const { return candidates_.data(); }
@@ -126,6 +147,92 @@ class Explanations {
     return false;
   }
 
+  // A point that a search has ended at, in the frame of its node.
+  struct Start {
+    int surface;
+    Vec3 point, normal;
+    bool waits = false;  // has it yet to be improved?
+    bool moved = false;  // has it been, in this sample, and where to?
+    Vec3 next_point{}, next_normal{};
+  };
+
+  // What is left of earlier searches for one purpose.
+  struct Course {
+    Course(std::size_t bodies, std::size_t surfaces) : due(bodies, 0), missed(surfaces) {
+      starts.reserve(kMost);
+      forget();
+    }
+    void forget() {
+      starts.clear();
+      std::fill(due.begin(), due.end(), 0);
+      for (Start& start : missed) start.surface = -1;
+      complete = false;
+    }
+    bool waits() const {
+      return std::any_of(starts.begin(), starts.end(), [](const Start& s) { return s.waits; });
+    }
+    bool cut() const {
+      return waits() || std::any_of(due.begin(), due.end(), [](char d) { return d != 0; });
+    }
+    // Starts are where they have been improved to.
+    void move_on() {
+      for (Start& s : starts) {
+        if (!s.moved) continue;
+        s.point = s.next_point;
+        s.normal = s.next_normal;
+      }
+    }
+
+    std::vector<Start> starts;
+    std::vector<char> due;      // per body: has it yet to be searched?
+    std::vector<Start> missed;  // per surface that a line misses: the best point; surface -1: not known
+    bool complete = false;      // has all been looked at once, that may explain?
+  };
+
+  // What must be searched for costs more, so it comes last and only where it may matter. What had to
+  // wait in the last sample comes first. Joint torques alone leave so much open that a part of a search
+  // is no use.
+  void search(const Ask& ask, bool has_wrench) {
+    const int all = left_ = has_wrench ? ask.units : Ask::kAll;
+    const bool was_cut = course_->cut();
+    waited_ = course_->waits();
+    for (Start& s : course_->starts) s.moved = false;
+    std::copy(course_->due.begin(), course_->due.end(), first_.begin());
+    for (const bool due : {true, false}) {
+      for (int i = 0; i < used_; ++i) {
+        View& view = views_[i];
+        if ((first_[view.body] != 0) == due) search(view, due || !ask.again, has_wrench);
+      }
+    }
+    units_ = all - left_;
+    const bool cut = course_->cut();
+    if (was_cut || cut) course_->move_on();
+    complete_ = course_->complete = course_->complete || !cut;
+  }
+
+  // `anew`: or does what has been found before serve?
+  void search(View& view, bool anew, bool has_wrench) {
+    char& due = course_->due[view.body];
+    due = 0;
+    if (!(view.floor < best_ + settings_.relevant)) {
+      if (anew) drop_starts(view);
+      return;
+    }
+    if (view.line) {
+      beside(view, anew);
+    } else if (anew) {
+      drop_starts(view);
+    }
+    if (!has_wrench) search_spread(view, anew);
+  }
+
+  void drop_starts(const View& view) {
+    auto& all = course_->starts;
+    all.erase(std::remove_if(all.begin(), all.end(),
+                             [&](const Start& s) { return surfaces_[s.surface].node == view.node; }),
+              all.end());
+  }
+
   // All entries of the line into the body.
   void enter(View& view) {
     const ForceLine line = view.later_line();
@@ -147,21 +254,25 @@ class Explanations {
 
   // What the line misses by no more than the noise may be touched as well as what it enters; and
   // where it only grazes the body, better points are nearby.
-  void beside(View& view) {
+  void beside(View& view, bool anew) {
     const int found = count_, own = index(view);
     const bool near = view.floor < best_ + settings_.face_sigmas * settings_.face_sigmas;
-    const bool passed = near &&
-        (again_ ? revisit(view, settings_.fine, settings_.faces_apart) : pass(view));
-    for (int i = 0; near && !again_ && i < found; ++i) {  // what is entered now may be missed next
-      if (candidates_[i].view == own) remember(view, candidates_[i]);
+    const bool later = anew && near && left_ <= 0;
+    if (later) course_->due[view.body] = 1;
+    if (anew && !later) drop_starts(view);
+    const bool searched = anew && near && !later;
+    const bool passed = searched ? pass(view)
+                                 : near && revisit(view, settings_.fine, settings_.faces_apart);
+    for (int i = 0; searched && i < found; ++i) {  // what is entered now may be missed next
+      if (candidates_[i].view == own) remember(view, candidates_[i], false);
     }
     if (!view.met && !passed) miss(view);
-    if (view.steep) return;
+    if (view.steep || left_ <= 0) return;
     for (int i = 0; i < found && count_ < kMost; ++i) {
       if (candidates_[i].view != own) continue;
       candidates_[count_] = candidates_[i];
       candidates_[i].fit.cone = std::numeric_limits<double>::infinity();  // replaced
-      refinement_.improve(view, candidates_[count_]);
+      refinement_.improve(view, candidates_[count_], left_);
       if (!known(found, settings_.same_point)) keep();
     }
   }
@@ -197,7 +308,8 @@ class Explanations {
       return cosine < 1.0 ? left - (1.0 - kRounding) * fitter_.cone_cost(cosine + kRounding) : left;
     };
     for (int s : *view.surfaces) {
-      surfaces_.around(s, line, metric, limit, fitter_.steepest(), most, [&](const SurfacePoint& p) {
+      int looked = 0;
+      const auto offer = [&](const SurfacePoint& p) {
         const double chi2 = view.floor + squared(G, p.point - nearest(p.point));
         if (!(chi2 < worth)) return;
         Candidate k;
@@ -211,12 +323,15 @@ class Explanations {
         if (entered(k)) return;
         found = insert(starts, kPassed, found, k, settings_.faces_apart);
         worth = std::min(worth, beaten(starts, kPassed, found));
-      });
+      };
+      surfaces_.around(s, line, metric, limit, fitter_.steepest(), looked, most, offer);
+      left_ -= looked;
     }
     for (int i = 0; i < found && count_ < kMost; ++i) {
       place(view, starts[i].surface, starts[i].point, starts[i].normal);
-      refinement_.improve(view, candidates_[count_], settings_.fine, settings_.faces_apart);
-      remember(view, candidates_[count_]);
+      const bool waits = left_ <= 0;
+      refinement_.improve(view, candidates_[count_], settings_.fine, settings_.faces_apart, left_);
+      remember(view, candidates_[count_], waits);
       if (!known(0, settings_.same_point)) keep();
     }
     return found > 0;
@@ -226,23 +341,36 @@ class Explanations {
   // anything on this body.
   bool revisit(View& view, double finest, double around) {
     bool any = false;
-    for (const Start& start : *found_) {
-      if (surfaces_[start.surface].node != view.node || count_ == kMost) continue;
+    for (Start& start : course_->starts) {
+      if (surfaces_[start.surface].node != view.node) continue;
+      const bool wanted = start.waits || !waited_;
+      if (wanted) start.waits = false;
+      if (count_ == kMost) continue;
       any = true;
       place(view, start.surface, surfaces_.to_world(start.point, view.node),
             surfaces_.turn_to_world(start.normal, view.node));
       if (view.line && entered(candidates_[count_])) continue;
       if (!(candidates_[count_].fit.cost() < best_ + settings_.rough)) continue;
-      refinement_.improve(view, candidates_[count_], finest, around);
+      start.waits = wanted && left_ <= 0;
+      if (wanted && left_ > 0) {
+        Candidate& k = candidates_[count_];
+        refinement_.improve(view, k, finest, around, left_);
+        start.moved = true;
+        start.next_point = surfaces_.to_node(k.point, view.node);
+        start.next_normal = surfaces_.turn_to_node(k.normal, view.node);
+      }
       if (!known(0, settings_.same_point)) keep();
     }
     return any;
   }
 
-  void remember(const View& view, const Candidate& k) {
-    if (found_->size() < kMost && k.fit.cost() < best_ + settings_.relevant)
-      found_->push_back({k.surface, surfaces_.to_node(k.point, view.node),
-                         surfaces_.turn_to_node(k.normal, view.node)});
+  // `waits`: has it yet to be improved?
+  void remember(const View& view, const Candidate& k, bool waits) {
+    if (course_->starts.size() == kMost || !(k.fit.cost() < best_ + settings_.relevant)) return;
+    Start start{k.surface, surfaces_.to_node(k.point, view.node),
+                surfaces_.turn_to_node(k.normal, view.node)};
+    start.waits = waits;
+    course_->starts.push_back(start);
   }
 
   // Is there an entry of the line nearby that explains as well?
@@ -288,8 +416,25 @@ class Explanations {
       // At an edge the normal is that of either side: what counts is the wrench alone.
       if (fitter_.free_chi2(view.q, view.earlier(p.point)) > best_ + settings_.relevant) continue;
       place(view, s, p.point, p.normal);
-      refinement_.improve(view, candidates_[count_]);
+      improve_missed(view, course_->missed[s]);
       keep();
+    }
+  }
+
+  // From the candidate at hand the best explanation nearby; without work left, the one that was found
+  // last.
+  void improve_missed(const View& view, Start& best) {
+    Candidate& k = candidates_[count_];
+    if (left_ > 0) {
+      refinement_.improve(view, k, left_);
+      best.surface = k.surface;
+      best.point = surfaces_.to_node(k.point, view.node);
+      best.normal = surfaces_.turn_to_node(k.normal, view.node);
+    } else if (best.surface >= 0) {
+      const Candidate nearest = k;
+      place(view, best.surface, surfaces_.to_world(best.point, view.node),
+            surfaces_.turn_to_world(best.normal, view.node));
+      if (!(k.fit.cost() < nearest.fit.cost())) k = nearest;
     }
   }
 
@@ -302,8 +447,8 @@ class Explanations {
   }
 
   // Without a line: the best of the points spread over each link, each improved.
-  void search(View& view) {
-    if (again_) {
+  void search_spread(View& view, bool anew) {
+    if (!anew) {
       revisit(view, settings_.coarse, 4.0 * settings_.coarse);
       return;
     }
@@ -321,9 +466,9 @@ class Explanations {
       }
       for (int i = 0; i < found && count_ < kMost; ++i) {
         Candidate& k = candidates_[count_] = starts[i];
-        if (!refinement_.descend(view, k) && k.fit.cost() < best_ + settings_.rough)
-          refinement_.settle(view, k, settings_.coarse, 0.8 * settings_.start_spacing);
-        remember(view, k);
+        if (!refinement_.descend(view, k, left_) && k.fit.cost() < best_ + settings_.rough)
+          refinement_.settle(view, k, settings_.coarse, 0.8 * settings_.start_spacing, left_);
+        remember(view, k, false);
         if (!known(0, settings_.same_point)) keep();
       }
     }
@@ -337,14 +482,13 @@ class Explanations {
   std::vector<View> views_;
   std::vector<Candidate> candidates_;
   std::vector<int> missed_;  // per surface: the triangle that a line has missed least, last; -1: none
-  // Where searches on each segment have ended, in the frames of the nodes.
-  struct Start {
-    int surface;
-    Vec3 point, normal;
-  };
-  std::vector<std::vector<Start>> starts_;
-  std::vector<Start>* found_ = nullptr;  // those of the segment at hand
-  bool again_ = false;
+  std::vector<Course> courses_;  // per segment and purpose
+  // Of the search at hand: which it is, units of work that are left, and that it took; did starts wait
+  // before it, and which bodies were due; is it complete?
+  Course* course_ = nullptr;
+  int left_ = 0, units_ = 0;
+  bool waited_ = false, complete_ = true;
+  std::vector<char> first_;
   int used_ = 0, count_ = 0;
   double best_ = 0.0;
 };

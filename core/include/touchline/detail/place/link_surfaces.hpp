@@ -66,9 +66,11 @@ class LinkSurfaces {
   }
 
   // The point of a surface nearest to a point of the world, in world; `face` is -1 beyond `limit`.
-  SurfacePoint nearest(int surface, const Vec3& target, double limit) const {
+  // `looked`: see `Mesh`.
+  SurfacePoint nearest(int surface, const Vec3& target, double limit, int& looked) const {
     const int node = surfaces_[surface].node;
-    return in_world(surfaces_[surface].mesh.nearest_to_point(to_node(target, node), limit), node);
+    const Mesh& mesh = surfaces_[surface].mesh;
+    return in_world(mesh.nearest_to_point(to_node(target, node), limit, -1, looked), node);
   }
 
   // The same for a line; `near`: the place of a triangle that may be near, or -1.
@@ -79,14 +81,14 @@ class LinkSurfaces {
 
   // Calls `visit(SurfacePoint)`, in world, for the point nearest to a line of each triangle that is
   // nearer to it than `limit` and stands against it: at a cosine above `steep`. Left out is what is
-  // beside it by a weighed square of `most(cosine)` or more.
+  // beside it by a weighed square of `most(cosine)` or more. `looked`: see `Mesh`.
   template <class Most, class Visit>
   void around(int surface, const ForceLine& line, const Beside& beside, double limit, double steep,
-              Most&& most, Visit&& visit) const {
+              int& looked, Most&& most, Visit&& visit) const {
     const int node = surfaces_[surface].node;
     const Beside own{{turn_to_node(beside.axis[0], node), turn_to_node(beside.axis[1], node)},
                      beside.weight};
-    surfaces_[surface].mesh.around(to_node(line, node), own, limit, steep, most,
+    surfaces_[surface].mesh.around(to_node(line, node), own, limit, steep, looked, most,
                                    [&](const SurfacePoint& p) { visit(in_world(p, node)); });
   }
 

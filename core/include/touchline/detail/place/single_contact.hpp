@@ -27,27 +27,29 @@ class SingleContact {
         found_(observer, posture, settings, std::move(surfaces)),
         lasting_(observer.row_layout().segments, 0.0) {}
 
-  // The contact on segment g, which `measurement` has read; its wrench is `lag` [s] old. `again`: it
-  // was looked for a moment ago, and the same places are looked at. `whole`: what comes nearest to an
-  // explanation is named also where no point explains.
-  const Answer& locate(int g, double lag, Measurement& measurement, bool again = false,
-                       bool whole = false) {
+  // Searches for contacts on segment g begin anew.
+  void forget(int g) { found_.forget(g); }
+  // Units of work that the last search took.
+  int units() const { return found_.units(); }
+
+  // The contact on segment g, which `measurement` has read; its wrench is `lag` [s] old.
+  const Answer& locate(int g, double lag, Measurement& measurement, const Ask& ask) {
     const auto mean = [&](int node) {
       return steady_mean(posture_.pose(node), posture_.twist(node), lag);
     };
-    return locate(g, mean, steady_doubt(), measurement, again, whole);
+    return locate(g, mean, steady_doubt(), measurement, ask);
   }
 
   // The same, if it is known where the bodies were when they felt it.
-  const Answer& locate(int g, const Past& past, Measurement& measurement, bool again) {
-    return locate(g, [&](int node) { return past.mean(node); }, remembered_doubt(), measurement,
-                  again, false);
+  const Answer& locate(int g, const Past& past, Measurement& measurement, const Ask& ask) {
+    return locate(g, [&](int node) { return past.mean(node); }, remembered_doubt(), measurement, ask);
   }
 
   // The same, where forces of other contacts are free.
-  const Answer& locate_beside_free_forces(int g, double lag, Measurement& measurement) {
+  const Answer& locate_beside_free_forces(int g, double lag, Measurement& measurement,
+                                          const Ask& ask) {
     beside_free_forces_ = true;
-    locate(g, lag, measurement);
+    locate(g, lag, measurement, ask);
     beside_free_forces_ = false;
     return answer_;
   }
@@ -57,6 +59,7 @@ class SingleContact {
     answer_.status = Status::none;
     answer_.count = answer_.rank = answer_.unknowns = 0;
     answer_.force = {kNaN, kNaN, kNaN};
+    answer_.searching = false;
     return answer_;
   }
 
@@ -103,7 +106,7 @@ class SingleContact {
 
   template <class MeanOf>
   const Answer& locate(int g, MeanOf&& mean, const Doubt& doubt, Measurement& measurement,
-                       bool again, bool whole) {
+                       const Ask& ask) {
     clear();
     if (measurement.has_wrench()) {
       const double* w = measurement.wrench();
@@ -114,11 +117,12 @@ class SingleContact {
     } else if (measurement.has_wrench() && weak(measurement)) {
       answer_.status = Status::wrench_only;
     } else {
-      found_.find(g, mean, doubt, measurement, again, whole);
+      found_.find(g, mean, doubt, measurement, ask);
+      answer_.searching = !found_.complete();
       weigh();
       conclude(g, measurement);
       if (!measurement.lasts()) lasting_[g] = 0.0;
-      if (measurement.lasts() && !again && answer_.count > 0) lasting_[g] = lasting(measurement);
+      if (measurement.lasts() && !ask.again && answer_.count > 0) lasting_[g] = lasting(measurement);
       answer_.lasting = lasting_[g];
     }
     return answer_;
@@ -245,7 +249,7 @@ class SingleContact {
       answer.rank = equations;
       answer.unknowns = kUnknowns;
     }
-    const bool sure = equations >= kUnknowns && certain(answer);
+    const bool sure = equations >= kUnknowns && !answer.searching && certain(answer);
     answer.status = sure ? Status::located : Status::ambiguous;
   }
 

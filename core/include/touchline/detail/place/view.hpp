@@ -32,6 +32,7 @@ inline ForceLine line_of(const Spatial& w) {
 }
 
 struct View {
+  int body = -1;  // of the segment's
   int node = -1;
   const std::vector<int>* surfaces = nullptr;
   Quadratic q;
