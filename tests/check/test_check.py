@@ -258,6 +258,10 @@ FIXABLE = {
         {"force_torque_sensors": {"wrist": {"polarity": "inboard"}}},
     ),
     "delay": ({"tau": late}, {"joints": {f"joint{i}": {"delay": 0.03} for i in range(1, 8)}}),
+    "a sensor's delay": (
+        {"wrench": lambda values: late(values[:, WRIST])},
+        {"force_torque_sensors": {"wrist": {"delay": 0.03}}},
+    ),
     "sensor bias": (
         {"wrench": biased},
         {"force_torque_sensors": {"wrist": {"bias": [7.0, 0.0, 0.0, 0.0, 0.0, 0.0]}}},

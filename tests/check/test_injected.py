@@ -125,6 +125,20 @@ def test_a_delay_is_told_to_a_fifth_of_a_millisecond(robot):
     assert told is not None and abs(float(told[1]) - 30.0) < 0.2, found
 
 
+def test_the_delay_of_each_sensor_is_told_by_itself(robot):
+    case = make_case(robot, (), np.random.default_rng(5))
+    late = {"wrist": 2, "handle": 4}  # samples of 10 ms
+    for name, samples in late.items():
+        wrench = case.samples.wrench[:, robot.sensor_names.index(name)]
+        wrench[samples:] = wrench[:-samples].copy()
+    pattern = re.compile(r"sensor (\S+) comes (\S+) \+- \S+ ms late")
+    findings = findings_of(case)
+    told = [found for line in findings for found in pattern.findall(line)]
+    assert len(told) == len(findings) == len(late), findings
+    for name, delay in told:
+        assert abs(float(delay) - 10.0 * late[name]) < 0.5, findings
+
+
 def test_unknown_friction_is_told_with_its_size(robot):
     case = make_case(robot, (), np.random.default_rng(5))
     qd = case.samples.qd[:, 1]

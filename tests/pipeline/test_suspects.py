@@ -14,7 +14,8 @@ from touchline.simulation.contacts import Profile, ScriptedContact
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scenario import scripted
 from touchline.simulation.scene import Run
-from touchline.trials.recordings import record
+from touchline.trials.faults import FAULTS, channels_of, injected
+from touchline.trials.recordings import RELEASED, record
 
 BEGIN = 0.6  # s
 HIT = 2.2  # s
@@ -90,6 +91,39 @@ def test_axes_of_the_base_sensor_that_are_swapped_are_named_and_place_no_push(ar
     assert {"base.fx", "base.fy"} <= {change.channel for change in told}
     sure = [e for e in events if e.status == "located" and (e.body_probability or 0.0) >= 0.9]
     assert {event.body for event in sure} <= {"link6"}
+
+
+@pytest.mark.parametrize("channel", ["base.fz", "base.mz", "tau.joint4"])
+def test_a_reading_that_comes_late_is_no_new_contact_as_a_push_lets_go(arm, channel):
+    """It still shows what has gone: that looked like another push, against the one that ends."""
+    robot, pipeline, _ = arm
+    profile = Profile(BEGIN, 0.3, 0.02, 0.02)
+    push = ScriptedContact(
+        "link5", np.array([0.0, 0.0, 0.05]), np.array([18.0, -9.0, 6.0]), profile
+    )
+    settings = Run(seed=3, noise=SensorNoise(), model_error=0.02, physics=2000.0)
+    samples = scripted(robot, [push], 1.3, 0.5, settings).samples
+    fault = next(f for f in FAULTS if f.name == "delay")
+    place = next(c for c in channels_of(robot) if c.name == channel)
+    wrong, _ = injected(samples, fault, place, BEGIN - 0.3, np.random.default_rng(0))
+    _, _, healthy = heard(pipeline, samples)
+    _, _, events = heard(pipeline, wrong)
+    assert [(e.body, e.level) for e in events] == [(e.body, e.level) for e in healthy]
+
+
+@pytest.mark.parametrize("name", ["wrist", "handle"])
+def test_axes_that_are_swapped_as_a_push_lets_go_are_named_and_are_no_place(name):
+    """The sensor inboard feels the push fade, and then the opposite of what they are wrong by."""
+    robot = tl.load_robot("sara-full")
+    recording = record(robot, 4)
+    fault = next(f for f in FAULTS if f.name == "swapped axes")
+    place = next(c for c in channels_of(robot) if c.name == name)
+    wrong, _ = injected(recording.samples, fault, place, RELEASED, np.random.default_rng(0))
+    _, told, events = heard(tl.Pipeline(robot), wrong)
+    assert {f"{name}.fx", f"{name}.fy"} <= {change.channel for change in told}
+    assert wrong.time[told[0].sample] - RELEASED < 0.1
+    sure = [e for e in events if e.status == "located" and (e.body_probability or 0.0) >= 0.9]
+    assert {event.body for event in sure} <= {recording.body}
 
 
 def test_a_push_beside_a_suspect_is_an_event_of_its_own(arm):

@@ -301,6 +301,8 @@ class RedundantPipeline {
       const Moved moved = gates_.take_moved(c);
       if (moved == Moved::wrongly || news) doubt_where_felt(c, time, time - kUntold);
       else if (moved == Moved::alone) doubt_where_felt(c, time, kNever);  // it is no collision
+      else if (told[c] == Fault::suspect && before_[c] == Fault::none && !(time < unsure_until_[c]))
+        doubt_where_felt(c, time, time - kUntold, kUntold);  // what it brought beside contacts
       before_[c] = told[c];
       changing_ = changing_ || told[c] != Fault::none;
     }
@@ -318,10 +320,10 @@ class RedundantPipeline {
   }
 
   // What has begun since then [s] where a channel is felt is doubted, and none of it is a collision.
-  void doubt_where_felt(std::size_t channel, double time, double since) {
+  void doubt_where_felt(std::size_t channel, double time, double since, double lasts = kDoubtful) {
     for (std::size_t g = 0; g < suspicions_.size(); ++g) {
       if (!feels(g, channel)) continue;
-      const double until = time + kDoubtful;
+      const double until = time + lasts;
       suspicions_[g].extend(time, since, until);
       whole_.doubt(g, since, until);
       for (const std::unique_ptr<Second>& second : stand_ins_) {

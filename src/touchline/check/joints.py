@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from touchline.check.delays import common_delay
 from touchline.check.findings import Findings
 from touchline.check.fit import (
     ANGLE_FACTORS,
@@ -24,7 +25,6 @@ TELLING = 1.0  # Nm; a smaller expected torque says nothing of a torque's sign
 GAIN_OFF = 0.2  # friction and a payload change a torque's factor by less
 TAKEN_OUT = 0.15  # below this fraction of the expected torque, gravity is not in the signal
 RUBBING = 0.05  # of the largest expected torque; less friction is left to `calibrate`
-LATE = 2e-3  # s; smaller delays are told as a figure, not as a finding
 SURE = 5.0  # standard errors
 CLEARER = 0.3  # another joint explains a torque column so much better
 
@@ -253,29 +253,23 @@ def _judge(
 
 
 def _judge_delays(robot: Robot, fits: dict[int, TorqueFit], findings: Findings) -> None:
-    """A delay that all torques share: a model's errors do not agree on one."""
     known = [
         (fit.delay, fit.delay_error)
         for fit in fits.values()
         if fit.certain and abs(fit.factor - 1) < GAIN_OFF and np.isfinite(fit.delay)
     ]
-    if len(known) < 2:
+    late = common_delay(known)
+    if late is None:
         return
-    delays, errors = np.array(known).T
-    weight = np.maximum(errors, 1e-6) ** -2.0
-    common = float((weight * delays).sum() / weight.sum())
-    spread = max(1.0, float(np.sqrt((weight * (delays - common) ** 2).sum() / (len(known) - 1))))
-    error = spread * float(weight.sum()) ** -0.5
-    line = f"  delay of the torques: {1e3 * common:.2f} +- {1e3 * max(error, 1e-5):.2f} ms"
-    findings.note("joint torques", line)
-    if common > max(LATE, SURE * error):
+    findings.note("joint torques", f"  delay of the torques: {late.words}")
+    if late.sure:
         findings.find(
-            f"the torques come {1e3 * common:.1f} +- {1e3 * max(error, 1e-4):.1f} ms late, beside "
-            f"the positions: delay: {common:.4f} for each of joints"
+            f"the torques come {late.words} late, beside the positions: "
+            f"delay: {late.value:.4f} for each of joints"
         )
         for joint in robot.description.joints:
             if joint.measured:
-                findings.mend("joints", joint.name, delay=round(joint.delay + common, 5))
+                findings.mend("joints", joint.name, delay=round(joint.delay + late.value, 5))
 
 
 def swapped_torques(windows: Windows, measured: list[int]) -> list[tuple[int, int]]:

@@ -19,6 +19,7 @@ from touchline.observer.samples import Samples
 SECONDS, ROWS = 0.25, 8  # at least so long and so many samples is a window
 MOST = 4000
 JOINT_FIELDS = "q", "qd", "slope", "torque", "expected_torque", "expected_rate"
+WRENCH_FIELDS = "wrench", "expected_wrench", "weightless_wrench", "wrench_rate", "weightless_rate"
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ class Windows:
         wrench: (W, k, 6) as logged.
         expected_wrench: (W, k, 6) on the outboard side, in the sensor's frame, without contact.
         weightless_wrench: the same for a sensor whose driver has taken the weight out.
+        wrench_rate, weightless_rate: how fast these change [N/s, Nm/s].
         period: of the samples [s].
     """
 
@@ -47,6 +49,8 @@ class Windows:
     wrench: Array
     expected_wrench: Array
     weightless_wrench: Array
+    wrench_rate: Array
+    weightless_rate: Array
     period: float
 
     def __len__(self) -> int:
@@ -82,6 +86,8 @@ class WindowMaker:
         }
         cut = {name: _mean(values, count, rows) for name, values in signals.items()}
         cut["expected_rate"] = _rate(whole.tau_ext, count, rows) / self._period
+        cut["wrench_rate"] = _rate(whole.sensor_wrench, count, rows) / self._period
+        cut["weightless_rate"] = _rate(weightless.sensor_wrench, count, rows) / self._period
         steps, q = self._steps(part.time, count), part.q[: count * rows]
         shape = (count, rows, q.shape[1])
         ends = q.reshape(shape)[:, -1] - q.reshape(shape)[:, 0]
@@ -113,7 +119,7 @@ class WindowMaker:
         """All windows."""
         n, k = len(self._robot.joint_names), len(self._robot.sensor_names)
         shapes = dict.fromkeys(JOINT_FIELDS, (n,))
-        shapes |= dict.fromkeys(("wrench", "expected_wrench", "weightless_wrench"), (k, 6))
+        shapes |= dict.fromkeys(WRENCH_FIELDS, (k, 6))
         parts = self._parts or [{name: np.empty((0, *s)) for name, s in shapes.items()}]
         joined = {name: np.concatenate([p[name] for p in parts]) for name in shapes}
         return Windows(**joined, period=self._period)
@@ -148,8 +154,8 @@ def _read_torques(robot: Robot, part: Samples) -> Array:
 
 
 def _rate(values: Array, count: int, rows: int) -> Array:
-    """Change (count, n) per sample, from the ends of the windows."""
-    cut = values[: count * rows].reshape(count, rows, -1)
+    """Change (count, ...) per sample, from the ends of the windows."""
+    cut = values[: count * rows].reshape(count, rows, *values.shape[1:])
     return (cut[:, -1] - cut[:, 0]) / (rows - 1)
 
 

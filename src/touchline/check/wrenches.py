@@ -8,6 +8,7 @@ from itertools import permutations, product
 import numpy as np
 
 from touchline.arrays import Array
+from touchline.check.delays import axis_delays, common_delay
 from touchline.check.findings import Findings
 from touchline.check.fit import FORCE_FACTORS, MOMENT_FACTORS, factor_words
 from touchline.check.model import outboard_mass
@@ -128,6 +129,8 @@ class _SensorCheck:
         if best.change:
             self.findings.mend("force_torque_sensors", self.sensor.name, **best.change)
         self._judge(best)
+        if best.kind == "described" and not words + force_words + moment_words:
+            self._judge_delay()
         if best.columns is None:
             return []
         matrix = np.zeros((6, 6))
@@ -263,6 +266,28 @@ class _SensorCheck:
             float(np.sqrt(x[known].var(axis=0).sum())) for x in (read, moments[:, has])
         )
         return size > max(FARTHER_NM, FARTHER * max(1.0, abs(factor)) * expected)
+
+    def _judge_delay(self) -> None:
+        """Of a log in the sensor's own axes: these turn with the arm, and others do not."""
+        if self.sensor.frame != "sensor":
+            return
+        w, k, name = self.windows, self.k, self.sensor.name
+        sign = 1.0 if self.sensor.polarity == "outboard" else -1.0
+        weightless = self.sensor.compensated != "none"
+        rate = (w.weightless_rate if weightless else w.wrench_rate)[:, k]
+        reading = np.where(self.has, sign * self.reading, np.nan)
+        known = axis_delays(reading, self._expected(self.sensor.compensated), rate, w.period)
+        late = common_delay(known)
+        if late is None:
+            return
+        self.findings.note("wrenches", f"  {name}: delay {late.words}")
+        if late.sure:
+            self.findings.find(
+                f"sensor {name} comes {late.words} late, beside the positions: "
+                f"delay: {late.value:.4f}"
+            )
+            delay = round(self.sensor.delay + late.value, 5)
+            self.findings.mend("force_torque_sensors", name, delay=delay)
 
     def _judge_bias(self, force: Fit, moment: Fit | None) -> None:
         name = self.sensor.name

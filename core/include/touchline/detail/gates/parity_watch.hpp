@@ -159,7 +159,7 @@ class ParityWatch {
   template <class Contradicted>
   void compare(Pair& pair, const Result& result, double dt, Contradicted&& contradicted) {
     const Layout& layout = observer_.layout();
-    const int inner = layout.segments[pair.inner].sensor, outer = layout.segments[pair.outer].sensor;
+    const int outer = layout.segments[pair.outer].sensor;
     const std::size_t first = at_.wrench() + 6 * static_cast<std::size_t>(outer);
     const double* all_own = result.normalized.data() + first_[pair.outer];
     const double* all_between = result.normalized.data() + first_[pair.inner];
@@ -172,26 +172,12 @@ class ParityWatch {
       own[i] = all_own[i] - pair.own[i];
       between[i] = all_between[i] - pair.between[i];
     }
-    bool now = largest_size(own) > 1.0 && largest_size(between) > tuning_.parity_noise &&
-               result.estimate.segment_settled(pair.inner) &&
-               result.estimate.segment_settled(pair.outer);
-    if (now) {
-      double seen[6];
-      store(wrench_to_child(observer_.sensor_pose(inner),
-                            wrench_to_parent(observer_.sensor_pose(outer),
-                                             load_of(pair.outer, own))),
-            seen);
-      double size2 = 0.0, left2 = 0.0;
-      for (int i = 0; i < 6; ++i) {
-        const double x = seen[i] / rows_[first_[pair.inner] + i].contact, left = x + between[i];
-        size2 += x * x;
-        left2 += left * left;
-      }
-      const double clear = pair.touched ? kClear : tuning_.parity_clear;
-      now = size2 > clear * clear &&
-            left2 < (pair.touched ? kLeft * kLeft * size2
-                                  : std::max(tuning_.parity_left * tuning_.parity_left * size2,
-                                             tuning_.parity_noise * tuning_.parity_noise));
+    const bool settled = result.estimate.segment_settled(pair.inner) &&
+                         result.estimate.segment_settled(pair.outer);
+    bool now = settled && opposes(pair, own, between, pair.touched);
+    if (settled && !now && pair.touched) {  // the contact has gone since then
+      std::copy(all_own, all_own + 6, own);
+      now = opposes(pair, all_own, all_between, false);
     }
     const int axis = now ? only_axis(outer, own) : -1;
     const int other = now && axis < 0 ? swapped_axis(pair.outer, own) : -1;
@@ -199,6 +185,28 @@ class ParityWatch {
     if (axis >= 0) return contradicted(first + axis);
     contradicted(first + static_cast<std::size_t>(largest(own)));
     contradicted(first + static_cast<std::size_t>(other));
+  }
+
+  // Does the inner segment of a pair feel the opposite of what the outer one does [thresholds]?
+  bool opposes(const Pair& pair, const double* own, const double* between, bool touched) const {
+    if (!(largest_size(own) > 1.0 && largest_size(between) > tuning_.parity_noise)) return false;
+    const Layout& layout = observer_.layout();
+    const int inner = layout.segments[pair.inner].sensor, outer = layout.segments[pair.outer].sensor;
+    double seen[6];
+    store(wrench_to_child(observer_.sensor_pose(inner),
+                          wrench_to_parent(observer_.sensor_pose(outer), load_of(pair.outer, own))),
+          seen);
+    double size2 = 0.0, left2 = 0.0;
+    for (int i = 0; i < 6; ++i) {
+      const double x = seen[i] / rows_[first_[pair.inner] + i].contact, left = x + between[i];
+      size2 += x * x;
+      left2 += left * left;
+    }
+    const double clear = touched ? kClear : tuning_.parity_clear;
+    return size2 > clear * clear &&
+           left2 < (touched ? kLeft * kLeft * size2
+                            : std::max(tuning_.parity_left * tuning_.parity_left * size2,
+                                       tuning_.parity_noise * tuning_.parity_noise));
   }
 
   // A joint's torque beyond what the sensor right behind it says.

@@ -37,7 +37,7 @@ class SuspectWatch {
   // A sample begins; `add` takes what is suspected of a segment; then `finish`.
   void begin() { std::fill(now_.begin(), now_.end(), 0); }
   void add(const Suspect& suspect) {
-    if (!suspect.any() || !(std::fabs(suspect.error) > least_[suspect.channel])) return;
+    if (!suspect.any() || !suspect.told || !(std::fabs(suspect.error) > least_[suspect.channel])) return;
     now_[suspect.channel] = 1;
     if (suspect.other >= 0) now_[suspect.other] = 1;
     any_ = true;

@@ -86,8 +86,10 @@ class Arrivals {
     if (!suspect_.any()) {
       if (!placed(a) && changed(s, read)) return;
       if (lets_go(s, a)) return;
-      // A contact beside forces that are held has fewer unknowns than a channel beside free ones.
-      if (!placed(a)) suspect_ = suspect_beside_free_forces(s, read);
+      // A contact beside forces that are held has fewer unknowns than a channel beside free ones. But a
+      // known contact that lets go is likelier than a new one that pushes against it.
+      const bool contested = placed(a);
+      if (!contested || opposes(s, a)) suspect_ = suspect_beside_free_forces(s, contested, read);
     }
     if (suspect_.any()) {  // what has come is no contact, as far as is felt
       for (int c = 0; c < s.known.contacts.count; ++c) reports_.add(before.contacts.known[c]);
@@ -172,6 +174,14 @@ class Arrivals {
     return false;
   }
 
+  // Does what is left push against a known contact?
+  bool opposes(const SegmentContacts& s, const Answer& a) const {
+    const JointEstimate& before = s.known.before.contacts;
+    for (int c = 0; c < before.count; ++c)
+      if (dot(before.known[c].force, a.force) < 0.0) return true;
+    return false;
+  }
+
   // The known contacts explain all, with the forces of the last fit.
   void resume(SegmentContacts& s) {
     if (!s.state.is(Tracking::ending)) s.unexplained.calm = now_.time;
@@ -207,13 +217,14 @@ class Arrivals {
     return answer_;
   }
 
-  // A channel that explains alone what the known contacts leave, their forces free.
+  // A channel that explains alone what the known contacts leave, their forces free. `contested`: so does
+  // a new contact, with their forces held.
   template <class Read>
-  Suspect suspect_beside_free_forces(SegmentContacts& s, Read&& read) {
+  Suspect suspect_beside_free_forces(SegmentContacts& s, bool contested, Read&& read) {
     const JointEstimate& known = s.known.before.contacts;
     read();
     fit_.take_out(known, Change::of_forces(known.count, settings_.force_scale), measurement_);
-    return lone_.find(now_.segment, 3 * known.count);
+    return lone_.find(now_.segment, 3 * known.count, contested);
   }
 
   // The same with their forces free, where there are equations enough: three for each, and five.

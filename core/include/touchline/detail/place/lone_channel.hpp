@@ -23,6 +23,7 @@ struct Suspect {
   int channel = -1;  // as `ChannelLayout`; -1: there is none
   int other = -1;    // the one that it is swapped with; -1: none
   double error = 0.0;
+  bool told = true;  // else what is felt begins no contact, but a contact may be near that does it, too
   bool any() const { return channel >= 0; }
 };
 
@@ -37,13 +38,15 @@ class LoneChannel {
         out_until_(at_.count(), -kAbsurd),
         rows_(measurement.most_rows()),
         column_(measurement.most_rows()) {
+    weighed_.reserve(at_.joints + 12 * at_.sensors);  // each torque; six axes, and six pairs of them
     for (const Segment& segment : observer.layout().segments) {
       for (const int outer : segment.successors) inner_[outer] = segment.sensor;
     }
   }
 
   // Of segment g, whose rows the measurement has read. So many of their dimensions explain anything.
-  Suspect find(int g, int free = 0) {
+  // `contested`: a contact explains all, too.
+  Suspect find(int g, int free = 0, bool contested = false) {
     const int size = measurement_.size();
     if (!measurement_.has_wrench() || size - free <= kLeast) return {};
     measurement_.values(rows_.data(), 1);
@@ -51,16 +54,20 @@ class LoneChannel {
     all_ = 0.0;
     for (int i = 0; i < size; ++i) all_ += rows_[i] * rows_[i];
     if (free > 0 && all_ < chi2_limit(size - free, kArrival)) return {};  // they explain it alone
-    most_ = next_ = 0.0;
-    best_ = {};
+    weighed_.clear();
     visit_channels(g, [this](int channel, int other) { weigh(channel, other); });
-    const double left = all_ - most_;
+    const Weighed best = likeliest();
+    const double left = all_ - best.explains;
     const double limit = chi2_limit(std::max(1, size - 1 - free), kNoise);
     // A load that noise nearly hides fits every channel, and a clear one none but the faulty one.
-    const bool clear = most_ - next_ > kOnly * kOnly && left < kFair * most_;
-    if (!best_.any() || left > limit + kShape * kShape * all_ || (left > kLeft * all_ && !clear))
-      return {};
-    return borne_out() ? best_ : Suspect{};
+    const bool clear = best.explains - next_to(best.suspect) > kOnly * kOnly &&
+                       left < kFair * best.explains;
+    const bool noise = free > 0 && best.suspect.other < 0 &&
+                       left < chi2_limit(std::max(1, size - 1 - free), kUsual);
+    if (left > limit + kShape * kShape * all_) return {};
+    Suspect found = best.suspect;
+    found.told = !contested && (left <= kLeft * all_ || clear);
+    return found.told || noise ? found : Suspect{};
   }
 
   // Of what was looked at last: its squared size, to the scale of the noise.
@@ -96,9 +103,20 @@ class LoneChannel {
   static constexpr double kShape = 0.03;  // and this part of it: filters turn with the arm
   // Of the squared size: what one channel leaves of a contact that noise, or a gap, nearly hides.
   static constexpr double kLeft = 0.1;
+  // No more than noise usually leaves [sigmas]: of what known contacts do not explain, five sigmas and
+  // more, another contact far from them leaves more.
+  static constexpr double kUsual = 1.0;
   // Or sigmas by which no other channel explains as much. What is left may then be this part of what it
   // explains: ten rows of noise beside a load of five sigmas are less than half.
   static constexpr double kOnly = 3.0, kFair = 0.5;
+
+  // A channel, or two that are swapped, and the part of the squared length that lies along it. Two are
+  // wrong only where one explains less by so many sigmas.
+  struct Weighed {
+    Suspect suspect;
+    double explains = 0.0;
+    double likely() const { return explains - (suspect.other >= 0 ? kOnly * kOnly : 0.0); }
+  };
 
   // Calls `visit(channel, other)` for all that segment g feels, with what one unit of it does to the
   // rows in `column_`; `other`: of swapped axes, else -1.
@@ -116,8 +134,8 @@ class LoneChannel {
   }
 
   // The axes of a sensor, which this segment feels with a sign. Of one whose log has other axes, a
-  // channel is no axis. Swapped ones are looked for where joint torques contradict them: a sensor
-  // inboard tells of the others (parity_watch.hpp).
+  // channel is no axis. Swapped ones are looked for where joint torques or a sensor inboard contradict
+  // them.
   template <class Visit>
   void visit_axes(int sensor, double sign, Visit&& visit) {
     if (observer_.sensors()[sensor].turned) return;
@@ -126,7 +144,7 @@ class LoneChannel {
       load_axis(sensor, axis, -1, sign);
       visit(first + axis, -1);
     }
-    if (inner_[sensor] >= 0 || measurement_.size() < 6 + kTorques) return;
+    if (inner_[sensor] < 0 && measurement_.size() < 6 + kTorques) return;
     for (int axis = 0; axis < 6; ++axis) {  // of three: each with the next
       const int other = axis % 3 == 2 ? axis - 2 : axis + 1;
       load_axis(sensor, axis, other, sign);
@@ -162,30 +180,48 @@ class LoneChannel {
       square += column_[i] * column_[i];
     }
     if (!(square > 0.0)) return;
-    const double explained = along * along / square;
-    if (!(explained > most_)) {
-      next_ = std::max(next_, explained);
-      return;
+    weighed_.push_back({{channel, other, along / square}, along * along / square});
+  }
+
+  // The channel that explains most of those that the other segment at their sensor bears out.
+  Weighed likeliest() {
+    while (!weighed_.empty()) {
+      const auto most = std::max_element(weighed_.begin(), weighed_.end(),
+          [](const Weighed& a, const Weighed& b) { return a.likely() < b.likely(); });
+      if (borne_out(most->suspect)) return *most;
+      *most = weighed_.back();
+      weighed_.pop_back();
     }
-    next_ = most_;
-    most_ = explained;
-    best_ = {channel, other, along / square};
+    return {};
+  }
+
+  // What any other such channel explains that has no part in a suspect.
+  double next_to(const Suspect& suspect) const {
+    double most = 0.0;
+    for (const Weighed& w : weighed_) {
+      const bool other = !shares(w.suspect, suspect.channel) && !shares(w.suspect, suspect.other);
+      if (w.explains > most && other && borne_out(w.suspect)) most = w.explains;
+    }
+    return most;
+  }
+  static bool shares(const Suspect& suspect, int channel) {
+    return channel >= 0 && (suspect.channel == channel || suspect.other == channel);
   }
 
   // Does the other segment at the sensor feel the opposite, as it would of an error and would not of
   // a contact?
-  bool borne_out() const {
-    if (best_.channel < static_cast<int>(at_.wrench())) return true;
-    const int sensor = (best_.channel - static_cast<int>(at_.wrench())) / 6;
-    const int axis = (best_.channel - static_cast<int>(at_.wrench())) % 6;
+  bool borne_out(const Suspect& suspect) const {
+    if (suspect.channel < static_cast<int>(at_.wrench())) return true;
+    const int sensor = (suspect.channel - static_cast<int>(at_.wrench())) / 6;
+    const int axis = (suspect.channel - static_cast<int>(at_.wrench())) % 6;
     const int own = observer_.layout().segment_of_sensor[sensor];
     const bool here = own == measurement_.segment();
     if (here && inner_[sensor] < 0) return true;
     if (measurement_.normalized() == nullptr) return false;
     const int other = here ? observer_.layout().segment_of_sensor[inner_[sensor]] : own;
     const int at = here ? inner_[sensor] : sensor;
-    const int swapped = best_.other >= 0 ? best_.other - best_.channel + axis : -1;
-    const Spatial error = unit(axis, swapped, here ? -best_.error : best_.error);
+    const int swapped = suspect.other >= 0 ? suspect.other - suspect.channel + axis : -1;
+    const Spatial error = unit(axis, swapped, here ? -suspect.error : suspect.error);
     double shown[6];
     const Posture& posture = measurement_.posture();
     const Spatial w = wrench_to_parent(posture.pose(observer_.sensors()[sensor].node), error);
@@ -209,9 +245,8 @@ class LoneChannel {
   std::vector<double> out_until_;  // per channel [s]
   bool any_out_ = false;
   std::vector<double> rows_, column_;  // to the scale of the noise
-  // Squared lengths: of the rows, along the best channel, and along the one after it.
-  double all_ = 0.0, most_ = 0.0, next_ = 0.0;
-  Suspect best_;
+  double all_ = 0.0;  // squared length of the rows
+  std::vector<Weighed> weighed_;
 };
 
 }  // namespace touchline
