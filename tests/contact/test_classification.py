@@ -61,7 +61,7 @@ def test_forces_on_one_segment_that_can_be_told_apart_clamp_it(sara, skin):
         assert event.clamped is True
         place = sara.poses(drawn.touches[0].q)[touch.patch.node] @ touch.patch.T_node_link
         local = place[:3, :3].T @ (touch.position - place[:3, 3])
-        # One sigma is 64 mm on link 1: ten equations for ten unknowns, and inertias that are 2 % off.
+        # One sigma is 64 mm on link 1: ten equations, ten unknowns, and inertias that are 2 % off.
         np.testing.assert_allclose(event.position_link, local, atol=0.04)
         assert event.force @ touch.force > 0.95 * np.linalg.norm(event.force)
 

@@ -153,8 +153,9 @@ class Statistics:
         ):
             columns = np.array(values.T, order="C")
             if any_touch:
-                all_of += Moments.of(*(np.compress(touched, of, 1) for of in (columns, used)))
-                columns, used = (np.compress(~touched, of, 1) for of in (columns, used))
+                felt, of_felt = np.compress(touched, columns, 1), np.compress(touched, used, 1)
+                all_of += Moments.of(felt, of_felt)
+                columns, used = np.compress(~touched, columns, 1), np.compress(~touched, used, 1)
             moments = Moments.of(columns, used)
             all_of += moments
             without_touch += moments

@@ -22,7 +22,8 @@ from touchline.pipeline.pipeline import Pipeline
 from touchline.trials.faults import FAULTS, Channel, FaultType, cases_of, channels_of
 from touchline.trials.recordings import PHASES, record, robot_named
 
-_P, _R = TypeVar("_P"), TypeVar("_R")
+_P = TypeVar("_P")
+_R = TypeVar("_R")
 NUMBERS = tuple(
     field.name for field in fields(Outcome) if field.name not in ("robot", "fault", "channel")
 )
