@@ -504,7 +504,10 @@ class Detector {
     const bool quiet = levels_[g] == 0 && !s.pending;
     const bool may_begin = s.score > 1.0 || s.collision > 1.0 || (s.off && still_ < tuning_.pause);
     if (quiet && may_begin) s.origin = origin(g, dt);
-    if ((!quiet || may_begin) && s.origin == Origin::reversal && pushed(g)) s.origin = Origin::push;
+    // What creeps may be over its limit a moment before a push is: that has no before.
+    const bool recent = s.lasted < tuning_.trend / slowest_[g];
+    const bool other = s.origin == Origin::reversal || (s.origin == Origin::creep && recent);
+    if ((!quiet || may_begin) && other && pushed(g)) s.origin = Origin::push;
     advance(s.score > 1.0, dt, s.pending, s.above);
     s.highest = s.pending ? std::max(s.highest, s.score) : 0.0;
     advance(s.collision > 1.0, dt, s.pending_collision, s.above_collision);
