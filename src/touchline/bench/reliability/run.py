@@ -274,7 +274,7 @@ channel is named, and nothing that it explains is a sure contact or a collision.
 what is estimated where a sensor inboard contradicts it.
 
 A push does so where it passes near a sensor's axis, or where errors of the model hide what else it
-loads: of a hundred pushes about one. These are the false reports above. For two seconds that
+loads: of two hundred pushes about one. These are the false reports above. For two seconds that
 channel does not count. To wait for half a second with the report, where a contact explains all as
 well, would leave a third of them, and tell 2 % fewer signs, scales and delays in time.
 
