@@ -42,6 +42,22 @@ def torques_alone():
     return tl.Pipeline(robot), scripted(robot, [blow], 3.0, 0.5, settings).samples
 
 
+def pushed(robot, link, force, hold, seconds):
+    """Samples of a moving arm, 2 % off, that is pushed from BEGIN on for `hold` [s]."""
+    push = ScriptedContact(
+        link, np.array([0.0, 0.0, 0.05]), np.array(force), Profile(BEGIN, hold, 0.02, 0.02)
+    )
+    settings = Run(seed=3, noise=SensorNoise(), model_error=0.02, physics=2000.0)
+    return scripted(robot, [push], seconds, 0.5, settings).samples
+
+
+def faulty(robot, samples, name, channel, begin):
+    """The samples with a fault of a channel from `begin` [s] on."""
+    fault = next(f for f in FAULTS if f.name == name)
+    place = next(c for c in channels_of(robot) if c.name == channel)
+    return injected(samples, fault, place, begin, np.random.default_rng(0))[0]
+
+
 @pytest.mark.parametrize("name", ["base.fx", "base.fz", "tau.joint4"])
 def test_a_channel_that_alone_explains_what_is_felt_is_named(arm, name):
     robot, pipeline, samples = arm
@@ -67,10 +83,7 @@ def test_a_channel_that_alone_explains_what_is_felt_is_named(arm, name):
 )
 def test_a_push_is_not_suspected(arm, link, force):
     robot, pipeline, _ = arm
-    profile = Profile(BEGIN, 0.3, 0.02, 0.02)
-    push = ScriptedContact(link, np.array([0.0, 0.0, 0.05]), np.array(force), profile)
-    settings = Run(seed=3, noise=SensorNoise(), model_error=0.02, physics=2000.0)
-    _, told, events = heard(pipeline, scripted(robot, [push], 1.0, 0.5, settings).samples)
+    _, told, events = heard(pipeline, pushed(robot, link, force, 0.3, 1.0))
     assert told == []
     assert events != [] and events[0].level == "collision"
 
@@ -79,12 +92,7 @@ def test_a_push_is_not_suspected(arm, link, force):
 def test_axes_of_the_base_sensor_that_are_swapped_are_named_and_place_no_push(arm, begin):
     """They are swapped before a push, or during it: their error looks like a push on the base."""
     robot, pipeline, _ = arm
-    profile = Profile(BEGIN, 0.35, 0.02, 0.02)
-    push = ScriptedContact(
-        "link6", np.array([0.0, 0.0, 0.05]), np.array([18.0, -9.0, 0.0]), profile
-    )
-    settings = Run(seed=3, noise=SensorNoise(), model_error=0.02, physics=2000.0)
-    samples = scripted(robot, [push], 1.0, 0.5, settings).samples
+    samples = pushed(robot, "link6", [18.0, -9.0, 0.0], 0.35, 1.0)
     first = int(np.searchsorted(samples.time, begin))
     samples.wrench[first:, 0] = samples.wrench[first:, 0][:, [1, 0, 2, 3, 4, 5]]
     _, told, events = heard(pipeline, samples)
@@ -97,15 +105,8 @@ def test_axes_of_the_base_sensor_that_are_swapped_are_named_and_place_no_push(ar
 def test_a_reading_that_comes_late_is_no_new_contact_as_a_push_lets_go(arm, channel):
     """It still shows what has gone: that looked like another push, against the one that ends."""
     robot, pipeline, _ = arm
-    profile = Profile(BEGIN, 0.3, 0.02, 0.02)
-    push = ScriptedContact(
-        "link5", np.array([0.0, 0.0, 0.05]), np.array([18.0, -9.0, 6.0]), profile
-    )
-    settings = Run(seed=3, noise=SensorNoise(), model_error=0.02, physics=2000.0)
-    samples = scripted(robot, [push], 1.3, 0.5, settings).samples
-    fault = next(f for f in FAULTS if f.name == "delay")
-    place = next(c for c in channels_of(robot) if c.name == channel)
-    wrong, _ = injected(samples, fault, place, BEGIN - 0.3, np.random.default_rng(0))
+    samples = pushed(robot, "link5", [18.0, -9.0, 6.0], 0.3, 1.3)
+    wrong = faulty(robot, samples, "delay", channel, BEGIN - 0.3)
     _, _, healthy = heard(pipeline, samples)
     _, _, events = heard(pipeline, wrong)
     assert [(e.body, e.level) for e in events] == [(e.body, e.level) for e in healthy]
@@ -116,9 +117,7 @@ def test_axes_that_are_swapped_as_a_push_lets_go_are_named_and_are_no_place(name
     """The sensor inboard feels the push fade, and then the opposite of what they are wrong by."""
     robot = tl.load_robot("sara-full")
     recording = record(robot, 4)
-    fault = next(f for f in FAULTS if f.name == "swapped axes")
-    place = next(c for c in channels_of(robot) if c.name == name)
-    wrong, _ = injected(recording.samples, fault, place, RELEASED, np.random.default_rng(0))
+    wrong = faulty(robot, recording.samples, "swapped axes", name, RELEASED)
     _, told, events = heard(tl.Pipeline(robot), wrong)
     assert {f"{name}.fx", f"{name}.fy"} <= {change.channel for change in told}
     assert wrong.time[told[0].sample] - RELEASED < 0.1
