@@ -45,6 +45,18 @@ struct DetectionRow {
   double seen = 0.0;          // sigmas of the noise, told and seen, that `contact` is kept above
 };
 
+// What is known of a row at one sample.
+struct RowSample {
+  double residual = 0.0;    // filtered [N or Nm]
+  double innovation = 0.0;  // mean load over the last interval, not filtered
+  double offset = 0.0;      // of the residual: the slow baseline
+  double reference = 0.0;   // and the quick one
+  double referred = 0.0;    // time over which the quick one has been averaged [s]
+  double gap_std = 0.0;     // one sigma of what lost samples may have left in the residual
+  double speed = 0.0;       // of its joint [rad/s or m/s]; a wrench has none
+  bool known = false;
+};
+
 struct DetectionTimes {
   double min_duration;  // a test must hold this long to fire [s]
   double hold;          // and be quiet this long to clear [s]

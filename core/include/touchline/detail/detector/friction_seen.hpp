@@ -10,71 +10,152 @@
 #include <cstddef>
 #include <vector>
 
+#include "touchline/detail/detector/row_offsets.hpp"
+#include "touchline/detail/detector/rows.hpp"
 #include "touchline/detail/detector/tuning.hpp"
+#include "touchline/detail/model/posture.hpp"
+#include "touchline/detail/observer/observer.hpp"
 
 namespace touchline {
 
 class FrictionSeen {
  public:
-  explicit FrictionSeen(std::size_t rows) : rows_(rows) {}
+  // All that is handed over stays the caller's.
+  FrictionSeen(const Observer& observer, const DetectorRows& rows, const RowOffsets& offsets,
+               const DetectorTuning& tuning)
+      : observer_(observer), rows_(rows), offsets_(offsets), tuning_(tuning), joints_(rows.size()) {}
 
-  // Row i is of a joint that moves at `speed` [rad/s or m/s]; `part`: what its filter takes of a sample,
-  // and `slow_part` the mean of the last moments.
-  void follow(std::size_t i, double speed, double part, double slow_part, const DetectorTuning& t) {
-    Row& row = rows_[i];
-    const double way = speed / (std::fabs(speed) + t.friction_speed);
-    if (!row.started) row = {true, way, way, way, 0.0, 0.0};
-    row.way += (way - row.way) * part;
-    row.trend += (row.way - row.trend) * slow_part;
+  // Joints that are tested beside a force-torque sensor, which feels none of it; `posture`: null while
+  // it is not known.
+  void follow(const Posture* posture, double dt) {
+    for (std::size_t g = 0; g < rows_.segments(); ++g) {
+      if (!has_sensor(g)) continue;
+      const bool silent = posture != nullptr && is_silent(g);
+      double most = 0.0;
+      for (const std::size_t i : rows_.of(g)) {
+        if (!shows(i)) continue;
+        Joint& joint = joints_[i];
+        const double part = std::min(1.0, dt * rows_.bandwidths[i]);
+        joint.follow(rows_.samples[i].speed, part, std::min(1.0, part / tuning_.trend), tuning_);
+        const bool tells = joint.turned() >= tuning_.friction_turned;
+        if (silent && offsets_.started(i) && tells) joint.learn(unexplained(i, *posture), dt, tuning_);
+        most = std::max(most, joint.shown(rows_[i].contact, tuning_));
+      }
+      for (const std::size_t i : rows_.of(g))
+        if (shows(i)) expect(i, most);
+    }
   }
 
-  // Has enough of the friction of row i come since the baseline to tell of it?
-  bool tells(std::size_t i, const DetectorTuning& t) const { return turned(i) >= t.friction_turned; }
+  // What friction may have added to row i since its baseline [N or Nm].
+  double added(std::size_t i) const { return joints_[i].added; }
 
-  // What row i is off its baseline by [N or Nm], for dt [s] in which its sensor feels nothing.
-  void learn(std::size_t i, double off, double dt, const DetectorTuning& t) {
-    Row& row = rows_[i];
-    const double turned = row.way - row.base;
-    const double keep = std::max(0.0, 1.0 - dt * turned * turned / t.motion_memory);
-    row.square = keep * row.square + turned * turned * dt;
-    row.product = keep * row.product - off * turned * dt;
+  // The baselines of the rows that are averaged take the present sample; or a segment's rows rest on
+  // the mean of the last moments.
+  void average(const RowLanes& averaged, double dt) {
+    for (std::size_t g = 0; g < rows_.segments(); ++g) {
+      if (!has_sensor(g)) continue;
+      for (const std::size_t i : rows_.of(g))
+        if (!rows_.of_wrench(i) && averaged[i] > 0.0) joints_[i].average(offsets_.share(i, dt));
+    }
   }
-
-  // The baseline of row i takes the part `gain` of what the last sample has, or rests on the mean of
-  // the last moments.
-  void average(std::size_t i, double gain) {
-    rows_[i].base += (rows_[i].way - rows_[i].base) * gain;
-  }
-  void rest(std::size_t i) { rows_[i].base = rows_[i].trend; }
-
-  // The friction that row i has shown [N or Nm], 0 where that is less than `least`; and how much of it
-  // is sure, 0 to 1.
-  double shown(std::size_t i, double least, const DetectorTuning& t) const {
-    const Row& row = rows_[i];
-    const double friction = row.product / (row.square + t.friction_few);
-    return friction > least ? friction : 0.0;
-  }
-  double sure(std::size_t i, const DetectorTuning& t) const {
-    return rows_[i].square / (rows_[i].square + t.friction_enough);
-  }
-
-  // Which part of the joint's friction has come since the baseline: 2 once it goes the other way.
-  double turned(std::size_t i) const { return std::fabs(rows_[i].way - rows_[i].base); }
-  // The way it went while the baseline was averaged, -1 to 1.
-  double way(std::size_t i) const { return rows_[i].base; }
+  void rest(std::size_t i) { joints_[i].base = joints_[i].trend; }
 
   void go_on_from(const FrictionSeen& other, std::size_t of, std::size_t i) {
-    rows_[i] = other.rows_[of];
+    joints_[i] = other.joints_[of];
   }
 
  private:
-  struct Row {
+  struct Joint {
     bool started = false;
-    // Of the joint, -1 to 1, filtered as the row is: now, in the last moments, and of the baseline.
+    // The way it goes, -1 to 1, filtered as its row is: now, in the last moments, and of the baseline.
     double way = 0.0, trend = 0.0, base = 0.0;
     double square = 0.0, product = 0.0;  // sums of how much of it came [s], and with it [N s or Nm s]
+    double added = 0.0;
+
+    // `part`: what its filter takes of a sample, and `slow_part` the mean of the last moments.
+    void follow(double speed, double part, double slow_part, const DetectorTuning& t) {
+      const double now = speed / (std::fabs(speed) + t.friction_speed);
+      if (!started) *this = {true, now, now, now, 0.0, 0.0, added};
+      way += (now - way) * part;
+      trend += (way - trend) * slow_part;
+    }
+
+    // What its row is off its baseline by [N or Nm], for dt [s] in which the sensor feels nothing.
+    void learn(double off, double dt, const DetectorTuning& t) {
+      const double turn = way - base;
+      const double keep = std::max(0.0, 1.0 - dt * turn * turn / t.motion_memory);
+      square = keep * square + turn * turn * dt;
+      product = keep * product - off * turn * dt;
+    }
+
+    // The baseline takes the part `gain` of what the last sample has.
+    void average(double gain) { base += (way - base) * gain; }
+
+    // The friction that it has shown [N or Nm], 0 where that is less than `least`; and how much of it
+    // is sure, 0 to 1.
+    double shown(double least, const DetectorTuning& t) const {
+      const double friction = product / (square + t.friction_few);
+      return friction > least ? friction : 0.0;
+    }
+    double sure(const DetectorTuning& t) const { return square / (square + t.friction_enough); }
+
+    // Which part of its friction has come since the baseline: 2 once it goes the other way.
+    double turned() const { return std::fabs(way - base); }
   };
-  std::vector<Row> rows_;
+
+  bool has_sensor(std::size_t g) const { return observer_.layout().segments[g].sensor >= 0; }
+  bool shows(std::size_t i) const {
+    return !rows_.of_wrench(i) && rows_.samples[i].known && rows_[i].seen > 0.0;
+  }
+
+  // What may have come of the friction of a joint; `other`: the most that one beside it has shown. A
+  // joint of which little has been seen may have as much, or as stood there when it was moving at the
+  // start.
+  void expect(std::size_t i, double other) {
+    Joint& joint = joints_[i];
+    const double contact = rows_[i].contact;
+    if (offsets_.shown(i) > contact && offsets_.anchor(i) * joint.base < 0.0)
+      other = std::max(other, std::fabs(offsets_.anchor(i)));
+    const double own = joint.shown(contact, tuning_);
+    joint.added = std::max(own, (1.0 - joint.sure(tuning_)) * other) * joint.turned();
+  }
+
+  // Does the sensor of a segment feel nothing?
+  bool is_silent(std::size_t g) const {
+    bool any = false;
+    for (const std::size_t i : rows_.of(g)) {
+      if (!rows_.of_wrench(i)) continue;
+      if (!rows_.samples[i].known || !offsets_.started(i)) return false;
+      any = true;
+      if (std::fabs(off(i)) > rows_.limit(i)) return false;
+    }
+    return any;
+  }
+
+  // What a joint's row has that no contact explains of which the sensor shows no more than it does: one
+  // inboard of the joint does not load it, one outboard by what the sensor shows.
+  double unexplained(std::size_t i, const Posture& posture) const {
+    const int sensor = observer_.layout().segments[rows_[i].segment].sensor;
+    double w[6] = {};
+    for (std::size_t k = rows_.first(rows_[i].segment); rows_.of_wrench(k); ++k)
+      w[rows_[k].component] = off(k);
+    const Pose& X = posture.pose(observer_.sensors()[sensor].node);
+    const Spatial shown = wrench_to_parent(X, load(w));
+    const double inboard = off(i);
+    double outboard = inboard;
+    for (int node : observer_.joints()[rows_[i].joint].nodes)
+      outboard -= dot(posture.subspace(node), shown);
+    if (inboard * outboard <= 0.0) return 0.0;
+    return std::fabs(inboard) < std::fabs(outboard) ? inboard : outboard;
+  }
+
+  double off(std::size_t i) const { return rows_.samples[i].residual - offsets_.baseline(i); }
+
+  const Observer& observer_;
+  const DetectorRows& rows_;
+  const RowOffsets& offsets_;
+  const DetectorTuning& tuning_;
+  std::vector<Joint> joints_;  // per row
 };
 
 }  // namespace touchline

@@ -20,17 +20,6 @@
 
 namespace touchline {
 
-// What is known of a row at one sample.
-struct RowSample {
-  double residual = 0.0;    // filtered [N or Nm]
-  double innovation = 0.0;  // mean load over the last interval, not filtered
-  double offset = 0.0;      // of the residual: the slow baseline
-  double reference = 0.0;   // and the quick one
-  double referred = 0.0;    // time over which the quick one has been averaged [s]
-  double gap_std = 0.0;     // one sigma of what lost samples may have left in the residual
-  bool known = false;
-};
-
 class SegmentTests {
  public:
   // `tuning` stays the caller's. Rows that are not `loadable` are left out.

@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: Apache-2.0
+// The life of what a segment feels: when it becomes an event, what that most likely is, a push or the
+// arm's own doing, and when it is over. What is left of it may come to rest as an offset. No
+// allocation after construction.
+// Theory: docs/theory.md, section 4.7.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "touchline/detail/detector/activity.hpp"
+#include "touchline/detail/detector/detection_row.hpp"
+#include "touchline/detail/detector/friction_seen.hpp"
+#include "touchline/detail/detector/row_offsets.hpp"
+#include "touchline/detail/detector/rows.hpp"
+#include "touchline/detail/detector/tuning.hpp"
+
+namespace touchline {
+
+// What has been seen of a segment's noise since observation began.
+enum class Seen { little, some, enough };
+
+// What the tests say of a segment at one sample.
+struct SegmentScore {
+  double peak = 0.0;       // the largest share of its rows
+  double score = 0.0, borne = 0.0;  // of all tests, in thresholds; of what no single sample moves
+  double collision = 0.0, borne_collision = 0.0;  // of its rows, in thresholds of a collision
+  bool off = false;        // has the arm shown that it is not as told?
+  double age = 0.0;        // since its first settled sample [s]
+  Seen seen = Seen::little;
+};
+
+class SegmentLevels {
+ public:
+  // All that is handed over stays the caller's.
+  SegmentLevels(const DetectorRows& rows, const ActivityMeter& motion, const DetectionTimes& times,
+                const DetectorTuning& tuning, RowOffsets& offsets, FrictionSeen& friction)
+      : rows_(rows),
+        motion_(motion),
+        times_(times),
+        tuning_(tuning),
+        offsets_(offsets),
+        friction_(friction),
+        segments_(rows.segments()),
+        levels_(rows.segments(), 0) {}
+
+  const std::vector<int>& levels() const { return levels_; }  // per segment: a `Level`
+  bool is_felt(std::size_t g) const { return levels_[g] > 0; }
+  // Does a test hold, but not for long enough yet?
+  bool is_pending(std::size_t g) const { return segments_[g].contact.holds; }
+  bool is_quiet(std::size_t g) const { return !is_felt(g) && !is_pending(g); }
+  // May offsets be followed: is nothing felt, or only by what has been an offset since?
+  bool adapts(std::size_t g, double peak) const {
+    return is_felt(g) ? peak < times_.release : !is_pending(g);
+  }
+
+  // Is what is felt of a segment most likely the arm's own doing: an error of its model in motion?
+  bool is_own_doing(std::size_t g) const {
+    const Segment& s = segments_[g];
+    return s.off && motion_.moves() && (s.origin != Origin::push || s.lasted > tuning_.hand);
+  }
+
+  // Has the arm shown that it is not as told, and does it move, or has it since the event began?
+  bool has_moved_off(std::size_t g) const {
+    return segments_[g].off && (segments_[g].in_motion || motion_.moves());
+  }
+
+  // Does a sensor's wrench change faster than motions do? That is not learned as one of their errors.
+  bool steps(std::size_t g) const {
+    for (const std::size_t i : rows_.of(g)) {
+      if (!rows_.of_wrench(i) || !rows_.samples[i].known) continue;
+      if (offsets_.quick(i) > std::max(rows_[i].contact, offsets_.creep(i))) return true;
+    }
+    return false;
+  }
+
+  // A sample, dt [s] after the one before.
+  void decide(std::size_t g, const SegmentScore& now, double dt) {
+    Segment& s = segments_[g];
+    s.off = now.off;
+    if (is_joined(g)) {  // what there was is an offset, and the push is its own event
+      come_to_rest(g);
+      s.lasted = 0.0;
+      s.in_motion = true;
+      return;
+    }
+    const bool quiet = is_quiet(g);
+    const bool may_begin = now.score > 1.0 || now.collision > 1.0 || (s.off && motion_.moves());
+    if (quiet && may_begin) s.origin = origin(g, now, dt);
+    // What creeps may be over its limit a moment before a push is: that has no before.
+    const bool recent = s.lasted < tuning_.trend / rows_.slowest(g);
+    const bool other = s.origin == Origin::reversal || (s.origin == Origin::creep && recent);
+    if ((!quiet || may_begin) && other && is_pushed(g)) s.origin = Origin::push;
+    s.contact.advance(now.score, dt);
+    s.collision.advance(now.collision, dt);
+    // What motion shows soon exceeds no limit; it need not fall below a part of it.
+    const double release = is_own_doing(g) ? 1.0 : times_.release;
+    s.below = lasting(now.score < release, dt, s.below);
+    if (lasts(g, s.contact, now, now.score, now.borne)) levels_[g] = std::max(levels_[g], 1);
+    if (lasts(g, s.collision, now, now.collision, now.borne_collision)) levels_[g] = 2;
+    if (!is_felt(g)) {
+      s.top = s.top_wrench = s.rest = s.back = s.below = s.lasted = 0.0;
+      s.in_motion = motion_.moves();
+      return;
+    }
+    follow(g, dt);
+  }
+
+ private:
+  enum class Origin {  // what an event began with
+    start,     // of observation: an offset that has yet to be seen whole
+    reversal,  // only of joints that hardly move, as friction does that changes its sign
+    creep,     // no faster than motions change
+    push
+  };
+
+  // Does a test hold, since when without a break [s], and how high has its score been meanwhile?
+  struct Holding {
+    bool holds = false;
+    double since = 0.0, highest = 0.0;
+    void advance(double score, double dt) {
+      const bool now = score > 1.0;
+      since = now && holds ? since + dt : 0.0;
+      holds = now;
+      highest = now ? std::max(highest, score) : 0.0;
+    }
+    void end() {
+      holds = false;
+      since = 0.0;
+    }
+  };
+
+  struct Segment {
+    bool off = false;  // has the arm shown that it is not as told?
+    Holding contact, collision;
+    Origin origin = Origin::start;
+    bool in_motion = false;  // did the present event begin while the arm moved?
+    // Of the present event, for how long [s]:
+    double lasted = 0.0;
+    double below = 0.0;  // it has been below what releases it
+    double rest = 0.0;   // little has been left of it, and that has not changed
+    double back = 0.0;   // all has been as before the offset that stands there now
+    // Its largest mean of the last moments, in limits; the same of the sensors' rows alone.
+    double top = 0.0, top_wrench = 0.0;
+  };
+
+  // Which rows of a segment: all, or those that its sensor's wrench has.
+  enum class Rows { all, wrench };
+  bool counts(std::size_t i, Rows which) const {
+    return rows_.samples[i].known && (which == Rows::all || rows_.of_wrench(i));
+  }
+
+  // The present event goes on, or ends.
+  void follow(std::size_t g, double dt) {
+    Segment& s = segments_[g];
+    s.lasted += dt;
+    s.top = std::max(s.top, lately(g));
+    s.top_wrench = std::max(s.top_wrench, lately(g, Rows::wrench));
+    s.rest = lasting((may_rest(g) && is_steady(g)) || only_joints_left(g), dt, s.rest);
+    if (s.below >= times_.hold) levels_[g] = 0;
+    const double least = tuning_.rest / rows_.slowest(g);
+    const double least_moving = std::max(least, tuning_.rest_moving);
+    if (is_felt(g) && s.rest >= (motion_.stands() ? least : least_moving)) come_to_rest(g);
+    const bool back = motion_.stands() && offsets_.is_back(g, times_.release) && is_steady(g);
+    s.back = lasting(back, dt, s.back);
+    if (is_felt(g) && s.back >= least_moving) go_back(g);
+  }
+
+  // Has a test held for long enough, not by one sample alone, and not by noise that has yet to be
+  // seen? Where a test need not last, its threshold is one of calibration, which has met all that.
+  bool lasts(std::size_t g, const Holding& test, const SegmentScore& now, double score,
+             double borne) const {
+    if (!test.holds || test.since < times_.min_duration) return false;
+    if (times_.min_duration <= 0.0) return true;
+    const Segment& s = segments_[g];
+    const bool barely = s.contact.highest < tuning_.barely && s.off && motion_.moves();
+    const double moments = tuning_.trend / rows_.slowest(g);
+    if (barely && test.since < moments) return false;  // an error of the model passes
+    switch (now.seen) {
+      case Seen::little: return score > tuning_.unseen;
+      case Seen::some: return score > tuning_.alone;
+      default: return score > tuning_.alone || borne > 1.0;
+    }
+  }
+
+  // For how long something has held, but for single samples of noise.
+  double lasting(bool holds, double dt, double duration) const {
+    return holds ? duration + dt : std::max(0.0, duration - tuning_.spike * dt);
+  }
+
+  // What an event that begins now would have begun with.
+  Origin origin(std::size_t g, const SegmentScore& now, double dt) const {
+    const double settled = tuning_.start / rows_.slowest(g) + tuning_.start_samples * dt;
+    if (now.age < settled) return Origin::start;
+    bool slow = true, creeps = true;
+    for (const std::size_t i : rows_.of(g)) {
+      if (rows_.shares[i] < std::min(1.0, now.peak)) continue;
+      slow = slow && !rows_.of_wrench(i) &&
+             std::fabs(rows_.samples[i].speed) < tuning_.reversal_speed;
+      creeps = creeps && offsets_.quick(i) < offsets_.creep(i);
+    }
+    return slow ? Origin::reversal : creeps ? Origin::creep : Origin::push;
+  }
+
+  // Has a sensor's wrench stepped over its limit? Friction in joints, whichever moves them, does not
+  // load a sensor: what began with joints that hardly move is a push after all. So is what began while
+  // the sensor was lost, if it shows a load when it is known again.
+  bool is_pushed(std::size_t g) const {
+    for (const std::size_t i : rows_.of(g)) {
+      if (!rows_.of_wrench(i) || std::fabs(rows_.normalized[i]) < rows_.limits[i]) continue;
+      if (offsets_.is_anew(i) || offsets_.quick(i) >= offsets_.creep(i)) return true;
+    }
+    return false;
+  }
+
+  // Does a push join what most likely is the arm's own doing, or what only joints have felt, of an arm
+  // in motion that is not as told? A sensor's wrench then steps by more than its limit. What lasts for
+  // less than the mean of the last moments has no before.
+  bool is_joined(std::size_t g) const {
+    const Segment& s = segments_[g];
+    if (!is_felt(g) || !has_moved_off(g)) return false;
+    if (s.top_wrench > 1.0 && (s.origin == Origin::push || !is_own_doing(g))) return false;
+    if (s.lasted < tuning_.trend / rows_.slowest(g)) return false;
+    for (const std::size_t i : rows_.of(g))
+      if (counts(i, Rows::wrench) && offsets_.quick(i) > rows_.limit(i)) return true;
+    return false;
+  }
+
+  // May what the last moments have of a contact be friction or an error of the model? Only if it is
+  // little of the contact's peak. An arm that stands must have shown that it is not as told. Of one
+  // that moves, by itself and not by the contact alone, hardly anything may be left. Two contacts
+  // against each other leave more.
+  bool may_rest(std::size_t g) const {
+    const Segment& s = segments_[g];
+    const bool little = s.origin == Origin::start || lately(g) < tuning_.little * s.top;
+    if (!little || !(s.off || s.in_motion)) return false;
+    return motion_.stands() ? s.off : lately(g) < std::max(tuning_.barely, tuning_.trace * s.top);
+  }
+
+  // Does nothing of a contact load the segment's sensors any more, of such an arm? What its joints
+  // then have is friction that has changed meanwhile: no contact that clamps the arm loses its load on
+  // the sensors at once and keeps that on the joints.
+  bool only_joints_left(std::size_t g) const {
+    return has_moved_off(g) && segments_[g].top_wrench > 1.0 &&
+           lately(g, Rows::wrench) < times_.release && is_steady(g, Rows::wrench);
+  }
+
+  // The mean of the last moments, in limits: the largest of a segment's rows.
+  double lately(std::size_t g, Rows which = Rows::all) const {
+    double most = 0.0;
+    for (const std::size_t i : rows_.of(g))
+      if (counts(i, which)) most = std::max(most, std::fabs(offsets_.lasting(i)) / rows_.limit(i));
+    return most;
+  }
+
+  // Has no row of the segment changed of late by what would matter?
+  bool is_steady(std::size_t g, Rows which = Rows::all) const {
+    for (const std::size_t i : rows_.of(g))
+      if (counts(i, which) && offsets_.quick(i) > times_.release * rows_.limit(i)) return false;
+    return true;
+  }
+
+  void come_to_rest(std::size_t g) {
+    offsets_.come_to_rest(g);
+    end(g);
+  }
+  void go_back(std::size_t g) {
+    offsets_.go_back(g);
+    end(g);
+  }
+  void end(std::size_t g) {
+    for (const std::size_t i : rows_.of(g)) friction_.rest(i);
+    levels_[g] = 0;
+    Segment& s = segments_[g];
+    s.contact.end();
+    s.collision.end();
+    s.below = s.top = s.top_wrench = s.rest = s.back = 0.0;
+  }
+
+  const DetectorRows& rows_;
+  const ActivityMeter& motion_;
+  const DetectionTimes& times_;
+  const DetectorTuning& tuning_;
+  RowOffsets& offsets_;
+  FrictionSeen& friction_;
+  std::vector<Segment> segments_;
+  std::vector<int> levels_;
+};
+
+}  // namespace touchline
