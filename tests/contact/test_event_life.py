@@ -118,3 +118,20 @@ def test_a_push_that_begins_while_an_error_creeps_over_its_limit_is_no_error():
     assert all(event.status == "located" for event in pipeline.events)
     forces = [row.component in (0, 1, 2) for row in pipeline.thresholds.rows]
     assert np.max(detection.drift[-1][np.array(forces)]) < 0.5  # N
+
+
+def test_of_slow_samples_what_trembles_after_a_strong_touch_does_not_prolong_it():
+    # 15 Hz, touches of 0.4 s. For 0.3 s after each the base trembles by 0.8 thresholds: by more than
+    # the half of one that an event of quick samples must fall below.
+    period, begins = 1.0 / 15.0, 2.0 + 0.8 * np.arange(10)
+    time = period * np.arange(160)
+    rest, touch = signals(ROBOT, Q, [], 0.001, None), signals(ROBOT, Q, [pushed((-1, 1))], 0.001, None)
+    pipeline = Pipeline(ROBOT, period=period, torque_error=0.0)
+    (threshold,) = (row.contact for row in pipeline.thresholds.rows if row.component == 0)
+    since = np.min(np.where(time >= begins[:, None], time - begins[:, None], np.inf), axis=0)
+    touched, trembling = since < 0.4, (since >= 0.45) & (since < 0.75)
+    wrench = np.where(touched[:, None, None], touch.wrench[0], rest.wrench[0])
+    tau = np.where(touched[:, None], touch.tau[0], rest.tau[0])
+    wrench[:, 0, 0] += 0.8 * threshold * trembling * np.resize([1, 1, -1, -1], len(time))
+    pipeline.run(time, np.tile(Q, (len(time), 1)), np.zeros((len(time), 6)), tau, wrench)
+    assert len(pipeline.events) == len(begins)

@@ -38,7 +38,7 @@ class Detector {
       : tuning_(tuning),
         observer_(observer),
         settings_(std::move(settings)),
-        rows_(observer, std::move(rows), settings_.sum_limits.size()),
+        rows_(observer, std::move(rows), settings_.sum_limits.size(), settings_.noise.period),
         posture_(observer.tree(), observer.row_layout().joints),
         told_(observer, rows_.all(), settings_.noise),
         motion_(observer.row_layout().joints, tuning_),

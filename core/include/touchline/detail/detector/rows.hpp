@@ -39,13 +39,16 @@ class RowRange {
 
 class DetectorRows {
  public:
-  // Rows of a segment stand together, those of its wrench first. Of so many segments.
-  DetectorRows(const Observer& observer, std::vector<DetectionRow> rows, std::size_t segments)
+  // Rows of a segment stand together, those of its wrench first. Of so many segments; samples come
+  // `period` [s] apart.
+  DetectorRows(const Observer& observer, std::vector<DetectionRow> rows, std::size_t segments,
+               double period)
       : samples(rows.size()),
         residuals(rows.size()),
         known(rows.size()),
         contact(rows.size()),
         bandwidths(rows.size()),
+        kept(rows.size()),
         limits(rows.size(), 1.0),
         normalized(rows.size(), 0.0),
         shares(rows.size(), 0.0),
@@ -57,6 +60,7 @@ class DetectorRows {
       const Segment& segment = observer.layout().segments[row.segment];
       bandwidths[i] = row.component < 0 ? observer.joints()[row.joint].bandwidth
                                         : observer.sensors()[segment.sensor].bandwidth;
+      kept[i] = std::exp(-bandwidths[i] * period);
       contact[i] = row.contact;
       slowest_[row.segment] = std::min(slowest_[row.segment], bandwidths[i]);
       first_[row.segment + 1] = i + 1;
@@ -73,6 +77,10 @@ class DetectorRows {
   std::size_t end(std::size_t segment) const { return first_[segment + 1]; }
   // The least bandwidth of a segment's rows [rad/s].
   double slowest(std::size_t segment) const { return slowest_[segment]; }
+  // Do its filters keep less than this part of a reading until the next sample?
+  bool is_slow(std::size_t segment, double part) const {
+    return first(segment) < end(segment) && kept[first(segment)] < part;
+  }
   // Is it a component of a wrench, and not a joint's torque?
   bool of_wrench(std::size_t i) const { return rows_[i].component >= 0; }
   // What the load of row i must exceed now [N or Nm].
@@ -94,9 +102,10 @@ class DetectorRows {
   // Of the sample: what is read; residuals [N or Nm], and 1 where they are known.
   std::vector<RowSample> samples;
   RowLanes residuals, known;
-  // Of the robot: thresholds [N or Nm], bandwidths of the filters [rad/s].
+  // Of the robot: thresholds [N or Nm], bandwidths of the filters [rad/s], and what part of a reading
+  // these keep until the next sample.
   RowLanes contact;
-  std::vector<double> bandwidths;
+  std::vector<double> bandwidths, kept;
   // Of the sample: what `normalized` must exceed, at least 1; (residual - baseline) / threshold; the
   // size of that, in limits. The latter two are 0 where there is no settled residual.
   RowLanes limits;

@@ -95,8 +95,10 @@ class SegmentLevels {
     if ((!quiet || may_begin) && other && is_pushed(g)) s.origin = Origin::push;
     s.contact.advance(now.score, dt);
     s.collision.advance(now.collision, dt);
-    // What motion shows soon exceeds no limit; it need not fall below a part of it.
-    const double release = is_own_doing(g) ? 1.0 : times_.release;
+    // What motion shows soon exceeds no limit; it need not fall below a part of it. Where samples are slow,
+    // nor need what was strong: single ones of noise are all that is left of it.
+    const bool was_strong = rows_.is_slow(g, tuning_.slow) && tuning_.trace * s.top > 1.0;
+    const double release = is_own_doing(g) || was_strong ? 1.0 : times_.release;
     s.below = lasting(now.score < release, dt, s.below);
     if (lasts(g, s.contact, now, now.score, now.borne)) levels_[g] = std::max(levels_[g], 1);
     if (lasts(g, s.collision, now, now.collision, now.borne_collision)) levels_[g] = 2;

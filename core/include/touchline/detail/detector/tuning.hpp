@@ -183,6 +183,10 @@ struct DetectorTuning {
   // The same of an arm that moves: what two contacts against each other hardly leave. Half: false
   // events in motion go on. Double: one that is clamped is taken for free.
   double trace = 0.25;
+  // What a filter keeps of a reading until the next sample, below which samples are slow: noise comes
+  // through whole. Half: at 15 Hz what trembles after a touch prolongs it. Double: at 100 Hz what is left
+  // of a strong push may end and begin anew.
+  double slow = 0.5;
   // Samples of calm that one of noise takes away. Half and double: how soon an event ends in noise.
   double spike = 5.0;
   // Times 1 / K: how long rests what has come to rest. Half: a hand that holds still for 25 ms at
@@ -254,6 +258,7 @@ struct DetectorTuning {
     v("hand", "s", t.hand);
     v("little", "1", t.little);
     v("trace", "1", t.trace);
+    v("slow", "1", t.slow);
     v("spike", "samples", t.spike);
     v("rest", "1/K", t.rest);
     v("rest_moving", "s", t.rest_moving);
