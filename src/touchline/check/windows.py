@@ -18,7 +18,7 @@ from touchline.observer.samples import Samples
 
 SECONDS, ROWS = 0.25, 8  # at least so long and so many samples is a window
 MOST = 4000
-JOINT_FIELDS = "q", "qd", "slope", "torque", "expected_torque", "expected_rate"
+JOINT_FIELDS = "q", "qd", "slope", "acceleration", "torque", "expected_torque", "expected_rate"
 WRENCH_FIELDS = "wrench", "expected_wrench", "weightless_wrench", "wrench_rate", "weightless_rate"
 
 
@@ -30,6 +30,7 @@ class Windows:
         q: (W, n) positions.
         qd: (W, n) velocities as logged.
         slope: (W, n) velocities from the positions.
+        acceleration: (W, n) change of the logged velocities.
         torque: (W, n) as the description reads the log: sign, gain, bias and friction applied.
         expected_torque: (W, n) without contact.
         expected_rate: (W, n) how fast that changes [Nm/s].
@@ -43,6 +44,7 @@ class Windows:
     q: Array
     qd: Array
     slope: Array
+    acceleration: Array
     torque: Array
     expected_torque: Array
     expected_rate: Array
@@ -85,6 +87,7 @@ class WindowMaker:
             "weightless_wrench": weightless.sensor_wrench,
         }
         cut = {name: _mean(values, count, rows) for name, values in signals.items()}
+        cut["acceleration"] = _rate(part.qd, count, rows) / self._period
         cut["expected_rate"] = _rate(whole.tau_ext, count, rows) / self._period
         cut["wrench_rate"] = _rate(whole.sensor_wrench, count, rows) / self._period
         cut["weightless_rate"] = _rate(weightless.sensor_wrench, count, rows) / self._period
