@@ -238,7 +238,8 @@ def torque_words(name: str, fit: TorqueFit) -> list[str]:
     if abs(fit.factor) < TAKEN_OUT and unit is None:
         line = f"{start}: gravity seems taken out already; compensated: gravity (or model)"
         if abs(fit.factor) > SURE * fit.error:
-            line += f"; or a motor's current in amperes: gain: {1.0 / abs(fit.factor):.3g}"
+            sign = ", sign: -1" if fit.factor < 0 else ""
+            line += f"; or a motor's current in amperes: gain: {1.0 / abs(fit.factor):.3g}{sign}"
         return [line]
     if unit is not None:
         sign = ", and of opposite sign: sign: -1" if fit.factor < 0 else ""
