@@ -130,3 +130,29 @@ def test_an_output_may_rest_with_its_joint(case, path, tmp_path):
     assert not any("stuck" in line for line in told(case, path, tmp_path))
     s.q[still, 1] += 1e-4 * np.sin(np.arange(300))
     assert any("shoulder_lift_joint" in x and "stuck" in x for x in told(case, path, tmp_path))
+
+
+@pytest.mark.parametrize("seed", [5, 6])
+def test_friction_turns_no_sign(path, tmp_path, seed):
+    case = make_case(tl.load_robot(path), (), np.random.default_rng(seed))
+    rub(case)
+    lines = told(case, path, tmp_path)
+    assert not any("opposite sign" in line or "order" in line for line in lines), lines
+
+
+def test_a_wrong_sign_is_told_beside_friction(case, path, tmp_path):
+    rub(case)
+    case.samples.tau[:, 1] *= -1.0
+    lines = told(case, path, tmp_path)
+    assert any("shoulder_lift_joint" in x and "opposite sign" in x for x in lines), lines
+
+
+def test_what_friction_holds_tells_nothing(path, tmp_path):
+    robot = tl.load_robot(path)
+    case = make_case(robot, (), np.random.default_rng(5))
+    s = case.samples
+    s.q[:, :5], s.qd[:, :5] = s.q[0, :5], 0.0
+    s.tau[:] = _loads(Robot(robot.description, case.mechanism), s.time, s.q, s.qd)[0]
+    s.tau[:] += 0.05 * case.rng.normal(size=s.tau.shape)
+    s.tau[:, :5] += 0.8 * np.array(RUBBING[:5]) * case.rng.choice([-1.0, 1.0], 5)
+    assert told(case, path, tmp_path) == []

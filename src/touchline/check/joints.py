@@ -24,6 +24,7 @@ OFF = 0.1  # a velocity's factor may be off by this much
 TELLING = 1.0  # Nm; a smaller expected torque says nothing of a torque's sign
 GAIN_OFF = 0.2  # friction and a payload change a torque's factor by less
 TAKEN_OUT = 0.15  # below this fraction of the expected torque, gravity is not in the signal
+UNEVEN = 0.2  # of its friction may a motor's joint have more in one sense, without a bias
 RUBBING = 0.05  # of the largest expected torque; less friction is left to `calibrate`
 SURE = 5.0  # standard errors
 SAME = 0.995  # correlation of an expected torque with an acceleration that it is all made of
@@ -139,6 +140,10 @@ def check_torques(
     `limits` are the contact thresholds by joint [Nm].
     """
     measured = judged_joints(robot, windows, dead)
+    for j, joint in enumerate(robot.description.joints):
+        if len(windows) and joint.torque == "motor" and np.isnan(windows.torque[:, j]).all():
+            line = f"  {joint.name}: hardly moves, and dry friction can hold it: nothing is told"
+            findings.note("joint torques", line)
     if not measured or not len(windows):
         return
     fits: dict[int, TorqueFit] = {}
@@ -159,7 +164,7 @@ def check_torques(
             continue
         joint = robot.description.joints[j]
         driven = None  # the fit that knows of a rotor, where the description knows of none
-        if joint.torque == "motor" and not joint.rotor_inertia and not torque_words(name, fit):
+        if joint.torque == "motor" and not joint.rotor_inertia and fit.factor > 0.0:
             driven = fit_torque(windows, j, rotor=True)
         if driven is not None and driven.has_rotor:
             fit = driven
@@ -260,7 +265,7 @@ def _judge(
     if not fit.certain:
         return
     name = joint.name
-    coarse = torque_words(name, fit)
+    coarse = [] if or_rotor else torque_words(name, fit)
     for line in coarse:
         findings.find(line)
     if (
@@ -281,7 +286,11 @@ def _judge(
             "that the description does not know: of the motor's rotor, seen through the gear? "
             "Touchline calibrate finds rotor_inertia"
         )
-    if abs(fit.offset) > limit and fit.offset_error < 0.3 * abs(fit.offset):
+    biased = limit
+    if joint.torque == "motor":  # friction seen in one sense looks like an offset
+        both = np.isfinite(fit.rubbing_error)
+        biased = max(limit, UNEVEN * fit.rubbing) if both else np.inf
+    if abs(fit.offset) > biased and fit.offset_error < 0.3 * abs(fit.offset):
         findings.find(
             f"torque of {name} has an offset of {fit.offset:+.2f} Nm that the description does "
             f"not know, more than its contact threshold {limit:.2f}: set bias"

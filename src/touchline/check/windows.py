@@ -18,6 +18,8 @@ from touchline.observer.samples import Samples
 
 SECONDS, ROWS = 0.25, 8  # at least so long and so many samples is a window
 MOST = 4000
+# A motor's current says nothing of a joint that dry friction holds.
+MOVED, ENOUGH = 0.02, 8  # rad/s or m/s, and windows in which a motor's joint must move so fast
 JOINT_FIELDS = "q", "qd", "slope", "acceleration", "torque", "expected_torque", "expected_rate"
 WRENCH_FIELDS = "wrench", "expected_wrench", "weightless_wrench", "wrench_rate", "weightless_rate"
 
@@ -31,7 +33,8 @@ class Windows:
         qd: (W, n) velocities as logged.
         slope: (W, n) velocities from the positions.
         acceleration: (W, n) change of the logged velocities.
-        torque: (W, n) as the description reads the log: sign, gain, bias and friction applied.
+        torque: (W, n) as the description reads the log: sign, gain, bias and friction applied. NaN
+            where a joint with a motor's current stands still.
         expected_torque: (W, n) without contact.
         expected_rate: (W, n) how fast that changes [Nm/s].
         wrench: (W, k, 6) as logged.
@@ -125,6 +128,11 @@ class WindowMaker:
         shapes |= dict.fromkeys(WRENCH_FIELDS, (k, 6))
         parts = self._parts or [{name: np.empty((0, *s)) for name, s in shapes.items()}]
         joined = {name: np.concatenate([p[name] for p in parts]) for name in shapes}
+        for j, joint in enumerate(self._robot.description.joints):
+            if joint.torque == "motor":
+                moving = np.abs(joined["qd"][:, j]) > MOVED
+                enough = moving.sum() >= ENOUGH
+                joined["torque"][~moving | ~enough, j] = np.nan
         return Windows(**joined, period=self._period)
 
 
