@@ -75,3 +75,17 @@ def test_check_tells_what_was_assumed_and_that_nothing_is_measured():
     assert "assumed, as there is no robot.yaml" in result.text()
     text = check("go1").text()
     assert "are those of legs" in text
+
+
+def test_an_arm_without_surfaces_is_told_so(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(
+        '<robot name="arm"><link name="base"/><link name="l"><inertial><mass value="1"/><inertia '
+        'ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="j" '
+        'type="revolute"><parent link="base"/><child link="l"/><axis xyz="0 1 0"/><limit '
+        'lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+    )
+    (lines,) = [part for name, part in check(path).notes.items() if name == "what can be felt"]
+    assert lines == [
+        "  no link has a surface: a touch is felt in the joints that it loads, and not located"
+    ]

@@ -157,6 +157,30 @@ def test_columns_of_tables(tmp_path, options, log):
     assert found.log == log and found.has_torque
 
 
+def test_joints_that_a_recording_lacks_are_locked(tmp_path, capsys):
+    model = chain(tmp_path)
+    log = tmp_path / "log.csv"
+    names = ["t", *(f"j{i}_position" for i in (2, 3, 4)), *(f"j{i}_effort" for i in (2, 4))]
+    rows = [",".join(["0"] * len(names)) for _ in range(20)]
+    log.write_text("\n".join([",".join(names), *rows]) + "\n")
+    out = tmp_path / "robot.yaml"
+    assert main(["init", str(model), str(log), "--out", str(out)]) == 0
+    told = capsys.readouterr().out
+    assert "locked: j1, j5, j6: the recording does not have it" in told
+    assert "no torque is recorded of j3" in told
+    joints = {j.name: j.torque for j in tl.load_robot(out).description.joints}
+    assert joints == {"j2": "sensor", "j3": "none", "j4": "sensor"}
+    assert tl.load_robot(out).description.locked == {"j1": 0.0, "j5": 0.0, "j6": 0.0}
+
+
+@pytest.mark.parametrize("name", ["i{i1}", "motor_current_{i}", "{}.current"])
+def test_motor_currents_are_told(tmp_path, name):
+    joints = [f"j{i + 1}" for i in range(6)]
+    found = find_signals(table(joints, tau=name), load_mechanism(chain(tmp_path)), joints)
+    assert found.currents and found.has_torque
+    assert any("seem motor currents" in line for line in found.statements)
+
+
 def test_sensors_of_tables(tmp_path):
     mechanism = load_mechanism(chain(tmp_path))
     joints = [f"j{i + 1}" for i in range(6)]

@@ -363,3 +363,24 @@ def test_shapes_and_their_places(tmp_path):
     assert (cylinder.kind, cylinder.size) == ("cylinder", (0.1, 0.5))
     np.testing.assert_allclose(cylinder.T_link_shape @ [1, 0, 0, 1], [1, 3, 3, 1])
     assert (mesh.kind, mesh.scale, mesh.path) == ("mesh", (1, 2, -3), str(tmp_path / "m.obj"))
+
+
+def test_meshes_that_a_folder_lacks_are_told_together(tmp_path):
+    bodies = "".join(
+        f'<link name="l{i}"><inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" '
+        f'ixz="0" iyz="0"/></inertial><collision><geometry><mesh filename="{folder}/m{i}.stl"/>'
+        "</geometry></collision></link>"
+        for i, folder in enumerate(("/gone", "/gone", "/gone", "/alone"))
+    )
+    joints = "".join(
+        f'<joint name="j{i}" type="revolute"><parent link="l{i}"/><child link="l{i + 1}"/>'
+        '<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+        for i in range(3)
+    )
+    path = tmp_path / "arm.urdf"
+    path.write_text(f'<robot name="arm">{bodies}{joints}</robot>')
+    found = [line for line in load_mechanism(path).warnings if "no such file" in line]
+    assert found == [
+        f"{path}: meshes in '/gone': no such files; no contact is located on link 'l0', 'l1', 'l2'",
+        f"{path}: mesh '/alone/m3.stl': no such file; no contact is located on link 'l3'",
+    ]

@@ -13,6 +13,7 @@ from touchline.calibrate.beforehand import naming, refuse_one_pose, refuse_wrong
 from touchline.calibrate.blame import find_blame, often_off
 from touchline.calibrate.held_out import HeldOut, judge, split
 from touchline.calibrate.noise import measure_noise, noise_keys
+from touchline.calibrate.one_moment import OneMoment, find_moments
 from touchline.calibrate.quiet import LISTED, Suspicion, find_contacts
 from touchline.calibrate.recordings import Recordings
 from touchline.calibrate.short import METHOD, short_thresholds
@@ -64,6 +65,7 @@ class Thresholds:
         held_out: judgements on data that the thresholds had not seen.
         train, test: the parts of the data for that, as statistics of all methods.
         parted: how the data were parted.
+        moments: single ones that set a threshold in use.
     """
 
     description: CalibrationDescription
@@ -72,6 +74,7 @@ class Thresholds:
     train: Statistics
     test: Statistics
     parted: str
+    moments: list[OneMoment]
 
 
 @dataclass(frozen=True)
@@ -323,7 +326,9 @@ def _find_thresholds(
             _check_tails(robot, tails, chosen, found.hours)
             rows = grown(rows, more_elsewhere)
             description = describe(found.hours, recordings.period, rows, tails)
-            return Thresholds(description, tails, held_out, train, test, parted), left_out
+            share = rate / max(len(chosen) * len(tails), 1)
+            moments = find_moments(found, robot.segment_names, tails, chosen, share)
+            return Thresholds(description, tails, held_out, train, test, parted, moments), left_out
         new = [(s.recording, s.start, s.end) for s in suspicions]
         if _long(left_out + new) > MOST_LEFT_OUT * recordings.seconds:
             break

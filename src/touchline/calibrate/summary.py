@@ -173,8 +173,25 @@ def _threshold_lines(result: Calibration) -> list[str]:
             f"  * extrapolated: one alarm in {needed:.3g} h of a segment, from "
             f"{_of(result).description.hours:.3g} h. Record {needed:.3g} h to see it."
         )
+    lines += _moment_lines(result)
     chosen = result.robot.description.detection.method
     lines.append(f"  in use: {', '.join(chosen)}; also allowed: {', '.join(METHODS)}")
+    return lines
+
+
+def _moment_lines(result: Calibration) -> list[str]:
+    """Single moments that set a threshold."""
+    moments = _of(result).moments
+    lines = [
+        f"  one moment sets {x.method} of {x.segment}: {result.logs[x.recording]} at "
+        f"{x.time:.2f} s; without it {x.without:.3g}, not {x.threshold:.3g}"
+        for x in moments
+    ]
+    if lines:
+        lines.append(
+            "  a hard stop, or a touch? If it is no part of the work, cut it out and calibrate "
+            "again:\n  touches as weak as this moment are not felt otherwise"
+        )
     return lines
 
 

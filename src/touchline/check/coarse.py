@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import nnls
 
 from touchline.arrays import Array
 from touchline.check.findings import Findings
@@ -39,6 +40,7 @@ CLEARLY = 0.2  # nor does one that mends less; a wrong sign of one row is 1
 RIGHTED = 0.2  # of what is off: no more is left once the joints are in their right order
 LARGE = 5.0  # a factor beyond it, or below its inverse, is a unit, whatever else is wrong
 UNIT_NEAR = 0.4  # relative, of the common factor of all torques, which loads may change
+MOVED_SPEED = 0.02  # rad/s, over which dry friction turns its sign
 MOVED = 0.05  # rad or m; a joint that moved less tells nothing of the sense of its position
 FOLLOWS = 0.3  # of its own size may be left of a reading that is a multiple of what is expected
 MOST_BESIDE = 3  # changes that are tried beside wrong weights
@@ -182,6 +184,8 @@ def misfit(robot: Robot, windows: Windows, measured: list[int]) -> list[float]:
     found = []
     for j in measured:
         r, e = windows.torque[:, j], windows.expected_torque[:, j]
+        if robot.description.joints[j].torque == "motor":
+            r = r - _driving(windows, j)
         known = np.isfinite(r) & np.isfinite(e)
         if known.any():
             found.append(_relative(r[known, None], e[known, None], 0.0))
@@ -195,6 +199,20 @@ def misfit(robot: Robot, windows: Windows, measured: list[int]) -> list[float]:
             r, e = r[known], e[known]
             found.append(_relative(r - np.median(r, axis=0), e - np.median(e, axis=0), TELLING))
     return found
+
+
+def _driving(windows: Windows, j: int) -> Array:
+    """What (W,) unknown friction and the rotor may have in a motor's torque: never negative.
+
+    A torque or a position of the wrong sign would need friction that drives the joint.
+    """
+    qd = windows.qd[:, j]
+    columns = np.column_stack([np.tanh(qd / MOVED_SPEED), qd, windows.acceleration[:, j]])
+    beside = windows.torque[:, j] - windows.expected_torque[:, j]
+    known = np.isfinite(beside) & np.isfinite(columns).all(axis=1)
+    if not known.any():
+        return np.zeros(len(qd))
+    return columns @ nnls(columns[known], beside[known])[0]
 
 
 def _relative(reading: Array, expected: Array, least: float) -> float:

@@ -89,6 +89,12 @@ def felt(robot: Robot, period: float = 1e-3) -> tuple[Felt, ...]:
 
 def note_felt(robot: Robot, findings: Findings, period: float = 1e-3) -> None:
     """Add a table of what can be felt."""
+    if not felt(robot, period):
+        findings.note(
+            "what can be felt",
+            "  no link has a surface: a touch is felt in the joints that it loads, and not located",
+        )
+        return
     lines = [
         "  smallest pushes found, of any direction and posture: 95 % and 50 % of them (thresholds "
         f"at {1.0 / period:.4g} Hz)",

@@ -24,8 +24,10 @@ OFF = 0.1  # a velocity's factor may be off by this much
 TELLING = 1.0  # Nm; a smaller expected torque says nothing of a torque's sign
 GAIN_OFF = 0.2  # friction and a payload change a torque's factor by less
 TAKEN_OUT = 0.15  # below this fraction of the expected torque, gravity is not in the signal
+UNEVEN = 0.2  # of its friction may a motor's joint have more in one sense, without a bias
 RUBBING = 0.05  # of the largest expected torque; less friction is left to `calibrate`
 SURE = 5.0  # standard errors
+SAME = 0.995  # correlation of an expected torque with an acceleration that it is all made of
 CLEARER = 0.3  # another joint explains a torque column so much better
 
 
@@ -41,6 +43,8 @@ class TorqueFit:
         coulomb, viscous: friction that the description does not know [Nm], [Nm s/rad], with its
             part at the speed of most windows, `rubbing` [Nm], and `rubbing_error`.
         delay, delay_error: of the reading [s]; NaN where it was not fitted.
+        rotor, rotor_error: inertia that the description does not know [kg m2]; 0 if not fitted.
+        rotor_torque: what it takes where the joint accelerates most [Nm].
     """
 
     factor: float
@@ -55,11 +59,19 @@ class TorqueFit:
     rubbing_error: float = np.inf
     delay: float = np.nan
     delay_error: float = np.inf
+    rotor: float = 0.0
+    rotor_error: float = np.inf
+    rotor_torque: float = 0.0
 
     @property
     def certain(self) -> bool:
         """Is the factor known well enough to be judged?"""
         return not self.varied or self.error < 0.15 * max(abs(self.factor), 0.3)
+
+    @property
+    def has_rotor(self) -> bool:
+        """Does the reading show an inertia beside the factor?"""
+        return self.certain and self.rotor > SURE * self.rotor_error
 
 
 @dataclass(frozen=True)
@@ -128,6 +140,10 @@ def check_torques(
     `limits` are the contact thresholds by joint [Nm].
     """
     measured = judged_joints(robot, windows, dead)
+    for j, joint in enumerate(robot.description.joints):
+        if len(windows) and joint.torque == "motor" and np.isnan(windows.torque[:, j]).all():
+            line = f"  {joint.name}: hardly moves, and dry friction can hold it: nothing is told"
+            findings.note("joint torques", line)
     if not measured or not len(windows):
         return
     fits: dict[int, TorqueFit] = {}
@@ -146,18 +162,26 @@ def check_torques(
         fit = fit_torque(windows, j)
         if fit is None:
             continue
+        joint = robot.description.joints[j]
+        driven = None  # the fit that knows of a rotor, where the description knows of none
+        if joint.torque == "motor" and not joint.rotor_inertia and fit.factor > 0.0:
+            driven = fit_torque(windows, j, rotor=True)
+        if driven is not None and driven.has_rotor:
+            fit = driven
         _note_fit(name, fit, findings)
         if j not in inside:
             fits[j] = fit
-            _judge(robot.description.joints[j], fit, size, limits.get(j, np.inf), findings)
+            told = driven is not None and not driven.certain
+            _judge(joint, fit, size, limits.get(j, np.inf), told, findings)
     _judge_delays(robot, fits, findings)
 
 
-def fit_torque(windows: Windows, j: int) -> TorqueFit | None:
-    """What leads from a joint's expected torque to its reading."""
+def fit_torque(windows: Windows, j: int, rotor: bool = False) -> TorqueFit | None:
+    """What leads from a joint's expected torque to its reading; `rotor`: an inertia beside it."""
     expected, reading, qd = windows.expected_torque[:, j], windows.torque[:, j], windows.qd[:, j]
     rate = windows.expected_rate[:, j]
     usable = np.isfinite(expected) & np.isfinite(reading) & np.isfinite(rate) & np.isfinite(qd)
+    usable &= np.isfinite(windows.acceleration[:, j])
     if not usable.any():
         return None
     expected, reading, qd, rate = (x[usable] for x in (expected, reading, qd, rate))
@@ -166,6 +190,8 @@ def fit_torque(windows: Windows, j: int) -> TorqueFit | None:
     columns = {"expected": expected, "one": np.ones(len(expected))} if varied else {"e": expected}
     if varied and min((qd > MOVED).mean(), (qd < -MOVED).mean()) > 0.1:
         columns |= {"coulomb": np.tanh(qd / MOVED), "viscous": qd, "rate": rate}
+        if rotor:
+            columns["rotor"] = windows.acceleration[usable, j]
     line: Line | None = robust_line(np.column_stack(list(columns.values())), reading)
     if line is None:
         ratio = float(np.median(reading) / np.median(expected))
@@ -181,6 +207,9 @@ def fit_torque(windows: Windows, j: int) -> TorqueFit | None:
         return fit
     speed = float(np.quantile(np.abs(qd), 0.7))
     factor = fit.factor if abs(fit.factor) > 1e-9 else np.nan
+    inertia = values.get("rotor", 0.0)
+    if rotor and abs(np.corrcoef(expected, columns["rotor"])[0, 1]) > SAME:
+        return replace(fit, error=np.inf)
     return replace(
         fit,
         coulomb=values["coulomb"],
@@ -190,6 +219,9 @@ def fit_torque(windows: Windows, j: int) -> TorqueFit | None:
         # The expectation is a mean over the interval before each sample, half a period early.
         delay=0.5 * windows.period - values["rate"] / factor,
         delay_error=errors["rate"] / abs(factor),
+        rotor=inertia,
+        rotor_error=errors.get("rotor", np.inf),
+        rotor_torque=inertia * float(np.quantile(np.abs(windows.acceleration[usable, j]), 0.9)),
     )
 
 
@@ -209,7 +241,11 @@ def torque_words(name: str, fit: TorqueFit) -> list[str]:
     if not fit.certain:
         return []
     if abs(fit.factor) < TAKEN_OUT and unit is None:
-        return [f"{start}: gravity seems taken out already; compensated: gravity (or model)"]
+        line = f"{start}: gravity seems taken out already; compensated: gravity (or model)"
+        if abs(fit.factor) > SURE * fit.error:
+            sign = ", sign: -1" if fit.factor < 0 else ""
+            line += f"; or a motor's current in amperes: gain: {1.0 / abs(fit.factor):.3g}{sign}"
+        return [line]
     if unit is not None:
         sign = ", and of opposite sign: sign: -1" if fit.factor < 0 else ""
         return [f"{start}: in {unit} (or gain){sign}"]
@@ -219,12 +255,17 @@ def torque_words(name: str, fit: TorqueFit) -> list[str]:
 
 
 def _judge(
-    joint: JointDescription, fit: TorqueFit, size: float, limit: float, findings: Findings
+    joint: JointDescription,
+    fit: TorqueFit,
+    size: float,
+    limit: float,
+    or_rotor: bool,
+    findings: Findings,
 ) -> None:
     if not fit.certain:
         return
     name = joint.name
-    coarse = torque_words(name, fit)
+    coarse = [] if or_rotor else torque_words(name, fit)
     for line in coarse:
         findings.find(line)
     if (
@@ -232,11 +273,24 @@ def _judge(
         and abs(fit.factor - 1) > GAIN_OFF
         and abs(fit.factor - 1) * size > max(limit, TELLING)
     ):
+        rest = "and the masses outboard of it"
+        if or_rotor:
+            rest = "the masses outboard of it and rotor_inertia: this motion tells no more"
         findings.find(
             f"torque of {name} is {fit.factor:.3g} times what the model expects: check gain, unit, "
-            "and the masses outboard of it"
+            + rest
         )
-    if abs(fit.offset) > limit and fit.offset_error < 0.3 * abs(fit.offset):
+    if fit.has_rotor and fit.rotor_torque > max(limit, TELLING):
+        findings.find(
+            f"torque of {name} shows an inertia of {fit.rotor:.2g} +- {fit.rotor_error:.1g} kg m2 "
+            "that the description does not know: of the motor's rotor, seen through the gear? "
+            "Touchline calibrate finds rotor_inertia"
+        )
+    biased = limit
+    if joint.torque == "motor":  # friction seen in one sense looks like an offset
+        both = np.isfinite(fit.rubbing_error)
+        biased = max(limit, UNEVEN * fit.rubbing) if both else np.inf
+    if abs(fit.offset) > biased and fit.offset_error < 0.3 * abs(fit.offset):
         findings.find(
             f"torque of {name} has an offset of {fit.offset:+.2f} Nm that the description does "
             f"not know, more than its contact threshold {limit:.2f}: set bias"

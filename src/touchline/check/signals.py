@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Mask
 from touchline.check.findings import Findings
 from touchline.model.description import AXES
 from touchline.model.robot import Robot
@@ -24,12 +24,13 @@ OUTSIDE = 0.01  # rad or m beyond the limits before it is said
 
 @dataclass(frozen=True)
 class Signal:
-    """Where a column of the signal table comes from."""
+    """Where a column of the signal table comes from; `motor`: a torque from a motor's current."""
 
     kind: str
     name: str
     index: tuple[int, ...]
     range: float
+    motor: bool = False
 
 
 def signals_of(robot: Robot) -> list[Signal]:
@@ -40,7 +41,8 @@ def signals_of(robot: Robot) -> list[Signal]:
         for j, joint in enumerate(description.joints):
             if kind != "tau" or joint.measured:
                 reach = joint.range / joint.gain if kind == "tau" else np.inf
-                signals.append(Signal(kind, joint.name, (j,), reach))
+                motor = kind == "tau" and joint.torque == "motor"
+                signals.append(Signal(kind, joint.name, (j,), reach, motor))
     for k, sensor in enumerate(description.sensors):
         for axis in sensor.axes:
             i = AXES.index(axis)
@@ -69,20 +71,30 @@ class SignalTable:
         for i, values in enumerate(self._columns(part)):
             finite = np.isfinite(values)
             if self.signals[i].kind in ("tau", "wrench"):
-                self._add_runs(i, values[finite])
+                still = self._still(i, part)[finite] if self.signals[i].motor else None
+                self._add_runs(i, values[finite], still)
             self.missing[i] += int(np.isnan(values).sum())
             self.infinite[i] += int(np.isinf(values).sum())
             self.low[i] = min(self.low[i], values.min(where=finite, initial=np.inf))
             self.high[i] = max(self.high[i], values.max(where=finite, initial=-np.inf))
             self.at_range[i] += int((np.abs(values) >= self.signals[i].range).sum())
 
-    def _add_runs(self, i: int, values: Array) -> None:
+    def _still(self, i: int, part: Samples) -> Mask:
+        """Samples to which the joint did not move by a bit: a controller's output may rest too."""
+        return np.diff(part.q[:, self.signals[i].index[0]], prepend=np.nan) == 0
+
+    def _add_runs(self, i: int, values: Array, still: Mask | None) -> None:
         """Counts what is held; called before the least and largest value take these samples."""
         if not len(values):
             return
         edges = np.flatnonzero(np.diff(values, prepend=np.nan, append=np.nan) != 0)
         length, value = np.diff(edges), values[edges[:-1]]
-        run = np.where(length >= RUN, length, 0)
+        held = length >= RUN
+        if still is not None:
+            # The step to the first sample of a run is none within it.
+            moved = np.concatenate([[0], np.cumsum(~still)])
+            held &= moved[edges[1:]] > moved[edges[:-1] + 1]
+        run = np.where(held, length, 0)
         self.held[i] += int(run.sum())
         self.longest[i] = max(self.longest[i], int(run.max(initial=0)))
         low, high = float(values.min()), float(values.max())

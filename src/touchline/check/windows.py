@@ -18,7 +18,9 @@ from touchline.observer.samples import Samples
 
 SECONDS, ROWS = 0.25, 8  # at least so long and so many samples is a window
 MOST = 4000
-JOINT_FIELDS = "q", "qd", "slope", "torque", "expected_torque", "expected_rate"
+# A motor's current says nothing of a joint that dry friction holds.
+MOVED, ENOUGH = 0.02, 8  # rad/s or m/s, and windows in which a motor's joint must move so fast
+JOINT_FIELDS = "q", "qd", "slope", "acceleration", "torque", "expected_torque", "expected_rate"
 WRENCH_FIELDS = "wrench", "expected_wrench", "weightless_wrench", "wrench_rate", "weightless_rate"
 
 
@@ -30,7 +32,9 @@ class Windows:
         q: (W, n) positions.
         qd: (W, n) velocities as logged.
         slope: (W, n) velocities from the positions.
-        torque: (W, n) as the description reads the log: sign, gain, bias and friction applied.
+        acceleration: (W, n) change of the logged velocities.
+        torque: (W, n) as the description reads the log: sign, gain, bias and friction applied. NaN
+            where a joint with a motor's current stands still.
         expected_torque: (W, n) without contact.
         expected_rate: (W, n) how fast that changes [Nm/s].
         wrench: (W, k, 6) as logged.
@@ -43,6 +47,7 @@ class Windows:
     q: Array
     qd: Array
     slope: Array
+    acceleration: Array
     torque: Array
     expected_torque: Array
     expected_rate: Array
@@ -85,6 +90,7 @@ class WindowMaker:
             "weightless_wrench": weightless.sensor_wrench,
         }
         cut = {name: _mean(values, count, rows) for name, values in signals.items()}
+        cut["acceleration"] = _rate(part.qd, count, rows) / self._period
         cut["expected_rate"] = _rate(whole.tau_ext, count, rows) / self._period
         cut["wrench_rate"] = _rate(whole.sensor_wrench, count, rows) / self._period
         cut["weightless_rate"] = _rate(weightless.sensor_wrench, count, rows) / self._period
@@ -122,6 +128,11 @@ class WindowMaker:
         shapes |= dict.fromkeys(WRENCH_FIELDS, (k, 6))
         parts = self._parts or [{name: np.empty((0, *s)) for name, s in shapes.items()}]
         joined = {name: np.concatenate([p[name] for p in parts]) for name in shapes}
+        for j, joint in enumerate(self._robot.description.joints):
+            if joint.torque == "motor":
+                moving = np.abs(joined["qd"][:, j]) > MOVED
+                enough = moving.sum() >= ENOUGH
+                joined["torque"][~moving | ~enough, j] = np.nan
         return Windows(**joined, period=self._period)
 
 

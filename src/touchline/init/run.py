@@ -3,7 +3,7 @@
 
 import json
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import yaml
@@ -11,7 +11,14 @@ import yaml
 from touchline.errors import InputError
 from touchline.init.contents import read_contents
 from touchline.init.signals import FoundSensor, Signals, find_signals
-from touchline.model.guess import Guess, force_torque_links, guess_description, torque_reason
+from touchline.model.guess import (
+    UNKNOWN,
+    Guess,
+    force_torque_links,
+    guess_description,
+    rest_position,
+    torque_reason,
+)
 from touchline.model.loading import load_mechanism, read_robot_file
 from touchline.model.mechanism import Mechanism
 from touchline.model.packages import installed_shares
@@ -19,6 +26,7 @@ from touchline.model.plausibility import floating_warning
 from touchline.model.sources import EXAMPLE_DATA, find_robot
 
 NOTHING = Signals({}, (), False, ())
+ABSENT = "the recording does not have it: write where it stood"
 
 
 @dataclass(frozen=True)
@@ -83,7 +91,13 @@ def _draft(
 ) -> Draft:
     torque, why = guess.family.torque, torque_reason(guess.family)
     if log is not None and torque != "none" and not signals.has_torque:
-        torque, why = "none", "the recording has no joint torques"
+        torque, why = "none", "no joint torques were found in the recording"
+    elif signals.currents and torque == "sensor" and guess.family is UNKNOWN:
+        torque, why = "motor", "the recording has motor currents"
+    if signals.absent:
+        absent = {name: (rest_position(mechanism, name), ABSENT) for name in signals.absent}
+        observed = tuple(name for name in guess.observed if name not in absent)
+        guess = replace(guess, observed=observed, locked=guess.locked | absent)
     said = [f"joint torques are `torque: {torque}`: {why}"]
     for reason in dict.fromkeys(reason for _, reason in guess.locked.values()):
         names = ", ".join(n for n, (_, other) in guess.locked.items() if other == reason)
@@ -96,7 +110,7 @@ def _draft(
         "# Comments say what was guessed; `touchline check` tells what a recording contradicts.",
         f"name: {guess.name}",
         f"model: {_quoted(model)}",
-        _joints(guess, torque, why),
+        _joints(guess, torque, why, signals.silent),
         _locked(guess),
         _sensors(signals.sensors, mechanism),
         _log(signals),
@@ -115,9 +129,11 @@ def _portable(model: Path, out: Path) -> str:
     return Path(os.path.relpath(model, out.parent)).as_posix()
 
 
-def _joints(guess: Guess, torque: str, why: str) -> str:
+def _joints(guess: Guess, torque: str, why: str, silent: tuple[str, ...]) -> str:
     lines = [f"joints:    # in the order of all arrays; torques: {why}"]
-    lines += [f"  - {{name: {_quoted(name)}, torque: {torque}}}" for name in guess.observed]
+    for name in guess.observed:
+        own = "none" if name in silent else torque
+        lines.append(f"  - {{name: {_quoted(name)}, torque: {own}}}")
     return "\n".join(lines)
 
 

@@ -14,17 +14,19 @@ from touchline.model.guess import force_torque_links
 from touchline.model.mechanism import Mechanism
 
 TIME = re.compile(r"(time|timestamp|stamp|t|seconds)[ _(\[]*(s|sec|ms|us|ns)?[)\]]?", re.I)
+CURRENTS = "actual_current", "motor_current", "joint_current", "current", "currents", "cur", "i"
 NAMES = {
     "q": ("q", "pos", "position", "positions", "joint_position", "actual_q", "q_actual"),
     "qd": ("qd", "dq", "vel", "velocity", "velocities", "joint_velocity", "actual_qd", "qdot"),
     # The most telling first: a robot may log measured, commanded and estimated torques.
     "tau": (
         *("tau_j", "torquesm", "measured_torque", "joint_torque", "tau", "torque", "torques"),
-        *("effort", "efforts", "joint_effort", "actual_current", "current", "cur"),
+        *("effort", "efforts", "joint_effort", *CURRENTS),
     ),
 }
 AXIS = re.compile(r"^(?P<name>.*?)[._/]?(?P<axis>f[xyz]|[mt][xyz]|force_[xyz]|torque_[xyz])$", re.I)
 PERIODS = {1.0: "s", 1e-3: "ms", 1e-6: "us", 1e-9: "ns"}
+LEAST_JOINTS = 2  # of a recording that lacks others: a single name may be a chance
 SLOWEST, FASTEST = 10.0, 20_000.0  # Hz, of recordings that are of use
 
 
@@ -56,12 +58,18 @@ class Signals:
         sensors: the key `force_torque_sensors`.
         has_torque: whether there are joint torques.
         statements: each guess in a sentence.
+        absent: joints that the recording lacks while it has others.
+        silent: joints that it has without a torque while others have one.
+        currents: whether the torques seem to be motor currents.
     """
 
     log: dict[str, Any]
     sensors: tuple[FoundSensor, ...]
     has_torque: bool
     statements: tuple[str, ...]
+    absent: tuple[str, ...] = ()
+    silent: tuple[str, ...] = ()
+    currents: bool = False
 
 
 def find_signals(contents: Contents, mechanism: Mechanism, joints: Sequence[str]) -> Signals:
@@ -73,14 +81,17 @@ def find_signals(contents: Contents, mechanism: Mechanism, joints: Sequence[str]
 
 def _in_bag(contents: Contents, mechanism: Mechanism, joints: Sequence[str]) -> Signals:
     statements, topics = [], {}
+    known = {t: len(set(joints) & set(found.joints)) for t, found in contents.joint_states.items()}
+    most = max(known.values(), default=0)
     states: dict[str, JointStates] = {
         topic: found
         for topic, found in contents.joint_states.items()
-        if set(joints) <= set(found.joints)
+        if known[topic] == most >= min(LEAST_JOINTS, len(joints))
     }
-    has_torque = False
+    has_torque, absent = False, ()
     if states:
         topic = max(states, key=lambda name: (states[name].effort, states[name].velocity))
+        absent = tuple(joint for joint in joints if joint not in states[topic].joints)
         topics["joint_states"] = topic
         has_torque = states[topic].effort
         filled = [n for n in ("velocity", "effort") if getattr(states[topic], n)]
@@ -90,7 +101,7 @@ def _in_bag(contents: Contents, mechanism: Mechanism, joints: Sequence[str]) -> 
     else:
         names = {n for found in contents.joint_states.values() for n in found.joints}
         statements.append(
-            f"no topic of joint states has all joints; those recorded: {', '.join(sorted(names))}"
+            f"no topic of joint states has these joints; those recorded: {', '.join(sorted(names))}"
         )
     sensors = []
     for topic, frame in contents.wrenches.items():
@@ -101,7 +112,7 @@ def _in_bag(contents: Contents, mechanism: Mechanism, joints: Sequence[str]) -> 
         topics["wrench"] = {sensor.name: sensor.source for sensor in sensors}
     statements += [_told(sensor) for sensor in sensors]
     log = {"topics": topics} if topics else {}
-    return Signals(log, tuple(sensors), has_torque, tuple(statements))
+    return Signals(log, tuple(sensors), has_torque, tuple(statements), absent)
 
 
 def _in_table(
@@ -110,17 +121,38 @@ def _in_table(
     log: dict[str, Any] = {}
     statements: list[str] = []
     _time(columns, log, statements)
-    found = {}
+    found: dict[str, str] = {}
+    recorded = tuple(joints)
+    silent: tuple[str, ...] = ()
+    currents = False
     for signal in ("q", "qd", "tau"):
-        if all(f"{signal}.{joint}" in columns for joint in joints):
-            found[signal] = signal + ".{joint}"
+        ours = signal + ".{joint}"  # the contract's name, before all others
+        if all(ours.replace("{joint}", joint) in columns for joint in recorded):
+            found[signal] = ours
             continue
-        pattern = _pattern(columns, NAMES[signal], joints)
-        if pattern is not None:
-            found[signal] = log[signal] = pattern
+        pattern, name = _pattern(columns, NAMES[signal], recorded)
+        if pattern is None and signal != "qd":
+            pattern, name, having = _of_some(columns, NAMES[signal], recorded)
+            if pattern is not None and signal == "q":
+                recorded = having
+            elif pattern is not None:
+                silent = tuple(joint for joint in recorded if joint not in having)
+        if pattern is None:
+            if signal != "qd":
+                statements.append(f"no columns were recognized as {signal}")
+            continue
+        found[signal] = pattern
+        if pattern != signal + ".{joint}":
+            log[signal] = pattern
             statements.append(f"{signal} is in the columns {pattern}")
-        elif signal != "qd":
-            statements.append(f"no columns were recognized as {signal}")
+        if name in CURRENTS:
+            currents = True
+            statements.append(
+                f"{pattern} seem motor currents: write each joint's `gain`, Nm per ampere with the "
+                "gear's ratio"
+            )
+    if silent:
+        statements.append(f"no torque is recorded of {', '.join(silent)}: `torque: none`")
     if "qd" not in found:
         statements.append("velocities are not in the recording; they are estimated from positions")
     sensors = _sensor_columns(columns, mechanism, joints)
@@ -128,7 +160,8 @@ def _in_table(
     if named:
         log["sensors"] = named
     statements += [_told(sensor) for sensor in sensors]
-    return Signals(log, tuple(sensors), "tau" in found, tuple(statements))
+    absent = tuple(joint for joint in joints if joint not in recorded)
+    return Signals(log, tuple(sensors), "tau" in found, tuple(statements), absent, silent, currents)
 
 
 def _time(columns: dict[str, np.ndarray], log: dict[str, Any], statements: list[str]) -> None:
@@ -153,15 +186,12 @@ def _time(columns: dict[str, np.ndarray], log: dict[str, Any], statements: list[
 
 def _pattern(
     columns: dict[str, np.ndarray], names: Sequence[str], joints: Sequence[str]
-) -> str | None:
-    """Return the pattern of columns that stand for all joints: by their names, or numbered."""
+) -> tuple[str | None, str]:
+    """Return the pattern of columns that stand for all joints, by name or number, and its word."""
     for name in names:
-        for column in columns:
-            stem, joint, rest = _around(column, joints[0])
-            if joint and _word(stem + rest) == name:
-                pattern = f"{stem}{{joint}}{rest}"
-                if all(pattern.replace("{joint}", j) in columns for j in joints):
-                    return pattern
+        pattern = _by_name(columns, name, joints[0]) if joints else None
+        if pattern is not None and all(pattern.replace("{joint}", j) in columns for j in joints):
+            return pattern, name
         for column in columns:
             match = re.fullmatch(r"(.*?)[01]\]?", column)
             if match is None or _word(match[1]) != name:
@@ -171,7 +201,30 @@ def _pattern(
                 numbered = [f"{match[1]}{i + first}{end}" for i in range(len(joints))]
                 beyond = f"{match[1]}{len(joints) + first}{end}"
                 if set(numbered) <= set(columns) and beyond not in columns:
-                    return match[1] + placeholder + end
+                    return match[1] + placeholder + end, name
+    return None, ""
+
+
+def _of_some(
+    columns: dict[str, np.ndarray], names: Sequence[str], joints: Sequence[str]
+) -> tuple[str | None, str, tuple[str, ...]]:
+    """Return the pattern that stands for the most joints, its word, and these joints."""
+    best: tuple[str | None, str, tuple[str, ...]] = (None, "", ())
+    for name in names:
+        for pattern in {_by_name(columns, name, joint) for joint in joints} - {None}:
+            assert pattern is not None
+            having = tuple(j for j in joints if pattern.replace("{joint}", j) in columns)
+            if len(having) >= max(LEAST_JOINTS, len(best[2]) + 1):
+                best = pattern, name, having
+    return best
+
+
+def _by_name(columns: dict[str, np.ndarray], name: str, joint: str) -> str | None:
+    """Return the pattern of the column that holds a joint's name and this word."""
+    for column in columns:
+        stem, middle, rest = _around(column, joint)
+        if middle and _word(stem + rest) == name:
+            return f"{stem}{{joint}}{rest}"
     return None
 
 

@@ -124,9 +124,9 @@ def guess_description(mechanism: Mechanism, model: Path) -> Guess:
     fingers = _finger_joints(mechanism, free)
     for joint in free:
         if joint in fingers:
-            locked[joint] = (_rest(mechanism, joint), "fingers carry no torque signal")
+            locked[joint] = (rest_position(mechanism, joint), "fingers carry no torque signal")
         elif words(joint, mechanism.joints[joint].child) & WHEEL:
-            locked[joint] = (_rest(mechanism, joint), "a wheel carries no torque signal")
+            locked[joint] = (rest_position(mechanism, joint), "a wheel carries no torque signal")
     observed = tuple(name for name in free if name not in locked)
     family = family_of([mechanism.name, model.stem, *model.parent.parts[-2:]], free)
     return Guess(
@@ -204,7 +204,8 @@ def _finger_joints(mechanism: Mechanism, free: list[str]) -> set[str]:
     return found if len(found) < len(free) else set()
 
 
-def _rest(mechanism: Mechanism, name: str) -> float:
+def rest_position(mechanism: Mechanism, name: str) -> float:
+    """Return where a joint that is not observed is taken to stand: at 0, or its nearest limit."""
     joint = mechanism.joints[name]
     return float(np.clip(0.0, joint.lower, joint.upper))
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is suspicious about a mechanism but no reason to refuse it."""
 
+import re
+from collections import Counter
 from collections.abc import Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +11,8 @@ import numpy as np
 
 from touchline.model.mechanism import Inertia, Joint, Link, Mechanism
 from touchline.model.topology import outboard_links
+
+MISSING = re.compile(r"^mesh '(.*)[/\\][^/\\']+': no such file$")
 
 
 def mechanism_warnings(mechanism: Mechanism, path: Path) -> Mechanism:
@@ -72,9 +76,21 @@ def mesh_warnings(mechanism: Mechanism) -> Iterator[str]:
         for shape in surface_shapes(link):
             if shape.problem and link.name not in reasons.setdefault(shape.problem, []):
                 reasons[shape.problem].append(link.name)
-    for reason, links in reasons.items():
+    for reason, links in _together(reasons).items():
         names = ", ".join(f"'{name}'" for name in links)
         yield f"{reason}; no contact is located on link {names}"
+
+
+def _together(reasons: dict[str, list[str]]) -> dict[str, list[str]]:
+    """The reasons, with one for all files of a folder that are not there."""
+    folders = {reason: MISSING.sub(r"meshes in '\1': no such files", reason) for reason in reasons}
+    counts = Counter(folders.values())
+    together: dict[str, list[str]] = {}
+    for reason, links in reasons.items():
+        key = folders[reason] if counts[folders[reason]] > 1 else reason
+        known = together.setdefault(key, [])
+        known += [name for name in links if name not in known]
+    return together
 
 
 def surface_shapes(link: Link) -> tuple:

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`check` of arms whose torques come from motor currents: rotors, uneven friction, held outputs."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import touchline as tl
+from touchline.check import loads
+from touchline.check.findings import Findings
+from touchline.check.injected import Case, _last_link, _loads, _with_mass, make_case
+from touchline.check.recording import check_recording
+from touchline.logs import write_table
+from touchline.model.robot import Robot
+
+JOINTS = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
+TEXT = """\
+model: package://example-robot-data/robots/ur_description/urdf/ur10_robot.urdf
+noise: {tau: 0.05}
+joints:
+""" + "".join(f"  - {{name: {name}_joint, torque: motor}}\n" for name in JOINTS)
+RUBBING = 15.0, 10.0, 6.0, 2.0, 2.0, 2.0  # Nm of dry friction, as harmonic drives have
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    file = tmp_path_factory.mktemp("motor") / "robot.yaml"
+    file.write_text(TEXT)
+    return file
+
+
+@pytest.fixture
+def case(path):
+    return make_case(tl.load_robot(path), (), np.random.default_rng(5))
+
+
+def acceleration(case, j):
+    return np.gradient(case.samples.qd[:, j], case.samples.time)
+
+
+def rub(case):
+    for j, dry in enumerate(RUBBING):
+        case.samples.tau[:, j] += dry * np.tanh(case.samples.qd[:, j] / 0.02)
+
+
+def told(case, path, tmp_path):
+    write_table(tmp_path / "log.parquet", case.samples, case.robot.description)
+    findings = Findings()
+    check_recording(tl.load_robot(path), tmp_path / "log.parquet", findings)
+    return findings.findings
+
+
+def test_a_motor_arm_without_errors_is_silent(case, path, tmp_path):
+    assert told(case, path, tmp_path) == []
+
+
+def test_a_rotor_is_no_wrong_gain(case, path, tmp_path):
+    case.samples.tau[:, 0] += 4.0 * acceleration(case, 0)
+    (line,) = told(case, path, tmp_path)
+    found = re.search(r"shoulder_pan_joint shows an inertia of (\S+) ", line)
+    assert found is not None and float(found[1]) == pytest.approx(4.0, rel=0.1)
+
+
+def test_a_wrong_gain_is_no_rotor(case, path, tmp_path):
+    case.samples.tau[:, 1] *= 1.4
+    lines = told(case, path, tmp_path)
+    assert any("shoulder_lift_joint is 1.39 times" in line for line in lines), lines
+    assert not any("shows an inertia" in line for line in lines)
+
+
+def test_what_a_motion_does_not_tell_is_said(path, tmp_path):
+    robot = tl.load_robot(path)
+    case = make_case(robot, (), np.random.default_rng(5))
+    # Only the first joint moves: what it accelerates is always the same.
+    s = case.samples
+    s.q[:, 1:], s.qd[:, 1:] = s.q[0, 1:], 0.0
+    true = Robot(robot.description, case.mechanism)
+    s.tau[:] = _loads(true, s.time, s.q, s.qd)[0]
+    s.tau[:, 0] += 3.0 * acceleration(case, 0)
+    s.tau[:] += 0.05 * np.random.default_rng(1).normal(size=s.tau.shape)
+    lines = [line for line in told(case, path, tmp_path) if "shoulder_pan" in line]
+    assert len(lines) == 1 and "rotor_inertia: this motion tells no more" in lines[0]
+
+
+def stretched(path, seed=5):
+    """Small motion of a stretched arm: its shoulder bears much the same weight all the time."""
+    robot = tl.load_robot(path)
+    case = make_case(robot, (), np.random.default_rng(seed))
+    s = case.samples
+    s.q[:], s.qd[:] = 0.3 * s.q, 0.3 * s.qd
+    s.tau[:] = _loads(Robot(robot.description, case.mechanism), s.time, s.q, s.qd)[0]
+    s.tau[:] += 0.05 * case.rng.normal(size=s.tau.shape)
+    return case
+
+
+def test_a_gain_and_friction_little_off_are_no_wrong_mass(path, tmp_path, monkeypatch):
+    case = stretched(path)
+    case.samples.tau[:, 1] *= 0.85
+    rub(case)
+    case.samples.tau[:, 1] += 3.0  # a third stronger one way
+    lines = told(case, path, tmp_path)
+    assert not any("weighs" in line or "missing at" in line for line in lines), lines
+    monkeypatch.setattr(loads, "UNEVEN", 0.0)
+    monkeypatch.setattr(loads, "GAIN", 0.0)
+    assert any("weighs" in line for line in told(case, path, tmp_path))
+
+
+def test_a_load_is_weighed_beside_friction(path, tmp_path):
+    robot = tl.load_robot(path)
+    clean = make_case(robot, (), np.random.default_rng(6))
+    loaded = Case(robot, np.random.default_rng(6), clean.mechanism, clean.samples)
+    _with_mass(loaded, _last_link(loaded), 2.5, np.array([0.0, 0.0, 0.05]))
+    s = clean.samples
+    true = Robot(robot.description, loaded.mechanism)
+    case = replace(loaded, samples=replace(s, tau=_loads(true, s.time, s.q, s.qd)[0]))
+    rub(case)
+    case.samples.tau[:, 2] += 1.5
+    (line,) = [x for x in told(case, path, tmp_path) if "missing at" in x]
+    found = re.match(r"(\S+) \+- (\S+) kg", line)
+    assert found is not None and abs(float(found[1]) - 2.5) < 2.0 * max(float(found[2]), 0.1)
+
+
+def test_an_output_may_rest_with_its_joint(case, path, tmp_path):
+    s = case.samples
+    still = slice(0, 300)
+    s.q[still, 1], s.qd[still, 1] = s.q[300, 1], 0.0
+    s.tau[still, 1] = s.tau[300, 1]
+    assert not any("stuck" in line for line in told(case, path, tmp_path))
+    s.q[still, 1] += 1e-4 * np.sin(np.arange(300))
+    assert any("shoulder_lift_joint" in x and "stuck" in x for x in told(case, path, tmp_path))
+
+
+@pytest.mark.parametrize("seed", [5, 6])
+def test_friction_turns_no_sign(path, tmp_path, seed):
+    case = make_case(tl.load_robot(path), (), np.random.default_rng(seed))
+    rub(case)
+    lines = told(case, path, tmp_path)
+    assert not any("opposite sign" in line or "order" in line for line in lines), lines
+
+
+def test_a_wrong_sign_is_told_beside_friction(case, path, tmp_path):
+    rub(case)
+    case.samples.tau[:, 1] *= -1.0
+    lines = told(case, path, tmp_path)
+    assert any("shoulder_lift_joint" in x and "opposite sign" in x for x in lines), lines
+
+
+def test_what_friction_holds_tells_nothing(path, tmp_path):
+    robot = tl.load_robot(path)
+    case = make_case(robot, (), np.random.default_rng(5))
+    s = case.samples
+    s.q[:, :5], s.qd[:, :5] = s.q[0, :5], 0.0
+    s.tau[:] = _loads(Robot(robot.description, case.mechanism), s.time, s.q, s.qd)[0]
+    s.tau[:] += 0.05 * case.rng.normal(size=s.tau.shape)
+    s.tau[:, :5] += 0.8 * np.array(RUBBING[:5]) * case.rng.choice([-1.0, 1.0], 5)
+    assert told(case, path, tmp_path) == []
