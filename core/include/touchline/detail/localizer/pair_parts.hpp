@@ -81,7 +81,7 @@ class PairParts {
   static constexpr int kWaiting = 4096, kSteps = 12;  // room: pairs that wait; steps of each
   // Units of work: the beginning of a descent beside another one, or elsewhere, where no cache has the
   // mesh.
-  static constexpr int kBegin = 8, kElsewhere = 20;
+  static constexpr int kBegin = 8, kElsewhere = 60;
   static constexpr double kHopeless = 100.0;  // cost from which nothing is brought to where it explains
   static constexpr double kLittle = 2.0;      // of cost: a part is told by its place, not by its cost
   static constexpr double kSoon = 5e4;        // cost of a beginning from which it soon explains
