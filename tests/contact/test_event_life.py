@@ -115,7 +115,9 @@ def test_a_push_that_begins_while_an_error_creeps_over_its_limit_is_no_error():
     _, detection = pipeline.run(samples.time, samples.q, samples.qd, samples.tau, samples.wrench)
     assert len(pipeline.events) == pushes == 9
     assert all(event.cleared - event.detected > 0.5 for event in pipeline.events)
-    assert all(event.status == "located" for event in pipeline.events)
+    # Of an early one two places on its link are as likely; none from the eighth on is left without.
+    assert all(event.status in ("located", "ambiguous") for event in pipeline.events)
+    assert all(event.status == "located" for event in pipeline.events[7:])
     forces = [row.component in (0, 1, 2) for row in pipeline.thresholds.rows]
     assert np.max(detection.drift[-1][np.array(forces)]) < 0.5  # N
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A search for a newcomer that takes many samples: what it says meanwhile, and where it ends."""
+"""A search for a place that takes many samples: what it says meanwhile, and where it ends."""
 
 import numpy as np
 import pytest
@@ -9,22 +9,22 @@ from touchline.result.contact import Contact
 from touchline.trials.cell import Cell
 from touchline.trials.scene import arm_and_skin, make_scene
 
-CELL = Cell("sara", 3, 1)
-RUN = 3  # its third contact is explained by many places at first
-FEW, AS_IT_IS, ALL = 60, 600, 1_000_000_000  # units of work in a sample
+NEWCOMER, WEAK = Cell("sara", 3, 1), Cell("sara", 1, 1, speed=0.5, force=2.0)
+RUNS = {NEWCOMER: 3, WEAK: 5}  # what came last is explained by many places at first, then by one
+FEW, AS_IT_IS, ALL = 300, 1000, 1_000_000_000  # units of work in a sample
 
 
-def samples_and_pipeline(work: int):
+def samples_and_pipeline(cell: Cell, work: int):
     """The signals of a scene, and a pipeline with so many units of work in each sample."""
-    robot, skin = arm_and_skin(CELL.arm, CELL.tier)
+    robot, skin = arm_and_skin(cell.arm, cell.tier)
     tuning = {"place.search_work": work}
     pipeline = Pipeline(robot, skin=skin, torque_error=0.0, tuning=tuning)
-    return make_scene(CELL, RUN).signals, pipeline
+    return make_scene(cell, RUNS[cell]).signals, pipeline
 
 
-def follow(work: int) -> list[list[Contact]]:
+def follow(cell: Cell, work: int) -> list[list[Contact]]:
     """The contacts after every sample."""
-    s, pipeline = samples_and_pipeline(work)
+    s, pipeline = samples_and_pipeline(cell, work)
     samples = zip(s.time, s.q, s.qd, s.tau, s.wrench, strict=True)
     return [pipeline.update(*sample).contacts for sample in samples]
 
@@ -34,35 +34,41 @@ def by_link(contacts: list[Contact]) -> list[Contact]:
     return sorted(contacts, key=lambda contact: str(contact.link))
 
 
+@pytest.fixture(scope="module", params=[NEWCOMER, WEAK], ids=["newcomer", "weak"])
+def cell(request) -> Cell:
+    return request.param
+
+
 @pytest.fixture(scope="module")
-def few() -> list[list[Contact]]:
-    return follow(FEW)
+def few(cell: Cell) -> list[list[Contact]]:
+    return follow(cell, FEW)
 
 
-def test_less_work_in_a_sample_ends_at_the_same_places(few):
-    ends = [by_link(few[-1])] + [by_link(follow(work)[-1]) for work in (AS_IT_IS, ALL)]
+def test_less_work_in_a_sample_ends_at_the_same_places(cell, few):
+    ends = [by_link(few[-1])] + [by_link(follow(cell, work)[-1]) for work in (AS_IT_IS, ALL)]
     for contacts in ends:
-        assert [c.link for c in contacts] == [c.link for c in ends[-1]] and len(contacts) == 3
+        assert [c.link for c in contacts] == [c.link for c in ends[-1]]
+        assert len(contacts) == cell.contacts
         assert all(c.status == "located" for c in contacts)
         for one, other in zip(contacts, ends[-1], strict=True):
             assert np.linalg.norm(np.array(one.position) - np.array(other.position)) < 1e-3
 
 
-def test_no_newcomer_is_located_before_all_has_been_looked_at(few):
+def test_nothing_is_located_before_all_has_been_looked_at(few):
     early = [contact for contacts in few for contact in contacts if contact.searching]
     assert early
     assert all(contact.status != "located" for contact in early)
     assert not any(contact.searching for contact in few[-1])
 
 
-def test_all_at_once_says_nothing_of_a_search():
-    assert not any(contact.searching for contacts in follow(ALL) for contact in contacts)
+def test_all_at_once_says_nothing_of_a_search(cell):
+    assert not any(contact.searching for contacts in follow(cell, ALL) for contact in contacts)
 
 
-def test_samples_in_parts_give_the_same_bits(few):
+def test_samples_in_parts_give_the_same_bits(cell, few):
     events = []
     for parts in (1, 7):
-        s, pipeline = samples_and_pipeline(FEW)
+        s, pipeline = samples_and_pipeline(cell, FEW)
         for i in np.array_split(np.arange(len(s.time)), parts):
             pipeline.run(s.time[i], s.q[i], s.qd[i], s.tau[i], s.wrench[i])
         last = pipeline.contacts.sample == pipeline.contacts.sample.max()  # of the last part

@@ -57,20 +57,24 @@ int main() {
       Beside beside{{(1.0 / norm(one)) * one, {}}, {0.0, 0.0}};
       beside.axis[1] = cross(line.direction, beside.axis[0]);
       const auto all = [](double) { return 1.0; };
-      int boxes = 0;
-      mesh.around(line, beside, limit, steep, boxes, all, [&](const SurfacePoint& p) {
-        const Vec3 off = p.point - line.origin;
-        const double way = norm(off - dot(off, line.direction) * line.direction);
-        const double a = dot(beside.axis[0], off), b = dot(beside.axis[1], off);
-        if (std::fabs(way - p.distance) > 1e-12 || seen.count(p.face)) ++wrong;
-        seen[p.face] = p.distance;
-        weighed[p.face] = 4.0 * a * a + 90.0 * b * b;
-      });
+      // In parts of a few boxes at a time.
+      Mesh::Walk parts;
+      for (int left = 0; !parts.done(); left = 1 + static_cast<int>(chance() % 9))
+        mesh.around(line, beside, limit, steep, parts, left, all, [&](const SurfacePoint& p) {
+          const Vec3 off = p.point - line.origin;
+          const double way = norm(off - dot(off, line.direction) * line.direction);
+          const double a = dot(beside.axis[0], off), b = dot(beside.axis[1], off);
+          if (std::fabs(way - p.distance) > 1e-12 || seen.count(p.face)) ++wrong;
+          seen[p.face] = p.distance;
+          weighed[p.face] = 4.0 * a * a + 90.0 * b * b;
+        });
+      Mesh::Walk walk;
+      int boxes = 1 << 30;
       // Weighed, none is left out whose nearest point is less far; the bound shrinks as it may.
       beside.weight[0] = 4.0, beside.weight[1] = 90.0;
       double most = 0.5, least = 1e300;
       const auto within = [&](double) { return most; };
-      mesh.around(line, beside, limit, steep, boxes, within, [&](const SurfacePoint& p) {
+      mesh.around(line, beside, limit, steep, walk, boxes, within, [&](const SurfacePoint& p) {
         if (seen[p.face] != p.distance) ++wrong;
         least = std::min(least, weighed[p.face]);
         weighed.erase(p.face);

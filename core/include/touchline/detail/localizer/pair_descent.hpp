@@ -49,13 +49,14 @@ class PairDescent {
     while (done < units && working_) {
       looked_ = 0;
       working_ = improve();
-      done += kStep + looked_;
+      done += (bound_ ? kBoundStep : kStep) + looked_;
     }
     return done;
   }
 
  private:
-  static constexpr int kStep = 9;  // units of work of a step, beside those of looking for its surface
+  // Units of work of a step, beside those of looking for its surface; with friction cones.
+  static constexpr int kStep = 9, kBoundStep = 22;
   static constexpr double kHold = 5e-3;      // of an end that is held, one sigma of a step [m]
   static constexpr double kFall = 0.3;       // part of what a cost may be that is left by a step
   static constexpr double kFarthest = 0.04;  // that a step goes [m]

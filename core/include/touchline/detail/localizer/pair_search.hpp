@@ -77,7 +77,7 @@ class PairSearch {
 
   // Units of work: the beginning of a descent, where no cache has the mesh; where a force enters its body;
   // the evidence of a solution; another view.
-  static constexpr int kBegin = 60, kEntries = 110, kWeight = 150, kView = 110;
+  static constexpr int kBegin = 60, kEntries = 110, kWeight = 250, kView = 110;
 
   // From points spread over the links, by descents, to solutions. What was measured in the meantime
   // moves them a little; with other entries of their forces they are weighed by that.

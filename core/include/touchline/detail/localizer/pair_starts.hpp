@@ -60,7 +60,7 @@ class PairStarts {
         continue;
       }
       try_start(a, start_, b);
-      done += 1 + lanes_[1].count() / kTried;
+      done += 2 + lanes_[1].count() / kTried;
       if (++start_ < bodies_[a].count()) continue;
       for (int k = 0; k < kPerBodies; ++k) {
         if (!std::isfinite(best_[k].cost)) continue;
@@ -117,7 +117,7 @@ class PairStarts {
   static constexpr int kFollowed = 24;         // and of all
   // Units of work: a pair of bodies that is given up, or prepared; and how many points of one body are
   // a unit beside a point of the other. Not blocks: how wide they are depends on the processor.
-  static constexpr int kGivenUp = 10, kPrepared = 40, kTried = 4;
+  static constexpr int kGivenUp = 10, kPrepared = 100, kTried = 2;
   static constexpr double kSpacing = 0.02;     // of what a point stands for [m], one sigma
   static constexpr double kSoft = 0.3;         // of the friction cone of such a point [rad]
   static constexpr double kApart = 0.03;       // pairs nearer than this are one [m]

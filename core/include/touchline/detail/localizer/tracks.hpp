@@ -37,7 +37,7 @@ class Tracks {
         reports_(single.surfaces()),
         pasts_(segments, Past(measurement.posture().nodes().size(), settings.past_worn)),
         looked_(segments),
-        share_(settings.search_work, 1.0),
+        share_(settings.search_work),
         arrivals_(single, measurement, settings, fit_, known_, reports_, lone_, period),
         merging_(single.surfaces(), settings, fit_, known_, reports_),
         twins_(single.surfaces(), measurement, settings, fit_, known_, reports_, rows, segments,
@@ -84,10 +84,10 @@ class Tracks {
     double time = -kAbsurd, size = 0.0;
   };
   static constexpr double kLook = 0.005;  // [s] between second looks: a suspect lasts four of them
-  // Of the work of a sample each known contact but the first costs what arrives beside them so many
-  // units. Such a part is left for it at least. Where a pair is looked for one contact has such a part,
-  // and where one was so many times the work.
-  static constexpr int kEachKnown = 80, kLeast = 3, kBesidePair = 2, kAlone = 3;
+  // What known contacts explain takes so many units of a sample's work, and each but the first so many
+  // more. Such a part is left at least for what arrives beside them. Where a pair is looked for one
+  // contact has such a part, and in the first sample of a touch, when no cache has the meshes yet.
+  static constexpr int kKnown = 500, kEachKnown = 80, kLeast = 6, kBesidePair = 3, kFirst = 2;
 
   void report(int serial, const Answer& answer) { reports_.add(serial, answer); }
   void report(const KnownContact& k) { reports_.add(k); }
@@ -116,6 +116,14 @@ class Tracks {
       pasts_[g].follow(measurement_.load(), bandwidth, time, measurement_.posture());
     if (!s.unexplained_now() || s.known.contacts.count > 1)
       s.known.contacts.age(bandwidth, time, settings_);
+    own_ = share_.take(time);
+    spent_ = 0;
+    go_on(s, read);
+    share_.spend(spent_);
+  }
+
+  template <class Read>
+  void go_on(SegmentContacts& s, Read&& read) {
     switch (s.state.now()) {
       case Tracking::quiet: return;
       case Tracking::suspected:
@@ -142,25 +150,21 @@ class Tracks {
 
   template <class Read>
   void arrive(SegmentContacts& s, Read&& read) {
-    const int units = share_.take(now_.time);
-    const int beside = units - kEachKnown * (s.known.contacts.count - 1);
-    const int most = std::max(beside, units / kLeast);
-    share_.give_back(units - most + arrivals_.follow(s, now_, most, read));
+    const int beside = own_ - spent_ - kKnown - kEachKnown * (s.known.contacts.count - 1);
+    const bool first = s.unexplained.since == now_.time;
+    const int most = first ? own_ / kLeast : std::max(beside, own_ / kLeast);
+    spent_ += most - arrivals_.follow(s, now_, most, read);
     suspect_ = arrivals_.suspect();
   }
 
   // The segment's contact, if it has only one.
   const Answer& locate(SegmentContacts& s) {
     const Past& past = pasts_[now_.segment];
-    const bool shared = s.touched.two && !s.state.is(Tracking::single);
-    const int own = shared ? share_.take(now_.time) : 0;
-    const int units = !shared                        ? Ask::kAll
-                      : s.state.is(Tracking::pair) ? own / kBesidePair
-                                                     : std::min(own, Ask::kAll / kAlone) * kAlone;
+    const int units = own_ / (s.state.is(Tracking::pair) ? kBesidePair : s.touched.searched ? 1 : kFirst);
     const Ask ask{Ask::kSole, again(s), false, units};
     const Answer& a = past.known() ? single_.locate(now_.segment, past, measurement_, ask)
                                    : single_.locate(now_.segment, now_.lag, measurement_, ask);
-    if (shared) share_.give_back(own - std::min(own, single_.units()));
+    spent_ += single_.units();
     return a;
   }
 
@@ -173,7 +177,10 @@ class Tracks {
       s.suspected.explained.reset();
       return;
     }
-    if (a.status == Status::not_separable) return twins_.follow(s, a, now_, single_.units());
+    if (a.status == Status::not_separable) {
+      spent_ += twins_.follow(s, a, now_, own_, spent_);
+      return;
+    }
     report(s.touched.first, a);
     if (!placed(a)) {
       s.suspected.explained.reset();
@@ -314,7 +321,9 @@ class Tracks {
   Reports reports_;
   std::vector<Past> pasts_;  // per segment: of its whole wrench
   std::vector<Look> looked_;  // per segment
+  // Units of work: of the sample; of the segment at hand, its part and what it has spent of it.
   WorkShare share_;
+  int own_ = 0, spent_ = 0;
   Arrivals arrivals_;
   Merging merging_;
   Twins twins_;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <vector>
 
@@ -11,7 +12,6 @@
 #include "touchline/detail/localizer/pair_answer.hpp"
 #include "touchline/detail/localizer/reports.hpp"
 #include "touchline/detail/localizer/segment_contacts.hpp"
-#include "touchline/detail/localizer/work_share.hpp"
 
 namespace touchline {
 
@@ -27,15 +27,16 @@ class Twins {
         known_(known),
         reports_(reports),
         said_(surfaces, settings),
-        share_(settings.pair_work, period) {
+        units_(settings.pair_work * period / settings.search_work) {
     for (int g = 0; g < segments; ++g)
       work_.push_back(std::make_unique<Work>(measurement.posture(), surfaces, settings, rows, g));
   }
 
   // One contact explains nothing, from the beginning: looks for two, again and again while their
-  // forces rise, then ever more rarely. All of that takes many samples. `spent`: units of work on the one
-  // contact in this sample, which are missing here.
-  void follow(SegmentContacts& s, const Answer& one, const SegmentSample& now, int spent) {
+  // forces rise, then ever more rarely. All of that takes many samples. `own`: units of work of the
+  // segment in this sample (`PlaceTuning::search_work`), of which the one contact has taken `spent`.
+  // Returns what is taken of the rest.
+  int follow(SegmentContacts& s, const Answer& one, const SegmentSample& now, int own, int spent) {
     Together& two = s.together;
     Work& work = *work_[now.segment];
     if (!s.state.is(Tracking::pair)) {
@@ -49,14 +50,15 @@ class Twins {
       work.search.drop();
       work.parts.drop();
     }
-    spent_ = spent;
-    go_on(s, work, one, now);
+    const int all = static_cast<int>(std::clamp(std::round(units_ * own), 1.0, kMost));
+    const bool worked = go_on(s, work, one, now, std::max(all - spent, all / kLeast));
+    const int taken = worked ? std::max(0, own - spent) : 0;
     if (!two.separable) {
       end_second(two);
       two.inseparable.force = one.force;
       two.inseparable.searching = !two.walked;
       reports_.add(s.touched.first, two.inseparable);
-      return;
+      return taken;
     }
     if (two.seen < now.time && known_.explain_freely(two.contacts))
       fit_.accept(two.contacts, known_.change(), 0.0);
@@ -68,10 +70,11 @@ class Twins {
       reports_.add(two.contacts.known[k]);
       reports_.answer(reports_.count() - 1).searching = !settled;
     }
-    if (!settled) return;
+    if (!settled) return taken;
     s.known.contacts = two.contacts;
     s.know(now);
     s.state.enter(Tracking::several);
+    return taken;
   }
 
   // A single contact explains after all.
@@ -82,6 +85,7 @@ class Twins {
 
  private:
   static constexpr int kLeast = 4;  // so large a part of its work a sample does in any case
+  static constexpr double kMost = 1e9;  // units in a sample: a bound on integers
 
   void end_second(Together& two) {
     if (two.second) reports_.end(*two.second);
@@ -97,8 +101,9 @@ class Twins {
     PairParts parts;
   };
 
-  // One sample's part of it: what is done is taken over in a sample of its own.
-  void go_on(SegmentContacts& s, Work& work, const Answer& one, const SegmentSample& now) {
+  // One sample's part of it, at most about so many units of work: what is done is taken over in a sample
+  // of its own. Returns whether any work is done.
+  bool go_on(SegmentContacts& s, Work& work, const Answer& one, const SegmentSample& now, int units) {
     Together& two = s.together;
     if (work.parts.done()) {
       conclude(two, work);
@@ -106,9 +111,11 @@ class Twins {
     } else if (work.search.done() && !two.taken) {
       take(s, work, one, now);
     } else if (work.parts.working()) {
-      work.parts.work(units(now));
+      work.parts.work(units);
+      return true;
     } else if (work.search.working()) {
-      work.search.work(units(now), now, measurement_);
+      work.search.work(units, now, measurement_);
+      return true;
     } else if (two.taken && !two.separable && !two.walking &&
                work.search.begun() - two.since >= settings_.risen * now.brief()) {
       two.walking = true;
@@ -119,11 +126,7 @@ class Twins {
                                  now.time + settings_.search_growth * (now.time - two.since));
       work.search.begin(now, measurement_);
     }
-  }
-
-  int units(const SegmentSample& now) {
-    const int own = share_.take(now.time);
-    return std::max(own - spent_, own / kLeast);
+    return false;
   }
 
   // Takes the outcome of a search over.
@@ -169,8 +172,7 @@ class Twins {
   Reports& reports_;
   std::vector<std::unique_ptr<Work>> work_;  // per segment
   PairAnswer said_;
-  WorkShare share_;
-  int spent_ = 0;
+  double units_;  // of work on a pair, for each of a sample
   Answer answer_;
 };
 

@@ -1,45 +1,42 @@
 // SPDX-License-Identifier: Apache-2.0
-// How much work a sample may do on searches: a budget per time of the sensors' clock. So an answer takes
-// as long at any sample rate. All that is searched in a sample shares it. No allocation.
-// Theory: docs/theory.md, section 6.5.
+// How much work a sample may do on searches: all segments that search in it share it. Those that need
+// little leave the rest to others. No allocation.
+// Theory: docs/theory.md, section 6.4.
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 namespace touchline {
 
 class WorkShare {
  public:
-  // `rate`: units in a second. `period`: of the samples [s].
-  WorkShare(double rate, double period)
-      : units_(static_cast<int>(std::clamp(std::round(rate * period), 1.0, kMost))) {}
+  // Units in a sample.
+  explicit WorkShare(int units) : units_(units) {}
 
-  // Units for one search in the sample of `time` [s].
+  // Units for the searches of one segment in the sample of `time` [s], of which it tells what it has
+  // spent: that may be a few more.
   int take(double time) {
     if (time != time_) {
-      before_ = taken_;
-      taken_ = 0;
+      before_ = searching_;
+      searching_ = 0;
       left_ = units_;
       time_ = time;
     }
-    const int own = std::min(left_, units_ / std::max(before_, ++taken_));
-    left_ -= own;
-    return own;
+    return left_ / std::max(1, before_ - searching_);
+  }
+  void spend(int units) {
+    left_ = std::max(0, left_ - units);
+    searching_ += units > units_ / kLittle ? 1 : 0;
   }
 
-  // In the same sample: so many of those that were taken last are not needed.
-  void give_back(int units) { left_ += units; }
-
  private:
-  static constexpr double kMost = 1e9;  // units in a sample: a bound on integers
+  static constexpr int kLittle = 16;  // so small a part of a sample's work is no search
 
   int units_;
-  // How many have taken theirs in the sample of this time [s], so far, and in the one before; units that
-  // are left in it.
+  // Of the sample of this time [s]: how many have searched, and in the one before; units that are left.
   double time_ = -std::numeric_limits<double>::infinity();
-  int taken_ = 0, before_ = 0, left_ = 0;
+  int searching_ = 0, before_ = 0, left_ = 0;
 };
 
 }  // namespace touchline

@@ -80,6 +80,40 @@ inline Lanes load_lanes(const double* from) {
 }
 inline void store_lanes(const Lanes& v, double* to) { std::memcpy(to, &v, sizeof v); }
 
+// `count` signals of kLanes samples, `stride` from one sample to the next: each signal side by side.
+inline void gather(const double* from, std::size_t stride, std::size_t count, Lanes* to) {
+  if (count < kLanes) {
+    for (std::size_t i = 0; i < count; ++i) {
+      for (int k = 0; k < kLanes; ++k) set_lane(to[i], k, from[k * stride + i]);
+    }
+    return;
+  }
+  for (std::size_t next = 0; next < count; next += kLanes) {
+    const std::size_t i = std::min(next, count - kLanes);  // the last block reaches back
+    Lanes block[kLanes];
+    for (int k = 0; k < kLanes; ++k) block[k] = load_lanes(from + k * stride + i);
+    transpose(block);
+    for (int k = 0; k < kLanes; ++k) to[i + k] = block[k];
+  }
+}
+
+// Lane by lane: is it between the two? A NaN is not.
+#if defined(__GNUC__) || defined(__clang__)
+using LaneMask = decltype(Lanes{} < Lanes{});
+inline bool all_of(const LaneMask& mask) {
+  long long all = -1;
+  for (int k = 0; k < kLanes; ++k) all &= mask[k];
+  return all != 0;
+}
+#else
+using LaneMask = bool;
+inline bool all_of(bool mask) { return mask; }
+#endif
+inline LaneMask between(const Lanes& v, double low, double high) { return (v > low) & (v < high); }
+inline LaneMask within(const Lanes& v, double low, double high) {
+  return (v >= low) & (v <= high);
+}
+
 inline Lanes all_lanes(double x) { return Lanes{} + x; }
 
 inline Lanes root(Lanes x) {

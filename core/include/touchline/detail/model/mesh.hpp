@@ -52,7 +52,19 @@ struct Triangle {
 };
 
 class Mesh {
+  static constexpr int kDepth = 64;  // room: boxes that wait to be looked into
+
  public:
+  // How far a look at a mesh has come: the boxes that wait, at first the one that holds all.
+  class Walk {
+   public:
+    bool done() const { return waiting_ == 0; }
+
+   private:
+    friend Mesh;
+    int boxes_[kDepth] = {0}, waiting_ = 1;
+  };
+
   Mesh() : Mesh(std::vector<Triangle>{}) {}  // without triangles
   Mesh(const std::vector<Vec3>& vertices, const std::vector<std::array<int, 3>>& faces)
       : tree_(std::make_shared<Hierarchy>(triangles_of(vertices, faces))) {}
@@ -64,22 +76,28 @@ class Mesh {
   bool empty() const { return tree_->triangles.empty(); }
 
   // Calls `visit(Crossing)` for each crossing of the whole line, in no order. A line through an
-  // edge is reported by both triangles and never by none.
+  // edge is reported by both triangles and never by none. Returns the number of places that were looked
+  // into: what it took, on any machine.
   template <class Visit>
-  void crossings(const ForceLine& line, Visit&& visit) const {
+  int crossings(const ForceLine& line, Visit&& visit) const {
     const Vec3 inverse = invert(line.direction);
-    visit_triangles([&](const Box& box, int) { return crosses(box, line.origin, inverse); },
-                    [&](const Triangle& tri) {
-                      double t;
-                      if (crosses(tri, line, t)) visit(Crossing{t, tri.face, tri.normal});
-                    });
+    int looked = 0;
+    visit_triangles(
+        [&](const Box& box, int) {
+          ++looked;
+          return crosses(box, line.origin, inverse);
+        },
+        [&](const Triangle& tri) {
+          double t;
+          if (crosses(tri, line, t)) visit(Crossing{t, tri.face, tri.normal});
+        });
+    return looked;
   }
 
   // The point of the surface nearest to the line, if nearer than `limit`. `near`: the place of a
-  // triangle that may be near, or -1: then there is less to search. The answer is the same.
-  SurfacePoint nearest_to_line(const ForceLine& line,
-                               double limit = std::numeric_limits<double>::infinity(),
-                               int near = -1) const {
+  // triangle that may be near, or -1: then there is less to search. The answer is the same. `looked`
+  // grows by the number of places that were looked into.
+  SurfacePoint nearest_to_line(const ForceLine& line, double limit, int near, int& looked) const {
     if (near >= 0) {
       SurfacePoint there;
       there.distance = limit;
@@ -97,6 +115,7 @@ class Mesh {
         },
         [](double distance) { return distance; },
         [&](const Box& b, double distance) {
+          ++looked;
           return cutoff.may_hold(b, distance * distance, kFar);
         },
         [&](const Triangle& tri, SurfacePoint& best) {
@@ -105,21 +124,34 @@ class Mesh {
           if (best.distance < before) best.place = static_cast<int>(&tri - triangles().data());
         });
   }
+  SurfacePoint nearest_to_line(const ForceLine& line,
+                               double limit = std::numeric_limits<double>::infinity(),
+                               int near = -1) const {
+    int looked = 0;
+    return nearest_to_line(line, limit, near, looked);
+  }
 
   // Calls `visit(SurfacePoint)` for the point nearest to the line of each triangle that is nearer
   // to it than `limit` and stands against it: at a cosine above `steep`. Triangles of which every
   // point is at a weighed square of `most(cosine)` or more are left out; that may shrink meanwhile, and
-  // is nowhere more than at cosine 1. `looked`: as in `nearest_to_point`.
+  // is nowhere more than at cosine 1. Goes on from where `walk` is, as long as there are units of work
+  // `left`, which it takes from: places that are looked into.
   template <class Most, class Visit>
-  void around(const ForceLine& line, const Beside& beside, double limit, double steep, int& looked,
-              Most&& most, Visit&& visit) const {
+  void around(const ForceLine& line, const Beside& beside, double limit, double steep, Walk& walk,
+              int& left, Most&& most, Visit&& visit) const {
     const Cutoff cutoff(line, beside);
     const double square = limit * limit;
-    const Triangle* some[kLanes];
-    int count = 0, boxes = 0, near = 0;
+    const Triangle* some[kTogether];
+    int count = 0;
+    const auto look = [&] {
+      for (int i = 0; i < count; i += kLanes)
+        nearer_to_line(some + i, std::min(kLanes, count - i), line, limit, visit);
+      count = 0;
+    };
     visit_triangles(
+        walk, [&] { return left > 0; },
         [&](const Box& box, int index) {
-          ++boxes;
+          --left;
           return cutoff.may_hold(box, square, most(1.0)) &&
                  tree_->faces[index].may_stand_against(line.direction, steep);
         },
@@ -127,13 +159,10 @@ class Mesh {
           const double cosine = -dot(tri.normal, line.direction);
           if (!(cosine > steep) || !cutoff.may_hold(tri, square, most(cosine))) return;
           some[count++] = &tri;
-          ++near;
-          if (count < kLanes) return;
-          nearer_to_line(some, count, line, limit, visit);
-          count = 0;
+          left -= kNearLooked;
+          if (count == kTogether) look();
         });
-    if (count > 0) nearer_to_line(some, count, line, limit, visit);
-    looked += boxes + kNearLooked * near;
+    look();
   }
 
   // The point of the surface nearest to `p`, if nearer than `limit`. `near`: the place of a triangle
@@ -190,7 +219,8 @@ class Mesh {
   }
 
  private:
-  static constexpr int kLeaf = 4, kDepth = 64;  // triangles of a leaf; room for the stack
+  static constexpr int kLeaf = 4;  // triangles of a leaf
+  static constexpr int kTogether = 4;    // triangles looked at at once, however many lanes there are
   static constexpr int kNearLooked = 2;  // places: a triangle near a line takes as long as so many boxes
   static constexpr float kInfinity = std::numeric_limits<float>::infinity();
   static constexpr double kTouching = 1e-9;  // nearer than this nothing nearer is looked for [m]
@@ -489,22 +519,29 @@ class Mesh {
   // Calls `visit(Triangle)` for all in boxes that are `reached(Box, its number)`, in no order.
   template <class Reached, class Visit>
   void visit_triangles(Reached&& reached, Visit&& visit) const {
-    if (empty()) return;
+    Walk walk;
+    visit_triangles(walk, [] { return true; }, reached, visit);
+  }
+
+  // The same from where `walk` is, as long as it `may` go on.
+  template <class May, class Reached, class Visit>
+  void visit_triangles(Walk& walk, May&& may, Reached&& reached, Visit&& visit) const {
+    if (empty()) walk.waiting_ = 0;
     const Box* const boxes = tree_->boxes.data();
     const Triangle* const triangles = tree_->triangles.data();
-    int stack[kDepth], size = 0;
-    stack[size++] = 0;
-    while (size > 0) {
-      const int index = stack[--size];
+    int size = walk.waiting_;
+    while (size > 0 && may()) {
+      const int index = walk.boxes_[--size];
       const Box& box = boxes[index];
       if (!reached(box, index)) continue;
       if (box.count == 0) {
-        stack[size++] = index + 1;
-        stack[size++] = box.next;
+        walk.boxes_[size++] = index + 1;
+        walk.boxes_[size++] = box.next;
         continue;
       }
       for (int i = box.next; i < box.next + box.count; ++i) visit(triangles[i]);
     }
+    walk.waiting_ = size;
   }
 
   // Two unit axes across a direction.

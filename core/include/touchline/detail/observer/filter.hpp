@@ -85,6 +85,12 @@ class Filters {
 
   std::size_t size() const { return value_.size(); }
   double* values() { return value_.data(); }
+  // Has every row the same pole? It is for a step of `dt` [s]:
+  bool alike() const { return poles_.size() == 1; }
+  double only_pole(double dt) {
+    if (dt != dt_) set_poles(dt);
+    return poles_[0];
+  }
   // The poles of all rows for a step of `dt` [s].
   void write_poles(double dt, double* out) {
     if (dt != dt_) set_poles(dt);

@@ -58,8 +58,7 @@ inline Health judge_all(const double* values, std::size_t count) {
 }
 
 // The limit up to which a reading is surely neither absurd nor at the end of its range.
-inline std::uint64_t safe_limit(double range) {
-  return magnitude(std::fmin(kAbsurd, (1.0 - 1e-9) * range));
-}
+inline double safe_value(double range) { return std::fmin(kAbsurd, (1.0 - 1e-9) * range); }
+inline std::uint64_t safe_limit(double range) { return magnitude(safe_value(range)); }
 
 }  // namespace touchline

@@ -211,7 +211,9 @@ class Observer {
   bool step_together(const Sample& first, const double* time, double* out) {
     if (!steady_ || !writer_.all_settled() || !side_by_side_.possible()) return false;
     if (channels_.filters.doubtful()) return false;
-    const std::size_t n = joints_.size(), w = 6 * sensors_.size();
+    if (!side_by_side_.read(first)) return false;
+    const bool inside = side_by_side_.inside(lower_.data(), upper_.data());
+    const std::size_t n = joints_.size();
     Clock clock = clock_;
     Health health[kLanes] = {};
     Instant now[kLanes], before = now_;
@@ -219,19 +221,13 @@ class Observer {
       if (clock.take(time[k], health[k]) != Clock::Verdict::accepted) return false;
       now[k] = {time[k], before.time, clock.period(), clock.usual_step()};
       before = now[k];
-      const Sample sample{time[k], first.q + k * n, first.qd + k * n, first.tau + k * n,
-                          first.wrench + k * w};
-      health[k] |= judge_state(sample);
+      if (!inside) health[k] |= judge_limits(first.q + k * n);
       if ((health[k] & ~kModelLimit) != 0 || !now[k].usual(now[k].before)) return false;
-      if (!torques_.sound(sample.tau)) return false;
-      for (std::size_t s = 0; s < sensors_.size(); ++s) {
-        if (!wrenches_[s].sound(sample.wrench + 6 * s)) return false;
-      }
     }
     if (!in_lanes_) side_by_side_.enter(before_);
     in_lanes_ = true;
-    side_by_side_.evaluate(first.q, first.qd);
-    side_by_side_.balance(first.tau, first.wrench, now);
+    side_by_side_.evaluate();
+    side_by_side_.balance(now);
     compare(side_by_side_.projected(), side_by_side_.e(), side_by_side_.inputs());
     side_by_side_.filter(now);
     side_by_side_.write(writer_.quality(), health, out);
@@ -295,10 +291,11 @@ class Observer {
 
   Health judge_state(const Sample& sample) const {
     const Health health = judge_all(sample.q, lower_.size()) | judge_all(sample.qd, lower_.size());
-    if (health != 0) return health;
+    return health != 0 ? health : judge_limits(sample.q);
+  }
+  Health judge_limits(const double* q) const {
     bool inside = true;
-    for (std::size_t j = 0; j < lower_.size(); ++j)
-      inside &= (sample.q[j] >= lower_[j]) & (sample.q[j] <= upper_[j]);
+    for (std::size_t j = 0; j < lower_.size(); ++j) inside &= (q[j] >= lower_[j]) & (q[j] <= upper_[j]);
     return inside ? 0 : kModelLimit;
   }
 

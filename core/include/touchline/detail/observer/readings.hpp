@@ -28,21 +28,19 @@ class JointReadings {
       viscous_.push_back(joint.viscous);
       if (joint.measured() && joint.rough()) rough_.push_back(j);
       if (joint.measured() && !joint.rest.empty()) learned_.push_back(j);
-      limits_.push_back(joint.measured() ? safe_limit(joint.range / std::fabs(joint.gain))
-                                         : kNoLimit);
+      const double range = joint.range / std::fabs(joint.gain);
+      limits_.push_back(joint.measured() ? safe_limit(range) : kNoLimit);
+      if (joint.measured()) limited_.push_back({j, safe_value(range)});
     }
     present_ = measured_;
   }
 
-  // The same for samples side by side, all of which are usable: `logged` (kLanes, n).
-  void read(const double* logged, const Lanes* q, const Lanes* qd, const Lanes* n_bar,
+  // The same for samples side by side, all of which are usable.
+  void read(const Lanes* logged, const Lanes* q, const Lanes* qd, const Lanes* n_bar,
             Lanes* u) const {
     const std::size_t n = slope_.size();
-    for (std::size_t j = 0; j < n; ++j) {
-      Lanes tau;
-      for (int k = 0; k < kLanes; ++k) set_lane(tau, k, logged[k * n + j]);
-      u[j] = slope_[j] * tau - offset_[j] - viscous_[j] * qd[j] - n_bar[j];
-    }
+    for (std::size_t j = 0; j < n; ++j)
+      u[j] = slope_[j] * logged[j] - offset_[j] - viscous_[j] * qd[j] - n_bar[j];
     for (std::size_t j : rough_) {
       for (int k = 0; k < kLanes; ++k) {
         const double friction = joints_[j].dry_friction(lane(qd[j], k));
@@ -54,9 +52,11 @@ class JointReadings {
         set_lane(u[j], k, lane(u[j], k) - joints_[j].rest(lane(q[j], k), lane(qd[j], k)));
     }
   }
-  // Are all torques of one sample usable and within their ranges?
-  bool sound(const double* logged) const {
-    return all_below(logged, limits_.data(), limits_.size());
+  // Are all torques of samples side by side usable and within their ranges?
+  bool sound(const Lanes* logged) const {
+    LaneMask sound = between(Lanes{}, -1.0, 1.0);
+    for (const Limited& of : limited_) sound &= between(logged[of.joint], -of.limit, of.limit);
+    return all_of(sound);
   }
 
   // Per joint: was its last torque usable?
@@ -103,6 +103,11 @@ class JointReadings {
   std::vector<char> measured_, present_;
   std::vector<double> slope_, offset_, viscous_;
   std::vector<std::uint64_t> limits_;
+  struct Limited {
+    std::size_t joint;
+    double limit;
+  };
+  std::vector<Limited> limited_;  // joints that are measured
   std::vector<std::size_t> rough_, learned_;  // joints with dry friction, with a learned rest
   bool incomplete_ = false;
 };
@@ -113,20 +118,21 @@ class SensorReading {
   explicit SensorReading(const SensorRow& sensor)
       : sensor_(sensor), usual_(sensor.six_axis() && !sensor.turned) {
     for (int i = 0; i < 6; ++i) limits_[i] = safe_limit(sensor.range[i]);
+    for (int i = 0; i < 6; ++i) safe_[i] = safe_value(sensor.range[i]);
   }
 
   // All axes, logged in those of the sensor?
   bool usual() const { return usual_; }
-  // Is a reading of such a sensor usable and within its range?
-  bool sound(const double* logged) const { return all_below(logged, limits_, 6); }
-  // Of such a sensor, for samples side by side that are sound; `stride`: from one to the next.
-  BasicSpatial<Lanes> read(const double* logged, std::size_t stride) const {
+  // Are readings of such a sensor, of samples side by side, usable and within its range?
+  bool sound(const Lanes* logged) const {
+    LaneMask sound = between(Lanes{}, -1.0, 1.0);
+    for (int i = 0; i < 6; ++i) sound &= between(logged[i], -safe_[i], safe_[i]);
+    return all_of(sound);
+  }
+  // Of such a sensor, for samples side by side that are sound.
+  BasicSpatial<Lanes> read(const Lanes* logged) const {
     Lanes w[6];
-    for (int i = 0; i < 6; ++i) {
-      Lanes v;
-      for (int k = 0; k < kLanes; ++k) set_lane(v, k, logged[k * stride + i]);
-      w[i] = sensor_.sign * v - sensor_.bias[i];
-    }
+    for (int i = 0; i < 6; ++i) w[i] = sensor_.sign * logged[i] - sensor_.bias[i];
     return touchline::load(w);
   }
 
@@ -164,6 +170,7 @@ class SensorReading {
   const SensorRow& sensor_;
   bool usual_;  // all axes, logged in those of the sensor
   std::uint64_t limits_[6];
+  double safe_[6];
 };
 
 }  // namespace touchline

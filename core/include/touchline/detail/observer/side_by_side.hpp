@@ -18,6 +18,7 @@
 #include "touchline/detail/observer/readings.hpp"
 #include "touchline/detail/observer/row.hpp"
 #include "touchline/detail/observer/terms.hpp"
+#include "touchline/sample.hpp"
 
 namespace touchline {
 
@@ -37,6 +38,7 @@ class SideBySide {
         wrenches_(wrenches),
         row_(row),
         q_(2 * joints.size()),
+        logged_(joints.size() + 6 * sensors.size()),
         terms_(terms.at().width()),
         terms_before_(terms_.size()),
         p_(channels.balances.size(), all_lanes(kNaN)),
@@ -47,7 +49,9 @@ class SideBySide {
         projected_(projections.room(), Lanes{}),
         inputs_(padded(channels.filters.size()), all_lanes(kNaN)),
         values_(inputs_.size(), kNaN),
-        keep_(kLanes * inputs_.size(), 0.0) {
+        keep_(inputs_.size(), 0.0),
+        poles_(inputs_.size(), Lanes{}),
+        news_(poles_) {
     projected_.back() = all_lanes(kNaN);
     possible_ = kLanes > 1;
     for (std::size_t s = 0; s < sensors.size(); ++s) {
@@ -59,17 +63,39 @@ class SideBySide {
   // Is there a way for this robot at all?
   bool possible() const { return possible_; }
 
-  // The terms of kLanes samples.
+  // The signals of kLanes samples, the first of which is `sample`. Are all usable, and within their
+  // ranges? Where a joint is outside the limits of the model is not looked at.
+  bool read(const Sample& sample) {
+    const std::size_t n = joints_.size(), w = 6 * sensors_.size();
+    gather(sample.q, n, n, q_.data());
+    gather(sample.qd, n, n, q_.data() + n);
+    gather(sample.tau, n, n, logged_.data());
+    gather(sample.wrench, w, w, logged_.data() + n);
+    LaneMask sound = between(Lanes{}, -1.0, 1.0);
+    for (const Lanes& x : q_) sound &= between(x, -kAbsurd, kAbsurd);
+    if (!all_of(sound) || !torques_.sound(logged_.data())) return false;
+    for (std::size_t s = 0; s < sensors_.size(); ++s) {
+      if (!wrenches_[s].sound(logged_.data() + n + 6 * s)) return false;
+    }
+    return true;
+  }
+  // Are all joints between these positions?
+  bool inside(const double* lower, const double* upper) const {
+    LaneMask inside = between(Lanes{}, -1.0, 1.0);
+    for (std::size_t j = 0; j < joints_.size(); ++j) inside &= within(q_[j], lower[j], upper[j]);
+    return all_of(inside);
+  }
+
+  // The terms of the samples that have been read.
+  void evaluate() {
+    terms_.swap(terms_before_);
+    model_.evaluate(q_.data(), q_.data() + joints_.size(), terms_.data());
+  }
   void evaluate(const double* q, const double* qd) {
     const std::size_t n = joints_.size();
-    for (std::size_t j = 0; j < n; ++j) {
-      for (int k = 0; k < kLanes; ++k) {
-        set_lane(q_[j], k, q[k * n + j]);
-        set_lane(q_[n + j], k, qd[k * n + j]);
-      }
-    }
-    terms_.swap(terms_before_);
-    model_.evaluate(q_.data(), q_.data() + n, terms_.data());
+    gather(q, n, n, q_.data());
+    gather(qd, n, n, q_.data() + n);
+    evaluate();
   }
   void copy_terms(int k, double* out) const {
     for (std::size_t i = 0; i < terms_.size(); ++i) out[i] = lane(terms_[i], k);
@@ -98,21 +124,21 @@ class SideBySide {
   }
 
   // After `evaluate`: momenta, known loads, innovations and what these do to the joints.
-  void balance(const double* tau, const double* wrench, const Instant* now) {
+  void balance(const Instant* now) {
     p_.swap(p_before_);
     u_.swap(u_before_);
     const TermsLayout& at = model_.at();
     const std::size_t n = at.joints;
-    std::copy_n(terms_.data() + at.joint_momentum(), n, p_.data());
-    torques_.read(tau, q_.data(), q_.data() + n, terms_.data() + at.joint_bias(), u_.data());
+    for (std::size_t j = 0; j < n; ++j) p_[j] = terms_[at.joint_momentum() + j];
+    torques_.read(logged_.data(), q_.data(), q_.data() + n, terms_.data() + at.joint_bias(), u_.data());
     for (std::size_t s = 0; s < at.sensors; ++s) {
       const Lanes* terms = terms_.data() + at.sensor(s);
       const std::size_t first = row(channels_.sensor(s));
-      const BasicSpatial<Lanes> reading = wrenches_[s].read(wrench + 6 * s, 6 * at.sensors);
+      const BasicSpatial<Lanes> reading = wrenches_[s].read(logged_.data() + n + 6 * s);
       const BasicSpatial<Lanes> weight = sensors_[s].gravity_compensated
                                              ? BasicSpatial<Lanes>{}
                                              : load(terms + TermsLayout::kWeight);
-      std::copy_n(terms + TermsLayout::kMomentum, 6, p_.data() + first);
+      store(load(terms + TermsLayout::kMomentum), p_.data() + first);
       store(wrench_to_parent(load_pose(terms + TermsLayout::kPose), reading) + weight,
             u_.data() + first);
     }
@@ -136,19 +162,25 @@ class SideBySide {
   // the values of one sample.
   void filter(const Instant* now) {
     const std::size_t size = inputs_.size();
-    for (int k = 0; k < kLanes; ++k)
-      channels_.filters.write_poles(now[k].time - now[k].before, keep_.data() + k * size);
-    for (std::size_t i = 0; i < size; i += kLanes) {
-      Lanes* of_rows = inputs_.data() + i;
-      transpose(of_rows);
-      Lanes value = load_lanes(values_.data() + i);
+    if (channels_.filters.alike()) {
+      Lanes keep[kLanes], take[kLanes];
       for (int k = 0; k < kLanes; ++k) {
-        const Lanes keep = load_lanes(keep_.data() + k * size + i);
-        value = keep * value + (1.0 - keep) * of_rows[k];
-        of_rows[k] = value;
+        keep[k] = all_lanes(channels_.filters.only_pole(now[k].time - now[k].before));
+        take[k] = 1.0 - keep[k];
       }
-      store_lanes(value, values_.data() + i);
+      for (std::size_t i = 0; i < size; i += kLanes) filter(i, keep, take);
+      return;
     }
+    for (int k = 0; k < kLanes; ++k) {
+      double* keep = keep_.data();
+      channels_.filters.write_poles(now[k].time - now[k].before, keep);
+      for (std::size_t i = 0; i < size; i += kLanes) {
+        poles_[i + k] = load_lanes(keep + i);
+        news_[i + k] = 1.0 - poles_[i + k];
+      }
+    }
+    for (std::size_t i = 0; i < size; i += kLanes)
+      filter(i, poles_.data() + i, news_.data() + i);
   }
 
   // The rows of all samples. Blocks of kLanes columns may reach into those that follow, which are
@@ -171,10 +203,12 @@ class SideBySide {
     put(sensor_wrenches_.data(), 6 * row_.sensors, out + row_.sensor_wrench());
     put(segment_wrenches_.data(), 6 * row_.segments, out + row_.segment_wrench());
     put(e_.data() + row(channels_.segment(0)), 6 * row_.segments, out + row_.segment_innovation());
+    const std::size_t size = quality.size(), blocks = size / kLanes * kLanes;
     for (int k = 0; k < kLanes; ++k) {
-      double* to = out + k * width;
-      std::copy(quality.begin(), quality.end(), to + row_.joint_settled());
-      to[row_.health()] = static_cast<double>(health[k]);
+      double *row = out + k * width, *to = row + row_.joint_settled();
+      for (std::size_t i = 0; i < blocks; i += kLanes) store_lanes(load_lanes(&quality[i]), to + i);
+      for (std::size_t i = blocks; i < size; ++i) to[i] = quality[i];
+      row[row_.health()] = static_cast<double>(health[k]);
     }
   }
 
@@ -182,18 +216,28 @@ class SideBySide {
   static std::size_t padded(std::size_t rows) { return (rows + kLanes - 1) / kLanes * kLanes; }
   std::size_t row(std::size_t balance) const { return channels_.balances.group(balance).first; }
 
+  // kLanes rows of the filters from row i on, with the poles of each sample and what is left to 1.
+  void filter(std::size_t i, const Lanes* keep, const Lanes* take) {
+    Lanes* of_rows = inputs_.data() + i;
+    transpose(of_rows);
+    Lanes value = load_lanes(values_.data() + i);
+    for (int k = 0; k < kLanes; ++k) of_rows[k] = value = keep[k] * value + take[k] * of_rows[k];
+    store_lanes(value, values_.data() + i);
+  }
+
   // A segment's momentum and load: those of its sensor without those of the next ones outboard.
   void add_segment(std::size_t g) {
     const Segment& segment = layout_.segments[g];
     if (segment.sensor < 0) return;
     const std::size_t to = row(channels_.segment(g)), from = row(channels_.sensor(segment.sensor));
-    std::copy_n(p_.data() + from, 6, p_.data() + to);
-    std::copy_n(u_.data() + from, 6, u_.data() + to);
+    BasicSpatial<Lanes> p = load(p_.data() + from), u = load(u_.data() + from);
     for (int t : segment.successors) {
       const std::size_t next = row(channels_.sensor(t));
-      for (int i = 0; i < 6; ++i) p_[to + i] -= p_[next + i];
-      for (int i = 0; i < 6; ++i) u_[to + i] -= u_[next + i];
+      p = p - load(p_.data() + next);
+      u = u - load(u_.data() + next);
     }
+    store(p, p_.data() + to);
+    store(u, u_.data() + to);
   }
 
   // Row i of the filters, of all samples.
@@ -227,12 +271,16 @@ class SideBySide {
   RowLayout row_;
   bool possible_ = false;
   std::vector<Lanes> q_;  // positions, then velocities
+  std::vector<Lanes> logged_;  // torques, then wrenches
   std::vector<Lanes> terms_, terms_before_;
   std::vector<Lanes> p_, u_, p_before_, u_before_, e_;  // as in the balances
   std::vector<Lanes> projected_, inputs_;
   std::vector<Lanes> segment_wrenches_ = std::vector<Lanes>(6 * row_.segments);
   std::vector<Lanes> sensor_wrenches_ = std::vector<Lanes>(6 * row_.sensors);
-  std::vector<double> values_, keep_;  // of the filters: one per row, and per sample and row
+  // Of the filters: values and poles by row; per kLanes rows the poles of each sample, and what is
+  // left to 1.
+  std::vector<double> values_, keep_;
+  std::vector<Lanes> poles_, news_;
 };
 
 }  // namespace touchline

@@ -51,7 +51,7 @@ class Explanations {
       for (int c = 0; c < Ask::kCourses; ++c)
         courses_.emplace_back(surfaces_.bodies(g).size(), surfaces_.all().size());
     }
-    first_.resize(most);
+    turns_.resize(most);
     candidates_.resize(kMost);
     missed_.resize(surfaces_.all().size(), -1);
   }
@@ -69,6 +69,7 @@ class Explanations {
   template <class MeanOf>
   void find(int g, MeanOf&& mean, const Doubt& doubt, Measurement& measurement, const Ask& ask) {
     count_ = used_ = units_ = 0;
+    all_ = left_ = measurement.has_wrench() ? ask.units : Ask::kAll;
     complete_ = true;
     course_ = &courses_[g * Ask::kCourses + ask.course];
     best_ = std::numeric_limits<double>::infinity();
@@ -131,6 +132,8 @@ class Explanations {
  private:
   // Room: for candidates, for starts on a surface, for faces beside a line.
   static constexpr int kMost = 192, kStarts = 3, kPassed = 4;
+  static constexpr int kSome = 150;   // units of work on a point beside the line: some ten trials
+  static constexpr int kNearest = 2;  // units of work: a box beside a line takes as long as so many others
   static constexpr double kRounding = 1e-9;  // a part of costs and weights, far above what they err by
 
   // Can any point explain, by the bounds that each body sets: the misfit of the best wrench at all,
@@ -149,11 +152,19 @@ class Explanations {
 
   // A point that a search has ended at, in the frame of its node.
   struct Start {
-    int surface;
-    Vec3 point, normal;
+    int surface = -1;
+    Vec3 point{}, normal{};
     bool waits = false;  // has it yet to be improved?
     bool moved = false;  // has it been, in this sample, and where to?
     Vec3 next_point{}, next_normal{};
+  };
+
+  // A look at the faces of a body that is not at its end; body -1: there is none. Which of its surfaces
+  // is at hand, and how far into it; the best so far, in the frame of the node.
+  struct Look {
+    int body = -1, surface = 0, count = 0;
+    Mesh::Walk walk;
+    Start best[kPassed];
   };
 
   // What is left of earlier searches for one purpose.
@@ -165,6 +176,7 @@ class Explanations {
     void forget() {
       starts.clear();
       std::fill(due.begin(), due.end(), 0);
+      look.body = -1;
       for (Start& start : missed) start.surface = -1;
       complete = false;
     }
@@ -185,6 +197,7 @@ class Explanations {
 
     std::vector<Start> starts;
     std::vector<char> due;      // per body: has it yet to be searched?
+    Look look;
     std::vector<Start> missed;  // per surface that a line misses: the best point; surface -1: not known
     bool complete = false;      // has all been looked at once, that may explain?
   };
@@ -193,21 +206,32 @@ class Explanations {
   // wait in the last sample comes first. Joint torques alone leave so much open that a part of a search
   // is no use.
   void search(const Ask& ask, bool has_wrench) {
-    const int all = left_ = has_wrench ? ask.units : Ask::kAll;
     const bool was_cut = course_->cut();
     waited_ = course_->waits();
+    const bool anew = !ask.again && !was_cut;
     for (Start& s : course_->starts) s.moved = false;
-    std::copy(course_->due.begin(), course_->due.end(), first_.begin());
-    for (const bool due : {true, false}) {
+    for (int i = 0; i < used_; ++i) turns_[i] = turn_of(views_[i]);
+    for (const Turn turn : {Turn::begun, Turn::due, Turn::waits, Turn::last}) {
       for (int i = 0; i < used_; ++i) {
-        View& view = views_[i];
-        if ((first_[view.body] != 0) == due) search(view, due || !ask.again, has_wrench);
+        if (turns_[i] == turn) search(views_[i], anew || turn < Turn::waits, has_wrench);
       }
     }
-    units_ = all - left_;
+    units_ = all_ - left_;
     const bool cut = course_->cut();
     if (was_cut || cut) course_->move_on();
     complete_ = course_->complete = course_->complete || !cut;
+  }
+
+  // When a body's turn is: one that was begun with, has yet to be searched, or has points that have yet to
+  // be improved comes before the others.
+  enum class Turn : char { begun, due, waits, last };
+
+  Turn turn_of(const View& view) const {
+    if (course_->look.body == view.body) return Turn::begun;
+    if (course_->due[view.body]) return Turn::due;
+    const auto waits = [&](const Start& s) { return s.waits && surfaces_[s.surface].node == view.node; };
+    const auto& all = course_->starts;
+    return std::any_of(all.begin(), all.end(), waits) ? Turn::waits : Turn::last;
   }
 
   // `anew`: or does what has been found before serve?
@@ -216,6 +240,7 @@ class Explanations {
     due = 0;
     if (!(view.floor < best_ + settings_.relevant)) {
       if (anew) drop_starts(view);
+      give_up(view);
       return;
     }
     if (view.line) {
@@ -238,7 +263,7 @@ class Explanations {
     const ForceLine line = view.later_line();
     const int before = count_;
     for (int s : *view.surfaces) {
-      surfaces_.entries(s, line, [&](int surface, const Vec3& point, const Vec3& normal, double) {
+      const auto entry = [&](int surface, const Vec3& point, const Vec3& normal, double) {
         if (count_ == kMost) return;
         Candidate& k = fresh(view, surface);
         k.point = point;
@@ -248,7 +273,8 @@ class Explanations {
         view.steep = view.steep || k.fit.cone < settings_.grazing;
         view.met = true;
         if (!known(before, 1e-7)) keep();  // an edge is met twice
-      });
+      };
+      surfaces_.entries(s, line, entry);
     }
   }
 
@@ -257,10 +283,11 @@ class Explanations {
   void beside(View& view, bool anew) {
     const int found = count_, own = index(view);
     const bool near = view.floor < best_ + settings_.face_sigmas * settings_.face_sigmas;
-    const bool later = anew && near && left_ <= 0;
+    if (!near) give_up(view);
+    const bool searched = anew && near && look_around(view);
+    const bool later = anew && near && !searched;
     if (later) course_->due[view.body] = 1;
     if (anew && !later) drop_starts(view);
-    const bool searched = anew && near && !later;
     const bool passed = searched ? pass(view)
                                  : near && revisit(view, settings_.fine, settings_.faces_apart);
     for (int i = 0; searched && i < found; ++i) {  // what is entered now may be missed next
@@ -285,18 +312,28 @@ class Explanations {
     return k;
   }
 
-  // The faces that the line passes within the noise and at no grazing angle, apart from its entries
-  // and from each other: the best point on each. Returns whether there are any.
-  bool pass(View& view) {
+  // Nothing of a body is waited for that cannot explain by now.
+  void give_up(const View& view) {
+    if (course_->look.body == view.body) course_->look.body = -1;
+    for (Start& s : course_->starts) s.waits = s.waits && surfaces_[s.surface].node != view.node;
+  }
+
+  // Looks for the faces that the line passes within the noise and at no grazing angle, apart from its
+  // entries and from each other: the best point on each is in `passed_`. Returns whether it has come to
+  // the end; if not, the next sample goes on.
+  bool look_around(const View& view) {
+    passes_ = 0;
+    if (left_ <= 0) return false;
     const ForceLine line = view.later_line();
     const auto nearest = [&](const Vec3& p) {
       return line.at(dot(p - line.origin, line.direction));
     };
     double G[9];
     const Vec3 middle = view.earlier(nearest(posture_.pose(view.node).p));
-    if (!fitter_.place_metric(view.q, middle, view.wrench.linear, G)) return false;
-    Candidate starts[kPassed];
-    int found = 0;
+    if (!fitter_.place_metric(view.q, middle, view.wrench.linear, G)) {
+      if (course_->look.body == view.body) course_->look.body = -1;
+      return true;
+    }
     Beside metric = across(G, line.direction);
     const double limit = std::min(settings_.farthest, settings_.face_sigmas * widest(metric));
     // Weights are as exact as the larger one.
@@ -307,26 +344,53 @@ class Explanations {
       const double left = (1.0 + kRounding) * worth - view.floor;
       return cosine < 1.0 ? left - (1.0 - kRounding) * fitter_.cone_cost(cosine + kRounding) : left;
     };
-    for (int s : *view.surfaces) {
-      int looked = 0;
-      const auto offer = [&](const SurfacePoint& p) {
-        const double chi2 = view.floor + squared(G, p.point - nearest(p.point));
-        if (!(chi2 < worth)) return;
-        Candidate k;
-        k.fit.chi2 = chi2;
-        k.fit.cone = fitter_.cone_cost(-dot(p.normal, line.direction));
-        if (!(k.fit.cost() < worth)) return;
-        k.surface = s;
-        k.view = index(view);
-        k.point = p.point;
-        k.normal = p.normal;
-        if (entered(k)) return;
-        found = insert(starts, kPassed, found, k, settings_.faces_apart);
-        worth = std::min(worth, beaten(starts, kPassed, found));
-      };
-      surfaces_.around(s, line, metric, limit, fitter_.steepest(), looked, most, offer);
-      left_ -= looked;
+    const auto offer = [&](int s, const Vec3& point, const Vec3& normal) {
+      const double chi2 = view.floor + squared(G, point - nearest(point));
+      if (!(chi2 < worth)) return;
+      Candidate k;
+      k.fit.chi2 = chi2;
+      k.fit.cone = fitter_.cone_cost(-dot(normal, line.direction));
+      if (!(k.fit.cost() < worth)) return;
+      k.surface = s;
+      k.view = index(view);
+      k.point = point;
+      k.normal = normal;
+      if (entered(k)) return;
+      passes_ = insert(passed_, kPassed, passes_, k, settings_.faces_apart);
+      worth = std::min(worth, beaten(passed_, kPassed, passes_));
+    };
+    Look& look = course_->look;
+    if (look.body != view.body) look = Look{};
+    for (int i = 0; i < look.count; ++i) {
+      const Start& best = look.best[i];
+      offer(best.surface, surfaces_.to_world(best.point, view.node),
+            surfaces_.turn_to_world(best.normal, view.node));
     }
+    const int surfaces = static_cast<int>(view.surfaces->size());
+    for (; look.surface < surfaces; ++look.surface, look.walk = Mesh::Walk{}) {
+      const int s = (*view.surfaces)[look.surface];
+      surfaces_.around(s, line, metric, limit, fitter_.steepest(), look.walk, left_, most,
+                       [&](const SurfacePoint& p) { offer(s, p.point, p.normal); });
+      if (!look.walk.done()) break;
+    }
+    if (look.surface == surfaces) {
+      look.body = -1;
+      return true;
+    }
+    for (int i = 0; i < count_; ++i) {  // what is entered now may be missed in the next sample
+      if (candidates_[i].view == index(view))
+        passes_ = insert(passed_, kPassed, passes_, candidates_[i], settings_.faces_apart);
+    }
+    look.body = view.body;
+    look.count = passes_;
+    for (int i = 0; i < passes_; ++i) look.best[i] = start_of(view, passed_[i]);
+    return false;
+  }
+
+  // Improves what a look around has found. Returns whether that is anything.
+  bool pass(View& view) {
+    const Candidate* const starts = passed_;
+    const int found = passes_;
     for (int i = 0; i < found && count_ < kMost; ++i) {
       place(view, starts[i].surface, starts[i].point, starts[i].normal);
       const bool waits = left_ <= 0;
@@ -367,10 +431,14 @@ class Explanations {
   // `waits`: has it yet to be improved?
   void remember(const View& view, const Candidate& k, bool waits) {
     if (course_->starts.size() == kMost || !(k.fit.cost() < best_ + settings_.relevant)) return;
-    Start start{k.surface, surfaces_.to_node(k.point, view.node),
-                surfaces_.turn_to_node(k.normal, view.node)};
+    Start start = start_of(view, k);
     start.waits = waits;
     course_->starts.push_back(start);
+  }
+
+  Start start_of(const View& view, const Candidate& k) const {
+    return {k.surface, surfaces_.to_node(k.point, view.node),
+            surfaces_.turn_to_node(k.normal, view.node)};
   }
 
   // Is there an entry of the line nearby that explains as well?
@@ -410,7 +478,13 @@ class Explanations {
   void miss(View& view) {
     const ForceLine line = view.later_line();
     for (int s : *view.surfaces) {
-      const SurfacePoint p = surfaces_.nearest(s, line, settings_.farthest, missed_[s]);
+      if (left_ <= 0) {
+        miss_later(view, s);
+        continue;
+      }
+      int looked = 0;
+      const SurfacePoint p = surfaces_.nearest(s, line, settings_.farthest, missed_[s], looked);
+      left_ -= kNearest * looked;
       if (p.face < 0 || count_ == kMost) continue;
       missed_[s] = p.place;
       // At an edge the normal is that of either side: what counts is the wrench alone.
@@ -421,21 +495,25 @@ class Explanations {
     }
   }
 
-  // From the candidate at hand the best explanation nearby; without work left, the one that was found
-  // last.
+  // Without work left, what was found last on a surface stands.
+  void miss_later(const View& view, int surface) {
+    const Start& best = course_->missed[surface];
+    if (best.surface < 0) course_->due[view.body] = 1;
+    if (best.surface < 0 || count_ == kMost) return;
+    place(view, surface, surfaces_.to_world(best.point, view.node),
+          surfaces_.turn_to_world(best.normal, view.node));
+    keep();
+  }
+
+  // From the candidate at hand the best explanation nearby: some work there is for it, once a search has
+  // come so far.
   void improve_missed(const View& view, Start& best) {
     Candidate& k = candidates_[count_];
-    if (left_ > 0) {
-      refinement_.improve(view, k, left_);
-      best.surface = k.surface;
-      best.point = surfaces_.to_node(k.point, view.node);
-      best.normal = surfaces_.turn_to_node(k.normal, view.node);
-    } else if (best.surface >= 0) {
-      const Candidate nearest = k;
-      place(view, best.surface, surfaces_.to_world(best.point, view.node),
-            surfaces_.turn_to_world(best.normal, view.node));
-      if (!(k.fit.cost() < nearest.fit.cost())) k = nearest;
-    }
+    const int more = std::max(0, kSome - left_);
+    left_ += more;
+    refinement_.improve(view, k, left_);
+    left_ -= more;
+    best = start_of(view, k);
   }
 
   void place(const View& view, int surface, const Vec3& point, const Vec3& normal,
@@ -483,12 +561,15 @@ class Explanations {
   std::vector<Candidate> candidates_;
   std::vector<int> missed_;  // per surface: the triangle that a line has missed least, last; -1: none
   std::vector<Course> courses_;  // per segment and purpose
-  // Of the search at hand: which it is, units of work that are left, and that it took; did starts wait
-  // before it, and which bodies were due; is it complete?
+  // Of the search at hand: which it is, units of work in all, left, and that it took; did starts wait
+  // before it, and is it complete? When the turn of each view is.
   Course* course_ = nullptr;
-  int left_ = 0, units_ = 0;
+  int all_ = 0, left_ = 0, units_ = 0;
   bool waited_ = false, complete_ = true;
-  std::vector<char> first_;
+  std::vector<Turn> turns_;
+  // Of the body at hand: the faces that the line passes.
+  Candidate passed_[kPassed];
+  int passes_ = 0;
   int used_ = 0, count_ = 0;
   double best_ = 0.0;
 };

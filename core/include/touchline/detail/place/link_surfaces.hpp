@@ -74,30 +74,32 @@ class LinkSurfaces {
   }
 
   // The same for a line; `near`: the place of a triangle that may be near, or -1.
-  SurfacePoint nearest(int surface, const ForceLine& line, double limit, int near) const {
+  SurfacePoint nearest(int surface, const ForceLine& line, double limit, int near,
+                       int& looked) const {
     const int node = surfaces_[surface].node;
-    return in_world(surfaces_[surface].mesh.nearest_to_line(to_node(line, node), limit, near), node);
+    const Mesh& mesh = surfaces_[surface].mesh;
+    return in_world(mesh.nearest_to_line(to_node(line, node), limit, near, looked), node);
   }
 
   // Calls `visit(SurfacePoint)`, in world, for the point nearest to a line of each triangle that is
   // nearer to it than `limit` and stands against it: at a cosine above `steep`. Left out is what is
-  // beside it by a weighed square of `most(cosine)` or more. `looked`: see `Mesh`.
+  // beside it by a weighed square of `most(cosine)` or more. `walk`, `left`: see `Mesh`.
   template <class Most, class Visit>
   void around(int surface, const ForceLine& line, const Beside& beside, double limit, double steep,
-              int& looked, Most&& most, Visit&& visit) const {
+              Mesh::Walk& walk, int& left, Most&& most, Visit&& visit) const {
     const int node = surfaces_[surface].node;
     const Beside own{{turn_to_node(beside.axis[0], node), turn_to_node(beside.axis[1], node)},
                      beside.weight};
-    surfaces_[surface].mesh.around(to_node(line, node), own, limit, steep, looked, most,
+    surfaces_[surface].mesh.around(to_node(line, node), own, limit, steep, walk, left, most,
                                    [&](const SurfacePoint& p) { visit(in_world(p, node)); });
   }
 
   // Calls `visit(surface, point, normal, t)` for each entry of a line into a surface; where it is
-  // graspable, for each exit too.
+  // graspable, for each exit too. Returns what it took: see `Mesh`.
   template <class Visit>
-  void entries(int surface, const ForceLine& line, Visit&& visit) const {
+  int entries(int surface, const ForceLine& line, Visit&& visit) const {
     const int node = surfaces_[surface].node;
-    surfaces_[surface].mesh.crossings(to_node(line, node), [&](const Crossing& c) {
+    return surfaces_[surface].mesh.crossings(to_node(line, node), [&](const Crossing& c) {
       const Vec3 normal = turn_to_world(c.normal, node);
       if (surfaces_[surface].graspable || dot(normal, line.direction) < 0.0)
         visit(surface, line.at(c.t), normal, c.t);

@@ -68,10 +68,10 @@ struct PlaceTuning {
   double body_reach = 0.15;
 
   // ---- The search ----
-  // Work in one sample on the places of newcomers beside known contacts. A unit is a box of a mesh that
-  // is looked into, some 0.06 us, and a point that is tried is 10 to 30. What a sample has no work left
-  // for, the next ones do. Half: weak newcomers are searched for over more samples. Double: samples are late.
-  int search_work = 600;
+  // Work in one sample on the places of contacts, of all segments together. A unit is a box of a mesh that
+  // is looked into, some 0.05 us, and a point that is tried is 10 to 30. What a sample has no work left
+  // for, the next ones do. Half: weak contacts are searched for over more samples. Double: samples are late.
+  int search_work = 1000;
   // chi2 above the best beyond which an explanation weighs nothing: e^-25. Half: e^-12, which may
   // be seen in a list. Double: time, for nothing.
   double cost_window = 50.0;
