@@ -123,11 +123,11 @@ def test_a_push_that_begins_while_an_error_creeps_over_its_limit_is_no_error():
 
 
 def test_of_slow_samples_what_trembles_after_a_strong_touch_does_not_prolong_it():
-    # 15 Hz, touches of 0.4 s. For 0.3 s after each the base trembles by 0.8 thresholds: by more than
-    # the half of one that an event of quick samples must fall below.
+    # 15 Hz, touches of 0.4 s. For 0.3 s after each the base trembles by 0.8 thresholds: by more
+    # than the half of one that an event of quick samples must fall below.
     period, begins = 1.0 / 15.0, 2.0 + 0.8 * np.arange(10)
     time = period * np.arange(160)
-    rest, touch = signals(ROBOT, Q, [], 0.001, None), signals(ROBOT, Q, [pushed((-1, 1))], 0.001, None)
+    rest, touch = (signals(ROBOT, Q, of, 0.001, None) for of in ([], [pushed((-1.0, 1.0))]))
     pipeline = Pipeline(ROBOT, period=period, torque_error=0.0)
     (threshold,) = (row.contact for row in pipeline.thresholds.rows if row.component == 0)
     since = np.min(np.where(time >= begins[:, None], time - begins[:, None], np.inf), axis=0)
