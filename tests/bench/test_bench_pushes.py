@@ -80,6 +80,13 @@ def test_two_pushes_of_an_arm_that_is_as_told_are_found_and_placed():
     assert tally.extra == tally.sure_wrong == tally.far == tally.idle == 0
 
 
+def test_pushes_that_joints_alone_feel_are_not_taken_for_friction():
+    """Each was learned as friction of some slow joint: it ended at once, and later ones were lost."""
+    tally = run(Part("panda-torques", "bias 2 N", 1000, 9.0))
+    assert tally.pushes == tally.found == tally.held == tally.cleared == 3
+    assert tally.extra == 0
+
+
 def test_what_is_wrong_is_so_of_the_arm_or_of_its_readings():
     right = play(Part("sara", "nothing", 1, 3.0))[1]
     heavy = play(Part("sara", "payload 0.3 kg", 1, 3.0))[1]
