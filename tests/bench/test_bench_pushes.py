@@ -81,7 +81,7 @@ def test_two_pushes_of_an_arm_that_is_as_told_are_found_and_placed():
 
 
 def test_pushes_that_joints_alone_feel_are_not_taken_for_friction():
-    """Each was learned as friction of some slow joint: it ended at once, and later ones were lost."""
+    """Each was learned as friction of a slow joint: it ended at once, and later ones were lost."""
     tally = run(Part("panda-torques", "bias 2 N", 1000, 9.0))
     assert tally.pushes == tally.found == tally.held == tally.cleared == 3
     assert tally.extra == 0

@@ -50,13 +50,18 @@ class FrictionSeen {
   }
 
   // May friction be what row i is off its baseline by? Only of a joint whose way has changed since then,
-  // and against that change. What comes within the last moments must do so with the joint's way.
+  // and against that change.
   bool explains(std::size_t i) const {
+    const double turn = joints_[i].now - joints_[i].base;
+    return !rows_.of_wrench(i) && std::fabs(turn) >= tuning_.friction_turned && off(i) * turn <= 0.0;
+  }
+  // And how it begins? What comes within the last moments must do so with the joint's way, unless the
+  // joint has stood: it breaks away before it is seen to move.
+  bool explains_onset(std::size_t i) const {
+    if (!explains(i)) return false;
     const Joint& joint = joints_[i];
-    const double turn = joint.now - joint.base;
-    if (rows_.of_wrench(i) || std::fabs(turn) < tuning_.friction_turned || off(i) * turn > 0.0)
-      return false;
-    if (offsets_.quick(i) < offsets_.creep(i)) return true;
+    const bool stood = std::fabs(joint.trend) < kStood;
+    if (stood || offsets_.quick(i) < offsets_.creep(i)) return true;
     const double change = rows_.samples[i].residual - offsets_.trend(i), lately = joint.now - joint.trend;
     const double least = kAsQuick * tuning_.creep_share * std::fabs(joint.trend - joint.base);
     return change * lately < 0.0 && std::fabs(lately) >= least;
@@ -83,6 +88,8 @@ class FrictionSeen {
   // Of the part by which a row changes quickly, no unit: other errors come beside friction, and the way
   // may change by half of it in the same time.
   static constexpr double kAsQuick = 0.5;
+  // Of its friction, no unit: less of it has come of a joint that stands.
+  static constexpr double kStood = 0.5;
 
   struct Joint {
     bool started = false;

@@ -198,7 +198,7 @@ class SegmentLevels {
     for (const std::size_t i : rows_.of(g)) {
       if (rows_.shares[i] < std::min(1.0, now.peak)) continue;
       slow = slow && std::fabs(rows_.samples[i].speed) < tuning_.reversal_speed &&
-             friction_.explains(i);
+             friction_.explains_onset(i);
       creeps = creeps && offsets_.quick(i) < offsets_.creep(i);
     }
     return slow ? Origin::reversal : creeps ? Origin::creep : Origin::push;
