@@ -257,6 +257,81 @@ def imperfect(
     return 0
 
 
+def pushes(
+    *,
+    arms: tuple[Literal["sara", "sara-full", "ur5", "panda", "panda-torques", "ur10"], ...] = (
+        "sara",
+        "sara-full",
+        "ur5",
+        "panda",
+        "panda-torques",
+    ),
+    wrong: tuple[
+        Literal[
+            "nothing",
+            "masses 2 %",
+            "masses 5 %",
+            "payload 0.3 kg",
+            "friction 1 Nm",
+            "bias 2 N",
+        ],
+        ...,
+    ] = (
+        "nothing",
+        "masses 2 %",
+        "masses 5 %",
+        "payload 0.3 kg",
+        "friction 1 Nm",
+        "bias 2 N",
+    ),
+    seeds: int = 1,
+    first: int = 0,
+    seconds: float = 60.0,
+    processes: int = 1,
+) -> int:
+    """Arms that move, are not as told, and are pushed every three seconds: what is said of it.
+
+    Example: touchline bench pushes --arms sara ur5 --seeds 3 --processes 4
+
+    Nothing is calibrated. What an arm takes for its own doing after one push decides what it makes
+    of the next. Random pushes of 8 to 40 N last 0.2 to 1.2 s, and one event belongs to one push.
+    Each line counts:
+
+    found: pushes that have an event of their own.
+
+    extra: events beyond these.
+
+    placed, no body, right body: found ones that are located, that have no body, or the pushed one.
+
+    sure wrong: events that name a body with probability 0.9 or more that is not pushed.
+
+    far: events located more than 5 cm off, or where nothing touches.
+
+    held: found ones that last until the release.
+
+    cleared: pushes 0.3 s after which all has ended.
+
+    idle: the share of the time without a touch that is in contact.
+
+    Args:
+        arms: Arms of the localization benchmark, or ur5; all but sara and sara-full need the
+            package example-robot-data. Only panda-torques has no force-torque sensor.
+        wrong: What is wrong with them.
+        seeds: Recordings of each line; each takes some ten seconds.
+        first: The first of their seeds.
+        seconds: Length of each recording [s].
+        processes: So many work at a time.
+    """
+    from touchline.bench.pushes.run import main
+    from touchline.numbers import check_least
+
+    check_least(1, seeds=seeds, processes=processes)
+    check_least(0, first=first)
+    check_least(3, seconds=seconds)
+    main(arms, wrong, seeds, first, seconds, processes)
+    return 0
+
+
 def calibrated(
     *, arms: tuple[str, ...] = ("sara", "panda", "ur5"), runs: int = 3, seed: int = 0
 ) -> int:
@@ -582,6 +657,7 @@ BENCHMARKS: dict[str, Callable[..., int]] = {
     "detection": detection,
     "check": check,
     "imperfect": imperfect,
+    "pushes": pushes,
     "calibrated": calibrated,
     "identify": identify,
     "real": real,

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from touchline.arrays import Array
+from touchline.model.mechanism import Mechanism
 from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot
 from touchline.simulation.control import (
@@ -38,6 +39,7 @@ class Run:
         control: rate of the controller [Hz]; default: that of the physics.
         noise: of the sensors; None: ideal sensors.
         model_error: 1 sigma of the relative error of the plant's inertias.
+        arm: what moves; None: the robot as it is told.
     """
 
     seed: int = 0
@@ -46,6 +48,7 @@ class Run:
     control: float | None = None
     noise: SensorNoise | None = None
     model_error: float = 0.0
+    arm: Mechanism | None = None
 
 
 def simulate(
@@ -81,7 +84,7 @@ def simulate(
 
 def make_plant(robot: Robot, settings: Run, **options: Any) -> Plant:
     """The plant with the settings' rate and errors of the model."""
-    mechanism = robot.mechanism
+    mechanism = settings.arm or robot.mechanism
     if settings.model_error:
         rng = np.random.default_rng([settings.seed, 2])
         mechanism = perturbed(mechanism, settings.model_error, rng)

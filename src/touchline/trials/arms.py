@@ -28,6 +28,19 @@ class Tier:
 TIERS = (Tier(0.0, 0.0, 0.0), Tier(0.05, 0.01, 0.05), Tier(0.2, 0.05, 0.1), Tier(0.5, 0.2, 0.3))
 
 
+def described_arm(name: str) -> Robot:
+    """An arm with the noise figures of its own description.
+
+    Args:
+        name: one of `ARMS`, or of another file beside theirs.
+
+    Raises:
+        InputError: if the package with the arm's model is not installed.
+    """
+    file = FILES / f"{name}.yaml"
+    return load_robot(file if file.exists() else name)
+
+
 def load_arm(name: str, tier: int) -> Robot:
     """An arm whose description says exactly how noisy its sensors are in the benchmark.
 
@@ -38,8 +51,7 @@ def load_arm(name: str, tier: int) -> Robot:
     Raises:
         InputError: if the package with the arm's model is not installed.
     """
-    file = FILES / f"{name}.yaml"
-    robot = load_robot(file if file.exists() else name)
+    robot = described_arm(name)
     noise = TIERS[tier]
     n = len(robot.joint_names)
     axes = (noise.force,) * 3 + (noise.moment,) * 3

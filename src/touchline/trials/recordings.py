@@ -14,6 +14,7 @@ from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scenario import scripted
 from touchline.simulation.scene import Run
 from touchline.simulation.touchable import SurfacePoint, TouchableSurface, structure_links
+from touchline.simulation.truth import Simulated
 
 ROBOTS = ("sara", "sara-full", "ur5", "panda")
 SECONDS, SPEED, FORCE, MODEL_ERROR = 2.4, 0.5, 25.0, 0.02  # s, rad/s, N
@@ -94,12 +95,26 @@ def record(robot: Robot, seed: int, pushed: bool = True, seconds: float = SECOND
 
 
 def record_pushes(robot: Robot, seed: int, seconds: float) -> tuple[Samples, int]:
-    """The arm swings and is pushed every few seconds, by forces, times and rises at random.
+    """The arm swings and is pushed every few seconds.
 
     Returns the samples, and how many pushes there are.
     """
-    rng = np.random.default_rng([seed, 12])
     settings = Run(seed=seed, noise=SensorNoise(), model_error=MODEL_ERROR, physics=2000.0)
+    simulated, pushes = push_often(robot, settings, seconds)
+    return simulated.samples, len(pushes)
+
+
+def push_often(
+    robot: Robot, settings: Run, seconds: float
+) -> tuple[Simulated, list[ScriptedContact]]:
+    """The arm swings and is pushed every few seconds, by forces, times and rises at random.
+
+    Args:
+        robot: as told.
+        settings: its seed is that of all that is random.
+        seconds: duration.
+    """
+    rng = np.random.default_rng([settings.seed, 12])
     free = scripted(robot, [], seconds, SPEED, settings).samples
     pushes = []
     for begin in np.arange(1.0, seconds - LASTS[1] - 0.1, EVERY):
@@ -108,7 +123,7 @@ def record_pushes(robot: Robot, seed: int, seconds: float) -> tuple[Samples, int
         profile = Profile(float(begin), max(0.0, lasts - 2 * rise), rise, rise)
         push = ScriptedContact(at.link, at.point, -force * at.normal, profile, force_frame="link")
         pushes.append(push)
-    return scripted(robot, pushes, seconds, SPEED, settings).samples, len(pushes)
+    return scripted(robot, pushes, seconds, SPEED, settings), pushes
 
 
 def _reachable(

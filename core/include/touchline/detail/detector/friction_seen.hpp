@@ -29,14 +29,17 @@ class FrictionSeen {
   // it is not known.
   void follow(const Posture* posture, double dt) {
     for (std::size_t g = 0; g < rows_.segments(); ++g) {
+      for (const std::size_t i : rows_.of(g)) {
+        if (rows_.of_wrench(i) || !rows_.samples[i].known) continue;
+        const double part = std::min(1.0, dt * rows_.bandwidths[i]);
+        joints_[i].follow(rows_.samples[i].speed, part, std::min(1.0, part / tuning_.trend), tuning_);
+      }
       if (!has_sensor(g)) continue;
       const bool silent = posture != nullptr && is_silent(g);
       double most = 0.0;
       for (const std::size_t i : rows_.of(g)) {
         if (!shows(i)) continue;
         Joint& joint = joints_[i];
-        const double part = std::min(1.0, dt * rows_.bandwidths[i]);
-        joint.follow(rows_.samples[i].speed, part, std::min(1.0, part / tuning_.trend), tuning_);
         const bool tells = joint.turned() >= tuning_.friction_turned;
         if (silent && offsets_.started(i) && tells) joint.learn(unexplained(i, *posture), dt, tuning_);
         most = std::max(most, joint.shown(rows_[i].contact, tuning_));
@@ -46,6 +49,24 @@ class FrictionSeen {
     }
   }
 
+  // May friction be what row i is off its baseline by? Only of a joint whose way has changed since then,
+  // and against that change.
+  bool explains(std::size_t i) const {
+    const double turn = joints_[i].now - joints_[i].base;
+    return !rows_.of_wrench(i) && std::fabs(turn) >= tuning_.friction_turned && off(i) * turn <= 0.0;
+  }
+  // And how it begins? What comes within the last moments must do so with the joint's way, unless the
+  // joint has stood: it breaks away before it is seen to move.
+  bool explains_onset(std::size_t i) const {
+    if (!explains(i)) return false;
+    const Joint& joint = joints_[i];
+    const bool stood = std::fabs(joint.trend) < kStood;
+    if (stood || offsets_.quick(i) < offsets_.creep(i)) return true;
+    const double change = rows_.samples[i].residual - offsets_.trend(i), lately = joint.now - joint.trend;
+    const double least = kAsQuick * tuning_.creep_share * std::fabs(joint.trend - joint.base);
+    return change * lately < 0.0 && std::fabs(lately) >= least;
+  }
+
   // What friction may have added to row i since its baseline [N or Nm].
   double added(std::size_t i) const { return joints_[i].added; }
 
@@ -53,7 +74,6 @@ class FrictionSeen {
   // the mean of the last moments.
   void average(const RowLanes& averaged, double dt) {
     for (std::size_t g = 0; g < rows_.segments(); ++g) {
-      if (!has_sensor(g)) continue;
       for (const std::size_t i : rows_.of(g))
         if (!rows_.of_wrench(i) && averaged[i] > 0.0) joints_[i].average(offsets_.share(i, dt));
     }
@@ -65,17 +85,25 @@ class FrictionSeen {
   }
 
  private:
+  // Of the part by which a row changes quickly, no unit: other errors come beside friction, and the way
+  // may change by half of it in the same time.
+  static constexpr double kAsQuick = 0.5;
+  // Of its friction, no unit: less of it has come of a joint that stands.
+  static constexpr double kStood = 0.5;
+
   struct Joint {
     bool started = false;
-    // The way it goes, -1 to 1, filtered as its row is: now, in the last moments, and of the baseline.
+    // The way it goes, -1 to 1: at this sample; filtered as its row is now, in the last moments, and of
+    // the baseline.
+    double now = 0.0;
     double way = 0.0, trend = 0.0, base = 0.0;
     double square = 0.0, product = 0.0;  // sums of how much of it came [s], and with it [N s or Nm s]
     double added = 0.0;
 
     // `part`: what its filter takes of a sample, and `slow_part` the mean of the last moments.
     void follow(double speed, double part, double slow_part, const DetectorTuning& t) {
-      const double now = speed / (std::fabs(speed) + t.friction_speed);
-      if (!started) *this = {true, now, now, now, 0.0, 0.0, added};
+      now = speed / (std::fabs(speed) + t.friction_speed);
+      if (!started) *this = {true, now, now, now, now, 0.0, 0.0, added};
       way += (now - way) * part;
       trend += (way - trend) * slow_part;
     }

@@ -199,8 +199,8 @@ class SegmentLevels {
     bool slow = true, creeps = true;
     for (const std::size_t i : rows_.of(g)) {
       if (rows_.shares[i] < std::min(1.0, now.peak)) continue;
-      slow = slow && !rows_.of_wrench(i) &&
-             std::fabs(rows_.samples[i].speed) < tuning_.reversal_speed;
+      slow = slow && std::fabs(rows_.samples[i].speed) < tuning_.reversal_speed &&
+             friction_.explains_onset(i);
       creeps = creeps && offsets_.quick(i) < offsets_.creep(i);
     }
     return slow ? Origin::reversal : creeps ? Origin::creep : Origin::push;
@@ -208,10 +208,14 @@ class SegmentLevels {
 
   // Has a sensor's wrench stepped over its limit? Friction in joints, whichever moves them, does not
   // load a sensor: what began with joints that hardly move is a push after all. So is what began while
-  // the sensor was lost, if it shows a load when it is known again.
+  // the sensor was lost, if it shows a load when it is known again. Friction of a joint that turns loads
+  // no other joint either: one that is clearly over its limit, and not by friction, is pushed.
   bool is_pushed(std::size_t g) const {
+    const bool reversal = segments_[g].origin == Origin::reversal;
     for (const std::size_t i : rows_.of(g)) {
-      if (!rows_.of_wrench(i) || std::fabs(rows_.normalized[i]) < rows_.limits[i]) continue;
+      const bool wrench = rows_.of_wrench(i);
+      if (rows_.shares[i] < (wrench ? 1.0 : tuning_.barely)) continue;
+      if (!wrench && (!reversal || friction_.explains(i))) continue;
       if (offsets_.is_anew(i) || offsets_.quick(i) >= offsets_.creep(i)) return true;
     }
     return false;
