@@ -27,17 +27,18 @@ class Timing:
 
 
 def measure(candidates: Sequence[Candidate], rounds: int) -> list[Timing]:
-    """Times every candidate once per round, after one call that does not count.
+    """Times every candidate once per round, each after one call of its own that does not count.
+
+    What another candidate has left in the caches is then no part of it.
 
     Args:
         candidates: what to time, in the order of a round.
         rounds: how many rounds, at least 1.
     """
-    for candidate in candidates:
-        candidate.work()
     spent = np.empty((rounds, len(candidates)))
     for row in spent:
         for i, candidate in enumerate(candidates):
+            candidate.work()
             start = time.perf_counter()
             candidate.work()
             row[i] = (time.perf_counter() - start) / candidate.samples * 1e6
