@@ -28,7 +28,7 @@ from touchline.check.joints import (
 from touchline.check.loads import explain_weights
 from touchline.check.mending import Mending
 from touchline.check.seen import Seen, windows_of
-from touchline.check.windows import Windows
+from touchline.check.windows import DRY_SPEED, Windows
 from touchline.check.wrenches import check_wrenches
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import gravity_loads
@@ -40,7 +40,6 @@ CLEARLY = 0.2  # nor does one that mends less; a wrong sign of one row is 1
 RIGHTED = 0.2  # of what is off: no more is left once the joints are in their right order
 LARGE = 5.0  # a factor beyond it, or below its inverse, is a unit, whatever else is wrong
 UNIT_NEAR = 0.4  # relative, of the common factor of all torques, which loads may change
-MOVED_SPEED = 0.02  # rad/s, over which dry friction turns its sign
 MOVED = 0.05  # rad or m; a joint that moved less tells nothing of the sense of its position
 FOLLOWS = 0.3  # of its own size may be left of a reading that is a multiple of what is expected
 MOST_BESIDE = 3  # changes that are tried beside wrong weights
@@ -207,7 +206,7 @@ def _driving(windows: Windows, j: int) -> Array:
     A torque or a position of the wrong sign would need friction that drives the joint.
     """
     qd = windows.qd[:, j]
-    columns = np.column_stack([np.tanh(qd / MOVED_SPEED), qd, windows.acceleration[:, j]])
+    columns = np.column_stack([np.tanh(qd / DRY_SPEED), qd, windows.acceleration[:, j]])
     beside = windows.torque[:, j] - windows.expected_torque[:, j]
     known = np.isfinite(beside) & np.isfinite(columns).all(axis=1)
     if not known.any():

@@ -89,7 +89,8 @@ def felt(robot: Robot, period: float = 1e-3) -> tuple[Felt, ...]:
 
 def note_felt(robot: Robot, findings: Findings, period: float = 1e-3) -> None:
     """Add a table of what can be felt."""
-    if not felt(robot, period):
+    links = felt(robot, period)
+    if not links:
         findings.note(
             "what can be felt",
             "  no link has a surface: a touch is felt in the joints that it loads, and not located",
@@ -101,7 +102,7 @@ def note_felt(robot: Robot, findings: Findings, period: float = 1e-3) -> None:
         f"  {'link':24} {'95 % [N]':>9} {'50 % [N]':>9}  where",
     ]
     deaf = []
-    for found in felt(robot, period):
+    for found in links:
         lines.append(
             f"  {found.link:24} {_number(found.force):>9} {_number(found.median):>9}  {found.place}"
         )

@@ -10,6 +10,7 @@ import numpy as np
 from touchline.arrays import Array
 from touchline.check.averages import averaged
 from touchline.check.findings import Findings
+from touchline.check.joints import UNEVEN
 from touchline.identify.evidence import WIDTHS, Evidence, gather
 from touchline.identify.fit import main_links
 from touchline.identify.identification import MOST_TOUCHED, touched_instants
@@ -37,9 +38,9 @@ SURE = 4.0  # standard errors
 ONE_POSE = 0.1  # rad
 MOST_FOUND = 3
 COULOMB_WIDTH, MOVED = 0.02, 0.02  # rad/s
-# What is known of a motor's torque: friction differs by a fifth with the sense and the load that it
-# works against, gains by a tenth. Both err alike in all poses, so more poses tell no more.
-UNEVEN, GAIN = 0.2, 0.1
+# What is known of a motor's torque: friction is `UNEVEN` with the sense and the load that it works
+# against, gains differ by a tenth. Both err alike in all poses, so more poses tell no more.
+GAIN = 0.1
 EDGE = 1e-4  # rad; residuals change linearly with so small a tilt
 
 

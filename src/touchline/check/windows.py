@@ -18,8 +18,9 @@ from touchline.observer.samples import Samples
 
 SECONDS, ROWS = 0.25, 8  # at least so long and so many samples is a window
 MOST = 4000
-# A motor's current says nothing of a joint that dry friction holds.
-MOVED, ENOUGH = 0.02, 8  # rad/s or m/s, and windows in which a motor's joint must move so fast
+# Dry friction turns its sign over such speeds [rad/s or m/s], and holds a slower joint, of which a
+# motor's current says nothing; so many windows must be faster.
+DRY_SPEED, ENOUGH = 0.02, 8
 JOINT_FIELDS = "q", "qd", "slope", "acceleration", "torque", "expected_torque", "expected_rate"
 WRENCH_FIELDS = "wrench", "expected_wrench", "weightless_wrench", "wrench_rate", "weightless_rate"
 
@@ -130,7 +131,7 @@ class WindowMaker:
         joined = {name: np.concatenate([p[name] for p in parts]) for name in shapes}
         for j, joint in enumerate(self._robot.description.joints):
             if joint.torque == "motor":
-                moving = np.abs(joined["qd"][:, j]) > MOVED
+                moving = np.abs(joined["qd"][:, j]) > DRY_SPEED
                 enough = moving.sum() >= ENOUGH
                 joined["torque"][~moving | ~enough, j] = np.nan
         return Windows(**joined, period=self._period)

@@ -3,7 +3,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from tyro.conf import arg
 
@@ -257,33 +257,16 @@ def imperfect(
     return 0
 
 
+PushedArm = Literal["sara", "sara-full", "ur5", "panda", "panda-torques", "ur10"]
+PushedFault = Literal[
+    "nothing", "masses 2 %", "masses 5 %", "payload 0.3 kg", "friction 1 Nm", "bias 2 N"
+]
+
+
 def pushes(
     *,
-    arms: tuple[Literal["sara", "sara-full", "ur5", "panda", "panda-torques", "ur10"], ...] = (
-        "sara",
-        "sara-full",
-        "ur5",
-        "panda",
-        "panda-torques",
-    ),
-    wrong: tuple[
-        Literal[
-            "nothing",
-            "masses 2 %",
-            "masses 5 %",
-            "payload 0.3 kg",
-            "friction 1 Nm",
-            "bias 2 N",
-        ],
-        ...,
-    ] = (
-        "nothing",
-        "masses 2 %",
-        "masses 5 %",
-        "payload 0.3 kg",
-        "friction 1 Nm",
-        "bias 2 N",
-    ),
+    arms: tuple[PushedArm, ...] = ("sara", "sara-full", "ur5", "panda", "panda-torques"),
+    wrong: tuple[PushedFault, ...] = get_args(PushedFault),
     seeds: int = 1,
     first: int = 0,
     seconds: float = 60.0,

@@ -21,15 +21,6 @@ from touchline.simulation.scene import Run
 from touchline.trials.arms import described_arm
 from touchline.trials.recordings import EVERY, push_often
 
-ARMS = ("sara", "sara-full", "ur5", "panda", "panda-torques")
-WRONG = (
-    "nothing",
-    "masses 2 %",
-    "masses 5 %",
-    "payload 0.3 kg",
-    "friction 1 Nm",
-    "bias 2 N",
-)
 PHYSICS = 2000.0  # Hz
 HEAD = (
     *("arm", "what is wrong", "pushes", "found", "extra", "placed", "no body", "right body"),

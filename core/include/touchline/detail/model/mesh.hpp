@@ -76,22 +76,16 @@ class Mesh {
   bool empty() const { return tree_->triangles.empty(); }
 
   // Calls `visit(Crossing)` for each crossing of the whole line, in no order. A line through an
-  // edge is reported by both triangles and never by none. Returns the number of places that were looked
-  // into: what it took, on any machine.
+  // edge is reported by both triangles and never by none.
   template <class Visit>
-  int crossings(const ForceLine& line, Visit&& visit) const {
+  void crossings(const ForceLine& line, Visit&& visit) const {
     const Vec3 inverse = invert(line.direction);
-    int looked = 0;
     visit_triangles(
-        [&](const Box& box, int) {
-          ++looked;
-          return crosses(box, line.origin, inverse);
-        },
+        [&](const Box& box, int) { return crosses(box, line.origin, inverse); },
         [&](const Triangle& tri) {
           double t;
           if (crosses(tri, line, t)) visit(Crossing{t, tri.face, tri.normal});
         });
-    return looked;
   }
 
   // The point of the surface nearest to the line, if nearer than `limit`. `near`: the place of a

@@ -95,11 +95,11 @@ class LinkSurfaces {
   }
 
   // Calls `visit(surface, point, normal, t)` for each entry of a line into a surface; where it is
-  // graspable, for each exit too. Returns what it took: see `Mesh`.
+  // graspable, for each exit too.
   template <class Visit>
-  int entries(int surface, const ForceLine& line, Visit&& visit) const {
+  void entries(int surface, const ForceLine& line, Visit&& visit) const {
     const int node = surfaces_[surface].node;
-    return surfaces_[surface].mesh.crossings(to_node(line, node), [&](const Crossing& c) {
+    surfaces_[surface].mesh.crossings(to_node(line, node), [&](const Crossing& c) {
       const Vec3 normal = turn_to_world(c.normal, node);
       if (surfaces_[surface].graspable || dot(normal, line.direction) < 0.0)
         visit(surface, line.at(c.t), normal, c.t);
