@@ -26,6 +26,7 @@
 #endif
 
 #ifdef __linux__
+#include <sched.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
 #endif
@@ -40,15 +41,25 @@ namespace nb = nanobind;
 namespace tl = touchline;
 using namespace nb::literals;
 
-// Threads that read and feel go before what else the machine does, Python's work above all: with
-// this niceness (that of PipeWire's threads) they wait less long for a processor. Only where the
-// system lets this user have it.
+// Threads that read and feel go before what else the machine does, Python's work above all: they
+// have real-time priority where the system lets this user have it. That is this one (1 to 99), below
+// a control loop's own (libfranka asks for the highest) and below the kernel's interrupts (50).
+constexpr int kRealTime = 10;
+// Elsewhere this niceness (that of PipeWire's threads), where the system grants at least that.
 constexpr int kAhead = -11;
 
-inline void go_ahead() noexcept {
+// Sets the priority of the calling thread; its children do not inherit it. A real-time priority that
+// the user gave the program stays. True if the thread's is real-time.
+inline bool go_ahead() noexcept {
 #ifdef __linux__
+  const int policy = ::sched_getscheduler(0) & ~SCHED_RESET_ON_FORK;
+  if (policy == SCHED_FIFO || policy == SCHED_RR) return true;
+  sched_param wanted{};
+  wanted.sched_priority = kRealTime;
+  if (::sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &wanted) == 0) return true;
   ::setpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(SYS_gettid)), kAhead);
 #endif
+  return false;
 }
 
 // A pipeline in a thread of its own. Python takes of each sample: arrival, sequence, time, signals,
@@ -372,7 +383,9 @@ inline int admit(tl::Admission& admission, double time) {
 }
 
 inline void bind(nb::module_& m) {
-  m.attr("AHEAD") = kAhead;
+  m.def("go_ahead", &go_ahead,
+        "Gives the calling thread real-time priority, or else a niceness of -11, as the system lets this\n"
+        "user have it. Returns whether it is real-time.");
   nb::class_<tl::Admission>(m, "Admission").def(nb::init<>()).def("take", &admit, "time"_a);
   nb::class_<Runner>(m, "Runner")
       .def(nb::init<pipelines::Pipeline&, std::size_t>(), "pipeline"_a, "slots"_a,

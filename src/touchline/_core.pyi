@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 INSTRUCTIONS: str = 'avx2'
 
-AHEAD: int = -11
-
 VERSION: str = '0.1.0'
 
 class NodeKind(enum.Enum):
@@ -525,6 +523,12 @@ class Pipeline:
     def slices(self) -> dict: ...
 
 def view(rows: numpy.typing.NDArray[numpy.float64], first: int, count: int, columns: int) -> numpy.typing.NDArray[numpy.float64]: ...
+
+def go_ahead() -> bool:
+    """
+    Gives the calling thread real-time priority, or else a niceness of -11, as the system lets this
+    user have it. Returns whether it is real-time.
+    """
 
 class Admission:
     def __init__(self) -> None: ...

@@ -6,6 +6,7 @@ import os
 import pickle
 import signal
 import socket
+import threading
 import time
 
 import numpy as np
@@ -16,6 +17,7 @@ from touchline.errors import InputError
 from touchline.live.aside import OPENED, SAMPLE, ReadAside, _frame, _numbers
 from touchline.live.connection import Connection
 from touchline.live.sample import Sample
+from touchline.native import core
 
 
 def aside(robot, address, period=1e-3):
@@ -63,6 +65,30 @@ def test_a_stall_of_python_costs_no_sample_and_no_time(sara):
     assert gaps[0] < 0.15
     assert np.all(np.round(np.diff(seen.times) * 1000) == 1)
     assert len(seen.times) == 2501
+
+
+def test_what_reads_and_feels_goes_before_all_else_where_the_system_lets_it(sara):
+    """Real-time priority: the reading process and two native threads, but no thread of Python."""
+    allowed = []
+    trial = threading.Thread(target=lambda: allowed.append(core.go_ahead()))
+    trial.start()
+    trial.join()
+    if not allowed[0]:
+        pytest.skip("this user may not have real-time priority")
+    seen = {}
+
+    def each(session):
+        source = session.connection.source
+        if source._felt is None or session.samples < 1300:
+            return
+        policies = [os.sched_getscheduler(int(task)) for task in os.listdir("/proc/self/task")]
+        real = [p for p in policies if p & ~os.SCHED_RESET_ON_FORK == os.SCHED_FIFO]
+        seen["here"] = len(real)
+        seen["main"] = os.sched_getscheduler(0)
+        seen["aside"] = os.sched_getscheduler(source._process.pid) & ~os.SCHED_RESET_ON_FORK
+
+    watch(sara, aside(sara, "sim://"), duration=2.0, each=each)
+    assert seen == {"here": 2, "main": os.SCHED_OTHER, "aside": os.SCHED_FIFO}
 
 
 def test_a_reading_process_that_is_killed_is_told_and_started_again(sara):

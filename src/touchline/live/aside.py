@@ -15,7 +15,6 @@ import struct
 import subprocess
 import sys
 import time
-from contextlib import suppress
 
 import numpy as np
 
@@ -300,8 +299,7 @@ def main(number: int) -> int:
     link = socket.socket(fileno=number)
     name, description, mechanism = pickle.loads(sys.stdin.buffer.read())
     settle()
-    with suppress(OSError, AttributeError):
-        os.nice(core.AHEAD)
+    core.go_ahead()
     try:
         _Reading(link, own_source(name, Robot(description, mechanism))).run()
     except InputError as error:
