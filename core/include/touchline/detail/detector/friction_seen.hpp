@@ -36,12 +36,13 @@ class FrictionSeen {
       }
       if (!has_sensor(g)) continue;
       const bool silent = posture != nullptr && is_silent(g);
+      const Spatial felt = silent ? felt_by_sensor(g, *posture) : Spatial{};
       double most = 0.0;
       for (const std::size_t i : rows_.of(g)) {
         if (!shows(i)) continue;
         Joint& joint = joints_[i];
         const bool tells = joint.turned() >= tuning_.friction_turned;
-        if (silent && offsets_.started(i) && tells) joint.learn(unexplained(i, *posture), dt, tuning_);
+        if (silent && offsets_.started(i) && tells) joint.learn(unexplained(i, felt, *posture), dt, tuning_);
         most = std::max(most, joint.shown(rows_[i].contact, tuning_));
       }
       for (const std::size_t i : rows_.of(g))
@@ -160,19 +161,22 @@ class FrictionSeen {
     return any;
   }
 
-  // What a joint's row has that no contact explains of which the sensor shows no more than it does: one
-  // inboard of the joint does not load it, one outboard by what the sensor shows.
-  double unexplained(std::size_t i, const Posture& posture) const {
-    const int sensor = observer_.layout().segments[rows_[i].segment].sensor;
+  // What a segment's sensor shows, in world [N, Nm].
+  Spatial felt_by_sensor(std::size_t g, const Posture& posture) const {
     double w[6] = {};
-    for (std::size_t k = rows_.first(rows_[i].segment); rows_.of_wrench(k); ++k)
-      w[rows_[k].component] = off(k);
-    const Pose& X = posture.pose(observer_.sensors()[sensor].node);
-    const Spatial shown = wrench_to_parent(X, load(w));
+    for (const std::size_t i : rows_.of(g))
+      if (rows_.of_wrench(i)) w[rows_[i].component] = off(i);
+    const int node = observer_.sensors()[observer_.layout().segments[g].sensor].node;
+    return wrench_to_parent(posture.pose(node), load(w));
+  }
+
+  // What a joint's row has that no contact explains of which the sensor shows no more than it does: one
+  // inboard of the joint does not load it, one outboard by what the sensor shows, `felt`.
+  double unexplained(std::size_t i, const Spatial& felt, const Posture& posture) const {
     const double inboard = off(i);
     double outboard = inboard;
     for (int node : observer_.joints()[rows_[i].joint].nodes)
-      outboard -= dot(posture.subspace(node), shown);
+      outboard -= dot(posture.subspace(node), felt);
     if (inboard * outboard <= 0.0) return 0.0;
     return std::fabs(inboard) < std::fabs(outboard) ? inboard : outboard;
   }

@@ -56,7 +56,7 @@ class PairDescent {
 
  private:
   // Units of work of a step, beside those of looking for its surface; with friction cones.
-  static constexpr int kStep = 9, kBoundStep = 22;
+  static constexpr int kStep = 22, kBoundStep = 29;
   static constexpr double kHold = 5e-3;      // of an end that is held, one sigma of a step [m]
   static constexpr double kFall = 0.3;       // part of what a cost may be that is left by a step
   static constexpr double kFarthest = 0.04;  // that a step goes [m]

@@ -79,9 +79,9 @@ class PairParts {
 
  private:
   static constexpr int kWaiting = 4096, kSteps = 12;  // room: pairs that wait; steps of each
-  // Units of work: the beginning of a descent beside another one, or elsewhere, where no cache has the
-  // mesh.
-  static constexpr int kBegin = 8, kElsewhere = 60;
+  // Units of work: the beginning of a descent beside another one, or elsewhere; and of a place that is
+  // looked into for a neighbour, where no cache has it.
+  static constexpr int kBegin = 8, kElsewhere = 20, kLooked = 2;
   static constexpr double kHopeless = 100.0;  // cost from which nothing is brought to where it explains
   static constexpr double kLittle = 2.0;      // of cost: a part is told by its place, not by its cost
   static constexpr double kSoon = 5e4;        // cost of a beginning from which it soon explains
@@ -163,7 +163,7 @@ class PairParts {
     for (int k = 0; k < 2; ++k) {
       if (fresh[k]) walk_on(s, k, done);
     }
-    return done;
+    return kLooked * done;
   }
 
   // One end of a pair; is it new?

@@ -75,9 +75,9 @@ class PairSearch {
   static constexpr double kLittle = 0.02;     // of cost: not worth a step
   static constexpr double kEver = std::numeric_limits<double>::infinity();  // any cost may still fall
 
-  // Units of work: the beginning of a descent, where no cache has the mesh; where a force enters its body;
-  // the evidence of a solution; another view.
-  static constexpr int kBegin = 60, kEntries = 110, kWeight = 250, kView = 110;
+  // Units of work: the beginning of a descent; where a force enters its body; the evidence of a solution;
+  // another view.
+  static constexpr int kBegin = 12, kEntries = 150, kWeight = 230, kView = 150;
 
   // From points spread over the links, by descents, to solutions. What was measured in the meantime
   // moves them a little; with other entries of their forces they are weighed by that.

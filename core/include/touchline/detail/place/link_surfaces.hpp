@@ -66,14 +66,14 @@ class LinkSurfaces {
   }
 
   // The point of a surface nearest to a point of the world, in world; `face` is -1 beyond `limit`.
-  // `looked`: see `Mesh`.
-  SurfacePoint nearest(int surface, const Vec3& target, double limit, int& looked) const {
+  // `near`: the place of a triangle that may be near, or -1. `looked`: see `Mesh`.
+  SurfacePoint nearest(int surface, const Vec3& target, double limit, int near, int& looked) const {
     const int node = surfaces_[surface].node;
     const Mesh& mesh = surfaces_[surface].mesh;
-    return in_world(mesh.nearest_to_point(to_node(target, node), limit, -1, looked), node);
+    return in_world(mesh.nearest_to_point(to_node(target, node), limit, near, looked), node);
   }
 
-  // The same for a line; `near`: the place of a triangle that may be near, or -1.
+  // The same for a line.
   SurfacePoint nearest(int surface, const ForceLine& line, double limit, int near,
                        int& looked) const {
     const int node = surfaces_[surface].node;

@@ -86,9 +86,10 @@ class Refinement {
     // Nothing farther away than that is of interest.
     const double limit = std::min(settings_.surface_reach, 1.000001 * beside);
     int looked = 0;
-    const SurfacePoint p = surfaces_.nearest(k.surface, target, limit, looked);
+    const SurfacePoint p = surfaces_.nearest(k.surface, target, limit, k.place, looked);
     left -= kPoint + looked;
     if (p.face < 0) return false;
+    k.place = p.place;
     const bool grasped = surfaces_[k.surface].graspable;
     const double cost = k.fit.cost();
     constexpr double kInfinity = std::numeric_limits<double>::infinity();

@@ -17,6 +17,7 @@ namespace touchline {
 
 struct Candidate {
   int surface = -1;  // index of the link's surface
+  int place = -1;    // of a triangle near the point, where one is known
   Vec3 point, normal;
   Fit fit;
   int view = 0;          // of the bodies looked at
