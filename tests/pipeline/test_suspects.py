@@ -182,6 +182,23 @@ def test_a_blow_after_a_step_is_a_collision(torques_alone):
     assert found.detected == pytest.approx(healthy.detected, abs=0.02)
 
 
+def test_a_torque_that_steps_as_a_push_lets_go_is_no_collision(torques_alone):
+    """What the push does to the other joints meanwhile does not bear the step out."""
+    pipeline, _ = torques_alone
+    gentle = Profile(BEGIN, 0.3, 0.1, 0.02)
+    push = ScriptedContact(
+        "link6", np.array([0.0, 0.0, 0.05]), np.array([5.0, 15.0, -18.0]), gentle
+    )
+    settings = Run(seed=3, noise=SensorNoise(), model_error=0.02, physics=2000.0)
+    samples = scripted(pipeline.robot, [push], 1.5, 0.5, settings).samples
+    _, _, healthy = heard(pipeline, samples)
+    assert [event.level for event in healthy] == ["contact"]
+    lets_go = BEGIN + 0.1 + 0.3 + 0.01
+    _, told, events = heard(pipeline, scaled(samples, "joint2", 0.5, lets_go, 1.5))
+    assert told[0].channel == "tau.joint2"
+    assert {event.level for event in events} == {"contact"}
+
+
 def scaled(samples, joint, part, begin, end):
     """A copy in which a joint's torque is this part of itself for a while."""
     tau = samples.tau.copy()

@@ -68,6 +68,7 @@ class ChannelGates {
         mean_(at_.count()),
         step_(at_.count()),
         ratio_(at_.count()),
+        ratio_before_(at_.count()),
         spiked_(at_.count(), -std::numeric_limits<double>::infinity()),
         moved_(at_.count(), Moved::no),
         far_(at_.joints),
@@ -152,6 +153,7 @@ class ChannelGates {
 
   // The step of each channel and its ratio; returns whether all are usual.
   bool measure(double dt) {
+    std::swap(ratio_, ratio_before_);
     const std::size_t n = at_.joints, count = at_.count();
     const double* __restrict now = now_.data();
     const double* __restrict last = last_.data();
@@ -366,12 +368,21 @@ class ChannelGates {
     if (c < at_.qd()) return false;
     if (c < at_.tau()) return speed_borne_out(c - at_.qd(), dt);
     const std::size_t first = at_.wrench(), sensor = c < first ? 0 : (c - first) / 6;
+    const bool sudden = news(c) > kSudden * ratio_[c];
     for (std::size_t other = at_.qd(); other < at_.count(); ++other) {
       const bool same = c == other || (c >= first && other >= first && (other - first) / 6 == sensor);
-      if (!same && moves(other) && ratio_[other] > tuning_.equal * ratio_[c]) return true;
+      if (same || !moves(other)) continue;
+      const bool bears = sudden ? news(other) > tuning_.equal * news(c)
+                                : ratio_[other] > tuning_.equal * ratio_[c];
+      if (bears) return true;
     }
     return c >= first && !witnessed(c) && one_force(sensor, c);
   }
+
+  // How much more a channel steps than in the sample before. What others have done for some samples does
+  // not bear out what one does suddenly: a push that is let go does not explain a jump of one torque.
+  double news(std::size_t c) const { return ratio_[c] - ratio_before_[c]; }
+  static constexpr double kSudden = 0.5;  // part of a step that the last one had not: more than a ramp's
 
   // Is there a sensor inboard that feels all that this channel can feel, and is it believed?
   bool witnessed(std::size_t c) const {
@@ -532,7 +543,7 @@ class ChannelGates {
   JointWays ways_;
   // Now: as read, but for what is held. Out: what goes on, with NaN.
   std::vector<double> now_, last_, out_, candidate_;
-  std::vector<double> mean_, step_, ratio_;  // of steps
+  std::vector<double> mean_, step_, ratio_, ratio_before_;  // of steps
   std::vector<double> spiked_;  // when it jumped last [s]
   std::vector<Moved> moved_;    // see `take_moved`
   std::vector<int> far_;
