@@ -37,10 +37,9 @@ class ChannelDoubts {
     for (std::size_t c = 0; c < told.size(); ++c) {
       const bool news = told[c] != before_[c] && (is_wrong(told[c]) || is_wrong(before_[c]));
       const Moved moved = gates_.take_moved(c);
-      const bool comes = told[c] == Fault::suspect && before_[c] == Fault::none;
       if (moved == Moved::wrongly || news) doubt(c, time, time - kUntold);
       else if (moved == Moved::alone) doubt(c, time, kNever);  // it is no collision
-      else if (comes && !left_out.is_unsure(c, time))
+      else if (told[c] == Fault::suspect && before_[c] == Fault::none && !left_out.is_unsure(c, time))
         doubt(c, time, time - kUntold, kUntold);  // what it brought beside contacts
       before_[c] = told[c];
       pending_ = pending_ || told[c] != Fault::none;
