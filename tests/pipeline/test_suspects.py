@@ -15,7 +15,7 @@ from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scenario import scripted
 from touchline.simulation.scene import Run
 from touchline.trials.faults import FAULTS, channels_of, injected
-from touchline.trials.recordings import RELEASED, record
+from touchline.trials.recordings import RELEASED, record, robot_named
 
 BEGIN = 0.6  # s
 HIT = 2.2  # s
@@ -182,20 +182,17 @@ def test_a_blow_after_a_step_is_a_collision(torques_alone):
     assert found.detected == pytest.approx(healthy.detected, abs=0.02)
 
 
-def test_a_torque_that_steps_as_a_push_lets_go_is_no_collision(torques_alone):
+def test_a_torque_that_steps_as_a_push_lets_go_is_told_and_is_no_collision():
     """What the push does to the other joints meanwhile does not bear the step out."""
-    pipeline, _ = torques_alone
-    gentle = Profile(BEGIN, 0.3, 0.1, 0.02)
-    push = ScriptedContact(
-        "link6", np.array([0.0, 0.0, 0.05]), np.array([5.0, 15.0, -18.0]), gentle
-    )
-    settings = Run(seed=3, noise=SensorNoise(), model_error=0.02, physics=2000.0)
-    samples = scripted(pipeline.robot, [push], 1.5, 0.5, settings).samples
-    _, _, healthy = heard(pipeline, samples)
-    assert [event.level for event in healthy] == ["contact"]
-    lets_go = BEGIN + 0.1 + 0.3 + 0.01
-    _, told, events = heard(pipeline, scaled(samples, "joint2", 0.5, lets_go, 1.5))
-    assert told[0].channel == "tau.joint2"
+    pytest.importorskip("pinocchio", reason="comes with example-robot-data, the arms' models")
+    robot = robot_named("panda")
+    samples = record(robot, 0).samples
+    pipeline = tl.Pipeline(robot)
+    _, _, (healthy,) = heard(pipeline, samples)
+    assert healthy.level == "contact"
+    _, told, events = heard(pipeline, faulty(robot, samples, "half", "tau.panda_joint4", RELEASED))
+    assert (told[0].channel, told[0].fault) == ("tau.panda_joint4", Fault.SPIKE)
+    assert samples.time[told[0].sample] == pytest.approx(RELEASED, abs=0.0015)
     assert {event.level for event in events} == {"contact"}
 
 
