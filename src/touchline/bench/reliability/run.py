@@ -286,5 +286,6 @@ well, would leave a third of them, and tell 2 % fewer signs, scales and delays i
 A joint and a sensor with no body between them must agree: what they differ by begins no event, and
 one of the two is named. With joint torques alone nothing of this is told: a push on the first link
 loads one joint, too. But where one steps alone within a sample, nothing becomes a collision for a
-second.
+second. What a push does to the others for many samples, as it comes or goes, does not count then.
+What is left: an error that makes a push look stronger than it is.
 """
