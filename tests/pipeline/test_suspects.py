@@ -15,7 +15,7 @@ from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scenario import scripted
 from touchline.simulation.scene import Run
 from touchline.trials.faults import FAULTS, channels_of, injected
-from touchline.trials.recordings import RELEASED, record
+from touchline.trials.recordings import RELEASED, record, robot_named
 
 BEGIN = 0.6  # s
 HIT = 2.2  # s
@@ -180,6 +180,20 @@ def test_a_blow_after_a_step_is_a_collision(torques_alone):
     _, _, events = heard(pipeline, wrong)
     (found,) = [event for event in events if event.level == "collision"]
     assert found.detected == pytest.approx(healthy.detected, abs=0.02)
+
+
+def test_a_torque_that_steps_as_a_push_lets_go_is_told_and_is_no_collision():
+    """What the push does to the other joints meanwhile does not bear the step out."""
+    pytest.importorskip("pinocchio", reason="comes with example-robot-data, the arms' models")
+    robot = robot_named("panda")
+    samples = record(robot, 0).samples
+    pipeline = tl.Pipeline(robot)
+    _, _, (healthy,) = heard(pipeline, samples)
+    assert healthy.level == "contact"
+    _, told, events = heard(pipeline, faulty(robot, samples, "half", "tau.panda_joint4", RELEASED))
+    assert (told[0].channel, told[0].fault) == ("tau.panda_joint4", Fault.SPIKE)
+    assert samples.time[told[0].sample] == pytest.approx(RELEASED, abs=0.0015)
+    assert {event.level for event in events} == {"contact"}
 
 
 def scaled(samples, joint, part, begin, end):

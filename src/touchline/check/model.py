@@ -100,6 +100,11 @@ def _parity(robot: Robot, findings: Findings) -> None:
         lines.append(
             f"  many pushes on one body look like an error of: {_shortened(robot, pushed)}"
         )
+    if parity.rank > 0 and parity.rubbed:
+        lines.append(
+            "  no six-axis sensor checks the joint torques: friction of a joint looks like an "
+            "error of its torque, so none is told"
+        )
     for body in _first_bodies(robot):
         lines.append(
             f"  an error of sensor {body[0]} alone can always be a push on {body[1]}; only joints "

@@ -7,6 +7,9 @@ whatever touches, and only a fault can fill it.
 
 A contact on another body loads fewer signals. Where it loads fewer than the five that a force at a
 place has unknowns, there are many contacts that look like the error of one of these signals.
+
+Where no six-axis sensor checks joint torques, dry friction of one joint looks like an error of its
+torque. So no such error is told: real arms have that friction.
 """
 
 from collections.abc import Sequence
@@ -34,6 +37,7 @@ class Parity:
         blind: signals whose constant error no pose shows, in words.
         blind_once: signals whose error a single general pose does not show, in words.
         pushed: signals whose error many pushes on one body show as well, in words.
+        rubbed: signals whose error friction of a joint shows as well, in words.
     """
 
     signals: int
@@ -42,10 +46,11 @@ class Parity:
     blind: tuple[str, ...]
     blind_once: tuple[str, ...]
     pushed: tuple[str, ...]
+    rubbed: tuple[str, ...]
 
     def tells(self, signal: str) -> bool:
-        """Can the layout tell an error of this signal from contacts?"""
-        return signal not in self.blind and signal not in self.pushed
+        """Can the layout tell an error of this signal from contacts and friction?"""
+        return signal not in (*self.blind, *self.pushed, *self.rubbed)
 
 
 def parity_of(robot: Robot) -> Parity:
@@ -70,6 +75,7 @@ def parity_of(robot: Robot) -> Parity:
         tuple(name for name, seen in zip(names, always, strict=True) if seen < VISIBLE),
         tuple(name for name, seen in zip(names, once, strict=True) if seen < VISIBLE),
         tuple(name for name, like in zip(names, np.all(pushes, axis=0), strict=True) if like),
+        _rubbed(robot),
     )
 
 
@@ -119,6 +125,12 @@ def _pushed(robot: Robot, q: Array) -> Mask:
         projection, _ = _left_null(matrix)
         found |= np.linalg.norm(projection, axis=0) < VISIBLE
     return found
+
+
+def _rubbed(robot: Robot) -> tuple[str, ...]:
+    if any(len(sensor.axes) == len(AXES) for sensor in robot.description.sensors):
+        return ()
+    return tuple(f"torque of {robot.joint_names[j]}" for j in _measured(robot))
 
 
 def _measured(robot: Robot) -> list[int]:

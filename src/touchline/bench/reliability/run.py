@@ -68,7 +68,8 @@ class Health:
 
 def healthy_motion(plan: Plan) -> Health:
     """The arms swing without a fault, and are pushed every few seconds."""
-    parts = [(name, 1000 + seed) for name, _ in robots() for seed in range(ceil(plan.healthy))]
+    seeds = range(1000 + plan.first, 1000 + plan.first + ceil(plan.healthy))
+    parts = [(name, seed) for name, _ in robots() for seed in seeds]
     seconds = 60.0 * min(plan.healthy, 1.0)
     if not seconds:
         return Health(0.0, 0, ())
@@ -205,7 +206,9 @@ def _by_fault(found: list[Outcome]) -> list[Row]:
 
 def _layouts(untold: dict[str, tuple[str, ...]]) -> list[str]:
     """What each layout cannot tell."""
-    lines = ["errors that a layout cannot tell from contacts, as touchline check lists them:"]
+    lines = [
+        "errors that a layout cannot tell from contacts or friction, as touchline check lists them:"
+    ]
     return lines + [f"  {name}: {', '.join(untold[name]) or 'none'}" for name in sorted(untold)]
 
 
@@ -266,6 +269,7 @@ more, but the estimates begin with the first of these.
 What a layout cannot tell, `touchline check ROBOT` lists as its parity space, and so does the table.
 Of signs, scales, delays and biases these runs are counted apart. There an error looks like contacts
 at the ends of segments, or like many pushes on one body: one that loads fewer than five signals.
+Where no six-axis sensor checks joint torques, it looks like friction of that joint.
 
 Scale, delay, bias and drift of one channel are told where they make it jump or stand still. They
 are also told where that channel alone explains what a segment feels (`suspect`), or what it feels
@@ -274,12 +278,14 @@ channel is named, and nothing that it explains is a sure contact or a collision.
 what is estimated where a sensor inboard contradicts it.
 
 A push does so where it passes near a sensor's axis, or where errors of the model hide what else it
-loads: of two hundred pushes about one. These are the false reports above. For two seconds that
+loads: of two hundred pushes about one. So do these errors, where a push lets go and they alone are
+left. These are the false reports above. For two seconds that
 channel does not count. To wait for half a second with the report, where a contact explains all as
 well, would leave a third of them, and tell 2 % fewer signs, scales and delays in time.
 
 A joint and a sensor with no body between them must agree: what they differ by begins no event, and
 one of the two is named. With joint torques alone nothing of this is told: a push on the first link
 loads one joint, too. But where one steps alone within a sample, nothing becomes a collision for a
-second.
+second. What a push does to the others for many samples, as it comes or goes, does not count then.
+What is left: an error that makes a push look stronger than it is.
 """

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "touchline/sample.hpp"
+#include "touchline/detail/observer/health.hpp"
 
 namespace touchline {
 

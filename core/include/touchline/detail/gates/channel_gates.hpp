@@ -8,14 +8,9 @@
 // stays and lives (its last digits move), it is taken after all, a few samples late, unless there
 // is a sensor inboard that would have had to feel it too.
 //
-// A stuck channel: how often it changes from sample to sample while the arm moves is learned, and
-// so is for how long it keeps a value. Logs that repeat samples repeat all of them, which counts
-// for nothing.
-//
-// A velocity is the derivative of its position: what positions and velocities differ by, over some
-// samples, is compared with what they have differed by so far. Where one of the two is not believed
-// the other stands in for it. A position is the way that its joint has come by its speed, for a
-// while; a speed is what positions show, low-passed.
+// A stuck channel (stuck_watch.hpp), and a velocity that is not the derivative of its position
+// (speed_watch.hpp), are left out. Where a position or a velocity is not believed, the other one of the
+// joint stands in for it (joint_ways.hpp).
 //
 // Limits follow from what this arm has shown, and from physics where it has shown nothing yet.
 // Theory: docs/theory.md, sections 3.1, 3.2 and 3.3.
@@ -29,8 +24,12 @@
 #include <vector>
 
 #include "touchline/detail/gates/fault.hpp"
+#include "touchline/detail/gates/gate_limits.hpp"
+#include "touchline/detail/gates/joint_ways.hpp"
+#include "touchline/detail/gates/speed_watch.hpp"
+#include "touchline/detail/gates/stuck_watch.hpp"
 #include "touchline/detail/gates/tuning.hpp"
-#include "touchline/detail/observer/layout.hpp"
+#include "touchline/detail/observer/health.hpp"
 #include "touchline/robot.hpp"
 #include "touchline/sample.hpp"
 
@@ -53,9 +52,15 @@ class ChannelGates {
       : tuning_(tuning),
         at_{robot.joints.size(), robot.sensors.size()},
         period_(std::max(robot.noise.period, kShortest)),
-        floor_(at_.count(), std::numeric_limits<double>::infinity()),
-        witness_(at_.count(), -1),
-        wraps_(at_.joints, 0),
+        memory_(std::min(1.0, period_ / tuning_.memory)),
+        warm_up_(samples(tuning_.warm_up, tuning_.least_seen)),
+        held_most_(std::min(samples(tuning_.held, tuning_.sure + 1), tuning_.held_most)),
+        return_(samples(tuning_.returns, tuning_.good)),
+        dwell_(samples(tuning_.dwell, tuning_.least_dwell)),
+        limits_(robot, at_, period_, tuning_),
+        stuck_(at_.tau(), at_.count(), silent(), tuning_),
+        speeds_(at_.joints, period_, silent(), tuning_),
+        ways_(at_.joints, period_, tuning_),
         now_(at_.count()),
         last_(at_.count(), kNever),
         out_(at_.count()),
@@ -63,42 +68,17 @@ class ChannelGates {
         mean_(at_.count()),
         step_(at_.count()),
         ratio_(at_.count()),
-        often_(at_.count()),
-        evidence_(at_.count()),
-        run_(at_.count()),
-        longest_(at_.count()),
-        highest_(at_.count(), -std::numeric_limits<double>::infinity()),
-        lowest_(at_.count(), std::numeric_limits<double>::infinity()),
-        drift_(at_.joints),
-        usual_drift_(at_.joints),
-        anchor_(at_.joints),
-        tracked_(at_.joints),
-        speed_(at_.joints),
-        acceleration_(at_.joints),
-        blind_(at_.joints),
-        same_(2 * at_.joints),
+        ratio_before_(at_.count()),
         spiked_(at_.count(), -std::numeric_limits<double>::infinity()),
         moved_(at_.count(), Moved::no),
         far_(at_.joints),
         since_(at_.count()),
         calm_(at_.count()),
         passes_(at_.count(), Passes::no),
-        early_(at_.count(), 0),
-        fault_(at_.count(), Fault::none) {
-    set_floors(robot);
-    memory_ = std::min(1.0, period_ / tuning_.memory);
-    warm_up_ = samples(tuning_.warm_up, tuning_.least_seen);
-    held_most_ = std::min(samples(tuning_.held, tuning_.sure + 1), tuning_.held_most);
-    silent_ = samples(tuning_.silent, tuning_.least_silent);
-    return_ = samples(tuning_.returns, tuning_.good);
-    dwell_ = samples(tuning_.dwell, tuning_.least_dwell);
-    kept_ = std::exp(-period_ / compared_over());
-    const double pole = std::exp(-std::min(tuning_.tracking, 0.5 / period_) * period_),
-        off = 1.0 - pole;
-    follows_[0] = 1.0 - pole * pole * pole;
-    follows_[1] = 1.5 * off * off * (1.0 + pole) / period_;
-    follows_[2] = off * off * off / (period_ * period_);
-  }
+        fault_(at_.count(), Fault::none) {}
+
+  ChannelGates(const ChannelGates&) = delete;
+  ChannelGates& operator=(const ChannelGates&) = delete;
 
   const ChannelLayout& layout() const { return at_; }
 
@@ -115,8 +95,9 @@ class ChannelGates {
     if (!usual || !all_sound_ || absurd_ || gap) settle(dt, gap);
     learn();
     track(dt, gap);
-    if (!gap) compare_speeds(dt);
-    if (moving()) count_changes(dt);
+    const bool differ = !gap && speeds_.compare(now_, last_, dt, rate_);
+    if (differ || (!gap && any_far_)) judge_speeds();
+    if (moving() && stuck_.count_changes(now_, last_, dt, rate_) && seen_ > warm_up_) find_stuck();
     std::copy(now_.begin(), now_.end(), last_.begin());
     return all_sound_ ? sample : believed(sample.time);
   }
@@ -141,58 +122,10 @@ class ChannelGates {
   static constexpr double kNever = std::numeric_limits<double>::quiet_NaN();
   static constexpr double kShortest = 1e-6;    // [s] of a period
   static constexpr double kAgain = 0.5;        // [s] within which a second jump is no accident
-  static constexpr double kSettles = 4.0;      // [1/K] that a filter waits at least before it counts
   int samples(double seconds, int least) const {
     return std::max(least, static_cast<int>(std::lround(std::min(seconds / period_, 1e6))));
   }
-
-  // A step that the filters make less of than the threshold of a contact can begin no event.
-  void set_floors(const Robot& robot) {
-    const auto share = [this](double bandwidth) { return 1.0 - std::exp(-bandwidth * period_); };
-    const auto early = [this](double bandwidth) {
-      return tuning_.good * period_ * bandwidth <= kSettles;
-    };
-    std::vector<double> contact(at_.count(), 0.0);
-    const Tree tree(robot.nodes, robot.gravity);
-    const Layout layout(tree, robot.joints, robot.sensors);
-    for (const DetectionRow& row : robot.rows) {
-      const int sensor = layout.segments[row.segment].sensor;
-      if (row.joint >= 0) contact[at_.tau() + row.joint] = row.contact;
-      if (row.component >= 0 && sensor >= 0)
-        contact[at_.wrench() + 6 * sensor + row.component] = row.contact;
-    }
-    for (std::size_t j = 0; j < at_.joints; ++j) {
-      const JointRow& joint = robot.joints[j];
-      floor_[at_.q() + j] = std::max(tuning_.least_travel, tuning_.fastest * period_);
-      floor_[at_.qd() + j] = tuning_.speed_step + tuning_.hardest * period_;
-      wraps_[j] = robot.nodes[joint.nodes[0]].kind == NodeKind::revolute;
-      if (!layout.inboard_sensors[j].empty())
-        witness_[at_.tau() + j] = layout.inboard_sensors[j][0].sensor;
-      const double least = std::max(contact[at_.tau() + j], tuning_.least_step_torque);
-      if (joint.measured())
-        floor_[at_.tau() + j] = least / share(joint.bandwidth) / std::fabs(joint.gain);
-      early_[at_.tau() + j] = early(joint.bandwidth);
-    }
-    for (std::size_t c = at_.wrench(); c < at_.count(); c += 3) {  // axes of the log may be turned
-      const SensorRow& sensor = robot.sensors[(c - at_.wrench()) / 6];
-      const std::size_t axis = (c - at_.wrench()) % 6;
-      const double least = *std::max_element(contact.begin() + c, contact.begin() + c + 3);
-      for (std::size_t t = 0; t < at_.sensors; ++t) {
-        const int inner = robot.sensors[t].node;
-        const bool inboard = sensor.node != inner && layout.is_outboard(sensor.node, inner);
-        if (inboard && robot.sensors[t].six_axis())
-          std::fill_n(witness_.begin() + c, 3, static_cast<int>(t));
-      }
-      const double smallest = axis == 0 ? tuning_.least_step_force : tuning_.least_step_torque;
-      for (int i = 0; i < 3; ++i) {
-        early_[c + i] = early(sensor.bandwidth);
-        if (sensor.axes[axis + i])
-          floor_[c + i] = std::max(least, smallest) / share(sensor.bandwidth);
-      }
-    }
-  }
-
-  bool watched(std::size_t c) const { return floor_[c] < std::numeric_limits<double>::infinity(); }
+  int silent() const { return samples(tuning_.silent, tuning_.least_silent); }
 
   void gather(const Sample& sample) {
     const std::size_t n = at_.joints;
@@ -220,11 +153,12 @@ class ChannelGates {
 
   // The step of each channel and its ratio; returns whether all are usual.
   bool measure(double dt) {
+    std::swap(ratio_, ratio_before_);
     const std::size_t n = at_.joints, count = at_.count();
     const double* __restrict now = now_.data();
     const double* __restrict last = last_.data();
     const double* __restrict mean = mean_.data();
-    const double* __restrict floor = floor_.data();
+    const double* __restrict floor = limits_.floors().data();
     double* __restrict step = step_.data();
     double* __restrict ratio = ratio_.data();
     for (std::size_t c = n; c < count; ++c) step[c] = std::fabs(now[c] - last[c]);
@@ -257,11 +191,11 @@ class ChannelGates {
         absent_ |= kMissing;
       }
       const bool odd = jumps || fault_[c] != Fault::none || (motion && now_[c] != now_[c]);
-      if (watched(c) && odd && seen_ >= warm_up_) judge(c, dt);
+      if (limits_.is_watched(c) && odd && seen_ >= warm_up_) judge(c, dt);
       if (gap || fault_[c] != Fault::none) step_[c] = kNever;
       else if (jumps && seen_ >= warm_up_) step_[c] = gate(c);
     }
-    if (gap) std::fill(drift_.begin(), drift_.end(), 0.0);
+    if (gap) speeds_.forget_all();
     find_all_sound();
   }
 
@@ -269,7 +203,7 @@ class ChannelGates {
     all_sound_ = std::all_of(fault_.begin(), fault_.end(), [](Fault f) { return f == Fault::none; });
   }
 
-  double gate(std::size_t c) const { return std::max(floor_[c], tuning_.jump * mean_[c]); }
+  double gate(std::size_t c) const { return std::max(limits_.floors()[c], tuning_.jump * mean_[c]); }
 
   void judge(std::size_t c, double dt) {
     const double x = now_[c];
@@ -280,7 +214,7 @@ class ChannelGates {
         if (c < at_.qd() && wraps(c, dt)) {
           const double turns = kTurn * std::round((x - last_[c]) / kTurn);
           last_[c] += turns;
-          tracked_[c] += turns;
+          ways_.turn(c, turns);
           return;
         }
         if (borne_out(c, dt)) return;
@@ -295,14 +229,14 @@ class ChannelGates {
       case Fault::absent: return near(c) ? take(c) : leave(c, Fault::wild);
       case Fault::stuck:
         if (now_[c] == last_[c]) return;
-        if (early_[c] != 0) passes_[c] = after(passed);
+        if (limits_.early(c)) passes_[c] = after(passed);
         if (++since_[c] < tuning_.changes) return;
         return c >= at_.tau() || near(c) ? take(c) : leave(c, Fault::wild);
       case Fault::step:
         calm_[c] = ratio_[c] > 1.0 ? tuning_.sure : std::max(calm_[c] - 1, 0);
         if (calm_[c] == 1 || ++since_[c] >= return_) take(c);
         return;
-      case Fault::disagrees:  // see `compare_speeds`
+      case Fault::disagrees:  // see `judge_speeds`
       case Fault::suspect: return;  // no gate says so
     }
   }
@@ -311,35 +245,33 @@ class ChannelGates {
   void leave(std::size_t c, Fault fault) {
     if (fault_[c] == fault) return;
     const bool held = fault_[c] == Fault::none || fault_[c] == Fault::spike;
-    if (held && c < at_.qd()) {
-      anchor_[c] = out_way(c);
-      blind_[c] = 0.0;
-    }
+    if (held && c < at_.qd()) ways_.lose(c, usable_speed(c), time_);
     fault_[c] = fault;
     since_[c] = calm_[c] = 0;
-    if (c < at_.tau()) drift_[c % at_.joints] = 0.0;
+    if (c < at_.tau()) speeds_.forget(c % at_.joints);
   }
 
-  // Where the joint was at the last sample, and has come since by its speed.
-  double out_way(std::size_t j) const {
-    return tracked_[j] + (time_ - tracked_at_) * (usable(at_.qd() + j) ? now_[at_.qd() + j] : speed_[j]);
-  }
   bool usable(std::size_t c) const {
     return (fault_[c] == Fault::none || fault_[c] == Fault::spike) && now_[c] == now_[c];
+  }
+  // The velocity of joint j; null: not believed.
+  const double* usable_speed(std::size_t j) const {
+    return usable(at_.qd() + j) ? &now_[at_.qd() + j] : nullptr;
   }
 
   // Joints whose positions are not believed go on by their speeds.
   void carry(double dt) {
     for (std::size_t j = 0; j < at_.joints; ++j) {
       if (fault_[j] == Fault::none || fault_[j] == Fault::spike) continue;
-      anchor_[j] += dt * (usable(at_.qd() + j) ? now_[at_.qd() + j] : kNever);
-      blind_[j] += dt;
+      const double* speed = usable_speed(j);
+      ways_.carry(j, speed != nullptr ? *speed : kNever, dt);
     }
   }
 
   // Is a reading that comes back where what stands in for it is, or is nothing known of it?
   bool near(std::size_t c) const {
-    const double at = c < at_.qd() ? anchor_[c] : speed_[c - at_.qd()] + 0.0 * tracked_[c - at_.qd()];
+    const std::size_t j = c % at_.joints;  // of a velocity nothing is known where the position is not
+    const double at = c < at_.qd() ? ways_.anchor(j) : ways_.speed(j) + 0.0 * ways_.tracked(j);
     return !(std::fabs(now_[c] - at) > gate(c));
   }
 
@@ -349,27 +281,17 @@ class ChannelGates {
     if (!all_sound_ || gap) {
       for (std::size_t j = 0; j < n; ++j) {
         const bool lost = !usable(j),
-            jumped = std::fabs(now_[j] - tracked_[j]) > gate(j) + dt * tuning_.fastest;
+            jumped = std::fabs(now_[j] - ways_.tracked(j)) > gate(j) + dt * tuning_.fastest;
         if (gap || lost || jumped) begin_tracking(j);
-        else track_one(j, dt);
+        else ways_.follow(j, now_[j], dt);
       }
     } else {
-      for (std::size_t j = 0; j < n; ++j) track_one(j, dt);
+      for (std::size_t j = 0; j < n; ++j) ways_.follow(j, now_[j], dt);
     }
-    tracked_at_ = time_;
-  }
-  void track_one(std::size_t j, double dt) {
-    const double v = speed_[j], a = acceleration_[j], ahead = tracked_[j] + dt * (v + 0.5 * dt * a);
-    const double off = now_[j] - ahead;
-    tracked_[j] = ahead + follows_[0] * off;
-    speed_[j] = v + dt * a + follows_[1] * off;
-    acceleration_[j] = a + follows_[2] * off;
+    ways_.followed(time_);
   }
   void begin_tracking(std::size_t j) {
-    tracked_[j] = usable(j) ? now_[j] : anchor_[j];
-    if (usable(at_.qd() + j)) speed_[j] = now_[at_.qd() + j];
-    acceleration_[j] = 0.0;
-    tracked_at_ = time_;
+    ways_.begin(j, usable(j) ? now_[j] : ways_.anchor(j), usable_speed(j), time_);
   }
 
   static Passes after(Passes before) {
@@ -407,18 +329,18 @@ class ChannelGates {
     if (c < at_.qd()) {
       if (near(c)) return take(c);
       since_[c] = calm ? since_[c] + 1 : 0;
-      if (since_[c] >= (blind_[c] < tuning_.way_blind ? return_ : tuning_.good)) take(c);
+      if (since_[c] >= (ways_.blind(c) < tuning_.way_blind ? return_ : tuning_.good)) take(c);
       return;
     }
-    if (!calm && c < at_.tau()) drift_[c - at_.qd()] = 0.0;
+    if (!calm && c < at_.tau()) speeds_.forget(c - at_.qd());
     since_[c] = calm && (c >= at_.tau() || near(c)) ? since_[c] + 1 : 0;
     const bool returned = std::fabs(now_[c] - candidate_[c]) <= gate(c);
-    if (early_[c] != 0 && (since_[c] > 0 || returned)) passes_[c] = after(passed);
+    if (limits_.early(c) && (since_[c] > 0 || returned)) passes_[c] = after(passed);
     if (since_[c] >= tuning_.good) take(c);
   }
 
   bool lives(std::size_t c, double before) const {
-    return now_[c] != before || often_[c] < tuning_.lively;
+    return now_[c] != before || (c < at_.tau() ? speeds_.is_dull(c) : stuck_.is_dull(c));
   }
 
   // The reading counts again.
@@ -426,11 +348,11 @@ class ChannelGates {
     fault_[c] = Fault::none;
     passes_[c] = Passes::no;
     since_[c] = 0;
-    evidence_[c] = run_[c] = 0.0;
-    if (c < at_.tau()) drift_[c % at_.joints] = 0.0;
+    stuck_.forget(c);
+    if (c < at_.tau()) speeds_.forget(c % at_.joints);
     if (c >= at_.qd()) return;
     const std::size_t v = at_.qd() + c;
-    const bool nothing_known = tracked_[c] != tracked_[c];
+    const bool nothing_known = ways_.tracked(c) != ways_.tracked(c);
     if (nothing_known && fault_[v] == Fault::absent && now_[v] == now_[v]) fault_[v] = Fault::none;
     begin_tracking(c);
   }
@@ -446,17 +368,27 @@ class ChannelGates {
     if (c < at_.qd()) return false;
     if (c < at_.tau()) return speed_borne_out(c - at_.qd(), dt);
     const std::size_t first = at_.wrench(), sensor = c < first ? 0 : (c - first) / 6;
+    const bool sudden = news(c) > kSudden * ratio_[c];
     for (std::size_t other = at_.qd(); other < at_.count(); ++other) {
       const bool same = c == other || (c >= first && other >= first && (other - first) / 6 == sensor);
-      if (!same && moves(other) && ratio_[other] > tuning_.equal * ratio_[c]) return true;
+      if (same || !moves(other)) continue;
+      const bool bears = sudden ? news(other) > tuning_.equal * news(c)
+                                : ratio_[other] > tuning_.equal * ratio_[c];
+      if (bears) return true;
     }
     return c >= first && !witnessed(c) && one_force(sensor, c);
   }
 
+  // How much more a channel steps than in the sample before. What others have done for some samples does
+  // not bear out what one does suddenly: a push that is let go does not explain a jump of one torque.
+  double news(std::size_t c) const { return ratio_[c] - ratio_before_[c]; }
+  static constexpr double kSudden = 0.5;  // part of a step that the last one had not: more than a ramp's
+
   // Is there a sensor inboard that feels all that this channel can feel, and is it believed?
   bool witnessed(std::size_t c) const {
-    if (witness_[c] < 0) return false;
-    const std::size_t first = at_.wrench() + 6 * witness_[c];
+    const int witness = limits_.witness(c);
+    if (witness < 0) return false;
+    const std::size_t first = at_.wrench() + 6 * static_cast<std::size_t>(witness);
     for (std::size_t i = first; i < first + 6; ++i) {
       if (fault_[i] != Fault::none || !(step_[i] == step_[i])) return false;
     }
@@ -466,19 +398,19 @@ class ChannelGates {
   // Would a contact that moves it move others, too? Of joint torques alone a push may load one: its
   // line meets the axes of the others.
   Moved moved(std::size_t c) const {
-    return c < at_.tau() || c >= at_.wrench() || witness_[c] >= 0 ? Moved::wrongly : Moved::alone;
+    return c < at_.tau() || c >= at_.wrench() || limits_.witness(c) >= 0 ? Moved::wrongly : Moved::alone;
   }
 
   // Has a position gone on after a whole turn?
   bool wraps(std::size_t j, double dt) const {
     const double way = now_[j] - last_[j];
-    return wraps_[j] && std::fabs(way - kTurn * std::round(way / kTurn) -
+    return limits_.wraps(j) && std::fabs(way - kTurn * std::round(way / kTurn) -
                                   dt * last_[at_.qd() + j]) <= gate(j);
   }
   static constexpr double kTurn = 6.283185307179586;  // [rad]
 
   bool moves(std::size_t c) const {
-    return watched(c) && fault_[c] == Fault::none &&
+    return limits_.is_watched(c) && fault_[c] == Fault::none &&
         step_[c] > tuning_.moves * mean_[c] + kLeastMove;
   }
   static constexpr double kLeastMove = 1e-9;  // of any unit: rounding
@@ -497,7 +429,7 @@ class ChannelGates {
     double d[6];
     int moving = 0;
     for (int i = 0; i < 6; ++i) {
-      if (!watched(first + i)) return false;
+      if (!limits_.is_watched(first + i)) return false;
       d[i] = now_[first + i] - last_[first + i];
       moving += moves(first + i) && ratio_[first + i] > tuning_.equal * ratio_[c] ? 1 : 0;
     }
@@ -524,61 +456,18 @@ class ChannelGates {
   }
   static constexpr int kSeenMost = 1 << 20;  // samples: the mean has forgotten them long ago
 
-  // By how much the way of each joint differs from its speed, over some samples.
-  void compare_speeds(double dt) {
-    const std::size_t n = at_.joints;
-    const double* __restrict now = now_.data();
-    const double* __restrict last = last_.data();
-    double* __restrict drift = drift_.data();
-    double* __restrict usual = usual_drift_.data();
-    const double silent = silent_, rate = rate_, kept = kept_;
-    const double stands = tuning_.stands, surely = tuning_.surely, stale = tuning_.stale;
-    const double disagrees = tuning_.disagrees;
-    double* __restrict same = same_.data();
-    double* __restrict often = often_.data();
-    for (std::size_t c = 0; c < 2 * n; ++c) {
-      const bool changes = !(now[c] == last[c]);
-      same[c] = changes ? 0.0 : same[c] + 1.0;
-      often[c] += same[c] < stands ? rate * ((changes ? 1.0 : 0.0) - often[c]) : 0.0;
-    }
-    const double least = least_drift();
-    double worst = 0.0;
-    for (std::size_t j = 0; j < n; ++j) {
-      const double off = now[j] - last[j] - 0.5 * dt * (now[n + j] + last[n + j]);
-      const double sum = kept * drift[j] + off, size = std::fabs(sum);
-      drift[j] = sum == sum ? sum : 0.0;
-      const double most = disagrees * usual[j] > least ? disagrees * usual[j] : least;
-      const double clipped = size < most ? size : most;
-      usual[j] += rate * (clipped - usual[j]);
-      const bool dead = same[n + j] >= stands && often[n + j] > surely;
-      const double over = dead ? 2.0 : (same[n + j] < silent ? size : stale * size) / most;
-      worst = over > worst ? over : worst;
-    }
-    if (worst > 1.0 || any_far_) judge_speeds();
-  }
-  double compared_over() const {  // [s]
-    return std::max(tuning_.speed_window, tuning_.speed_window_samples * period_);
-  }
-  double least_drift() const { return tuning_.speed_error * compared_over(); }
-  // One that has not changed for so long needs little to be told from one that is right.
-  bool stale(std::size_t c) const { return same_[c] >= silent_; }
-  bool far(std::size_t j) const {
-    const double off = std::fabs(drift_[j]) * (stale(at_.qd() + j) ? tuning_.stale : 1.0);
-    return off > std::max(tuning_.disagrees * usual_drift_[j], least_drift());
-  }
-
   void judge_speeds() {
     any_far_ = false;
     for (std::size_t j = 0; j < at_.joints; ++j) {
       Fault &position = fault_[j], &speed = fault_[at_.qd() + j];
       const bool told = speed == Fault::disagrees;
       if (told) {
-        far_[j] = far(j) ? dwell_ : far_[j] - 1;
+        far_[j] = speeds_.far(j) ? dwell_ : far_[j] - 1;
         if (far_[j] <= 0) take(j), take(at_.qd() + j);
       } else {
-        far_[j] = far(j) ? far_[j] + 1 : 0;
+        far_[j] = speeds_.far(j) ? far_[j] + 1 : 0;
         const bool free = position == Fault::none && speed == Fault::none;
-        const bool stands = same_[j] >= tuning_.stands && same_[at_.qd() + j] < 1.0;
+        const bool stands = stands_still(j);
         if (!free || seen_ <= warm_up_) continue;
         if (dead(j)) leave(at_.qd() + j, Fault::stuck);
         else if (far_[j] >= dwell_ || (far_[j] > 0 && stands)) tell_one(j);
@@ -590,20 +479,24 @@ class ChannelGates {
 
   // Has a velocity that changes with each sample stopped to do so while its joint moves?
   bool dead(std::size_t j) const {
-    const std::size_t v = at_.qd() + j;
-    const bool still = same_[v] >= tuning_.stands && often_[v] > tuning_.surely;
-    return still && same_[j] < 1.0 && std::fabs(speed_[j]) > tuning_.stuck_speed;
+    return speeds_.is_still(j) && speeds_.same(j) < 1.0 &&
+           std::fabs(ways_.speed(j)) > tuning_.stuck_speed;
+  }
+  // Has a position stopped to change while its velocity does?
+  bool stands_still(std::size_t j) const {
+    return speeds_.same(j) >= tuning_.stands && speeds_.same(at_.qd() + j) < 1.0;
   }
 
   // Position and velocity of a joint disagree: one that has stood still since is the wrong one.
   void tell_one(std::size_t j) {
     const std::size_t v = at_.qd() + j;
-    if (same_[j] >= tuning_.stands && same_[v] < 1.0) {
+    const double same = speeds_.same(j);
+    if (stands_still(j)) {
       leave(j, Fault::stuck);
-      anchor_[j] = now_[j] + same_[j] * period_ * now_[v];  // what it has missed so far
+      ways_.lose_at(j, now_[j] + same * period_ * now_[v]);  // what it has missed so far
       return;
     }
-    if (same_[v] >= dwell_ && same_[j] < dwell_) return leave(v, Fault::stuck);
+    if (speeds_.same(v) >= dwell_ && same < dwell_) return leave(v, Fault::stuck);
     fault_[j] = fault_[v] = Fault::disagrees;
   }
 
@@ -617,49 +510,9 @@ class ChannelGates {
     return speed > tuning_.stuck_speed;
   }
 
-  // How often torques and wrenches change, and since when one has not.
-  void count_changes(double dt) {
-    const std::size_t first = at_.tau(), count = at_.count();
-    const double* __restrict now = now_.data();
-    const double* __restrict last = last_.data();
-    double* __restrict often = often_.data();
-    double* __restrict evidence = evidence_.data();
-    double* __restrict run = run_.data();
-    double* __restrict longest = longest_.data();
-    double* __restrict highest = highest_.data();
-    double* __restrict lowest = lowest_.data();
-    double changes = 0.0, most = 0.0;
-    for (std::size_t c = 0; c < count; ++c) changes += std::fabs(now[c] - last[c]) > 0.0 ? 1.0 : 0.0;
-    if (changes == 0.0) return;  // a sample that was held or came twice
-    const double kept = 1.0 - std::min(1.0, dt / tuning_.run_memory);
-    const double silent = silent_, rate = rate_;
-    const double likely = tuning_.evidence, likely_at_end = tuning_.evidence_at_end;
-    for (std::size_t c = first; c < count; ++c) {
-      const double d = std::fabs(now[c] - last[c]);
-      const double p = often[c], p2 = p * p, p8 = p2 * p2 * p2 * p2;
-      const double before = longest[c] * kept;
-      longest[c] = d > 0.0 && run[c] > before ? run[c] : before;
-      run[c] = d == 0.0 ? run[c] + 1.0 : 0.0;
-      evidence[c] = d == 0.0 ? evidence[c] + p + p2 + 2.0 * p8 : 0.0;  // about -log(1 - p) each
-      const double off = (d > 0.0 ? 1.0 : 0.0) - p;
-      often[c] += d == d && run[c] < silent ? rate * off : 0.0;
-      const bool edge = now[c] >= highest[c] || now[c] <= lowest[c];
-      highest[c] = now[c] > highest[c] ? now[c] : highest[c];
-      lowest[c] = now[c] < lowest[c] ? now[c] : lowest[c];
-      const double over = evidence[c] - (edge ? likely_at_end : likely);
-      most = over > most ? over : most;
-    }
-    if (most > 0.0 && seen_ > warm_up_) find_stuck();
-  }
-
   void find_stuck() {
     for (std::size_t c = at_.tau(); c < at_.count(); ++c) {
-      if (!watched(c) || fault_[c] != Fault::none || run_[c] < tuning_.runs * longest_[c]) continue;
-      const bool edge = now_[c] == highest_[c] || now_[c] == lowest_[c];
-      const bool stuck = run_[c] >= silent_ && evidence_[c] > tuning_.evidence;
-      const bool clipped = edge && run_[c] >= tuning_.least_at_end &&
-                           evidence_[c] > tuning_.evidence_at_end;
-      if (!stuck && !clipped) continue;
+      if (!limits_.is_watched(c) || fault_[c] != Fault::none || !stuck_.is_stuck(c, now_[c])) continue;
       fault_[c] = Fault::stuck;
       since_[c] = 0;
     }
@@ -673,8 +526,8 @@ class ChannelGates {
       const std::size_t v = at_.qd() + j;
       const bool way = usable(j), speed = usable(v);
       if (!way && speed && fault_[j] != Fault::none &&
-          blind_[j] < tuning_.way_blind) out_[j] = anchor_[j];
-      if (!speed && way && fault_[v] != Fault::none) out_[v] = speed_[j];
+          ways_.blind(j) < tuning_.way_blind) out_[j] = ways_.anchor(j);
+      if (!speed && way && fault_[v] != Fault::none) out_[v] = ways_.speed(j);
     }
     return {time, out_.data() + at_.q(), out_.data() + at_.qd(), out_.data() + at_.tau(),
             out_.data() + at_.wrench()};
@@ -682,28 +535,23 @@ class ChannelGates {
 
   GatesTuning tuning_;
   ChannelLayout at_;
-  double period_;
-  std::vector<double> floor_;  // of steps that are judged; infinite: not a channel
-  std::vector<int> witness_;   // the sensor that feels all that a torque or wrench feels; -1: none
-  std::vector<char> wraps_;    // per joint: may it turn without end?
+  double period_, memory_;  // [s]; part of a mean that one sample is at least
+  int warm_up_, held_most_, return_, dwell_;  // [samples]
+  GateLimits limits_;
+  StuckWatch stuck_;
+  SpeedWatch speeds_;
+  JointWays ways_;
   // Now: as read, but for what is held. Out: what goes on, with NaN.
   std::vector<double> now_, last_, out_, candidate_;
-  std::vector<double> mean_, step_, ratio_;                // of steps
-  std::vector<double> often_, evidence_, run_, longest_, highest_, lowest_;  // of values that stay
-  std::vector<double> drift_, usual_drift_, anchor_;      // of joints
-  std::vector<double> tracked_, speed_, acceleration_;  // position, velocity, acceleration, of positions
-  std::vector<double> blind_;  // [s] without a position that is believed
-  std::vector<double> same_;   // samples for which a position or velocity has been the same
-  double follows_[3] = {}, tracked_at_ = kNever;
+  std::vector<double> mean_, step_, ratio_, ratio_before_;  // of steps
   std::vector<double> spiked_;  // when it jumped last [s]
   std::vector<Moved> moved_;    // see `take_moved`
   std::vector<int> far_;
   std::vector<int> since_, calm_;  // samples, of what a fault waits for
   std::vector<Passes> passes_;
-  std::vector<char> early_;   // may it, since the filters wait for longer? Of torques and wrenches
   std::vector<Fault> fault_;
-  double time_ = kNever, memory_ = 0.0, rate_ = 0.0, kept_ = 0.0;
-  int seen_ = 0, warm_up_ = 0, held_most_ = 1, silent_ = 0, return_ = 0, dwell_ = 0, refusals_ = 0;
+  double time_ = kNever, rate_ = 0.0;
+  int seen_ = 0, refusals_ = 0;
   bool all_sound_ = true, any_far_ = false, absurd_ = false;
   Health absent_ = 0;
 };

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// Events under the numbers under which they are told. Each pipeline counts its own ones. Where another
+// one speaks, its events get new numbers, or go on with those of the one before.
+// Theory: docs/theory.md, section 3.6.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include "touchline/pipeline.hpp"
+#include "touchline/result.hpp"
+#include "touchline/sample.hpp"
+
+namespace touchline {
+
+class EventNumbers {
+ public:
+  // At most so many at a time.
+  explicit EventNumbers(std::size_t most) { numbered_.reserve(most); }
+
+  bool empty() const { return numbered_.empty(); }
+  bool full() const { return numbered_.size() >= numbered_.capacity(); }
+  // The next one, as far as told.
+  int next() const { return next_; }
+  void count_from(int next) { next_ = next; }
+
+  bool knows(const Pipeline& of, int own) const { return find(of, own) != nullptr; }
+  // Does event `own` of a pipeline go on with one that was told before?
+  bool continues(const Pipeline& of, int own) const {
+    const Numbered* n = find(of, own);
+    return n != nullptr && n->continues;
+  }
+  // The number under which it has been told; -1: none of its own.
+  int told(const Pipeline& of, int own) const {
+    const Numbered* n = find(of, own);
+    return n != nullptr ? n->told : -1;
+  }
+
+  // The number under which it is told. `keeps`: that of its pipeline, if it is new.
+  int of(const Pipeline& pipeline, int own, bool keeps) {
+    if (const Numbered* n = find(pipeline, own)) return n->told;
+    if (keeps && own >= next_) return own;
+    if (!full()) numbered_.push_back({&pipeline, own, next_});
+    return next_++;
+  }
+
+  // It goes on with an event.
+  void go_on(const Pipeline& of, int own, const Event& with) {
+    numbered_.push_back({&of, own, with.id, true, with.detected, with.decided, with.level});
+  }
+
+  void forget(const Pipeline& of, int own) {
+    numbered_.erase(
+        std::remove_if(numbered_.begin(), numbered_.end(),
+                       [&](const Numbered& n) { return n.of == &of && n.own == own; }),
+        numbered_.end());
+  }
+  void forget_all() { numbered_.clear(); }
+
+  // What an event, or a contact of one, takes over of the one that it goes on with.
+  void take_over(const Pipeline& of, int own, Event& event) const {
+    const Numbered* n = find(of, own);
+    if (n == nullptr || !n->continues) return;
+    event.detected = n->detected;
+    event.level = std::max(event.level, n->level);
+    if (n->decided == n->decided) event.decided = n->decided;
+  }
+  void take_over(const Pipeline& of, int own, Contact& contact) const {
+    const Numbered* n = find(of, own);
+    if (n != nullptr && n->continues) contact.level = std::max(contact.level, n->level);
+  }
+
+ private:
+  struct Numbered {
+    const Pipeline* of;
+    int own, told;
+    bool continues = false;  // with an event that had been detected then:
+    double detected = kUnknown, decided = kUnknown;  // [s]
+    ContactLevel level = ContactLevel::contact;
+  };
+
+  const Numbered* find(const Pipeline& of, int own) const {
+    for (const Numbered& n : numbered_) {
+      if (n.of == &of && n.own == own) return &n;
+    }
+    return nullptr;
+  }
+
+  std::vector<Numbered> numbered_;
+  int next_ = 0;
+};
+
+}  // namespace touchline
