@@ -56,7 +56,6 @@ class Detector {
         averages_(rows_.size()),
         shown_by_motion_(rows_.size()),
         ages_(rows_.segments(), 0.0),
-        off_(rows_.segments(), 0),
         fires_(rows_.segments(), 0),
         scores_(rows_.segments()),
         excess_(rows_.size(), 1.0),
@@ -241,7 +240,7 @@ class Detector {
       off = off || offsets_.shown(i) > row.contact || meters_.contradicts(i, tuning_);
       if (!std::isfinite(s.innovation)) s.innovation = s.residual;  // samples were lost
     }
-    off_[g] = off && fires_[g];
+    rows_.off[g] = off && fires_[g];
   }
 
   bool read_wrench(std::size_t g, double* wrench, double* innovation) const {
@@ -260,7 +259,7 @@ class Detector {
   }
 
   // Has the arm shown that a segment is not as told, and moves? Then what is seen of its rows counts.
-  bool learns(std::size_t g) const { return off_[g] != 0 && motion_.moves(); }
+  bool learns(std::size_t g) const { return rows_.off[g] != 0 && motion_.moves(); }
 
   // How much has been seen of a segment's noise? The first moments show whether there is more than told.
   Seen seen(std::size_t g) const {
@@ -347,7 +346,6 @@ class Detector {
     const bool moves_off = learns(g);
     for (const std::size_t i : rows_.of(g)) test_row(i, moves_off, s, rows);
     s.age = ages_[g];
-    s.off = off_[g] != 0;
     s.seen = seen(g);
     if (joint_tests_ && placed_) {
       double most = std::numeric_limits<double>::infinity();
@@ -389,7 +387,7 @@ class Detector {
       const bool felt = levels_.is_felt(g), pending = levels_.is_pending(g);
       const bool learns_now =
           learns(g) && dt > 0.0 && (felt ? levels_.is_own_doing(g) : !levels_.steps(g));
-      const bool rests = stopped && off_[g] != 0;
+      const bool rests = stopped && rows_.off[g] != 0;
       const bool usual = !(confirmed || looking || learns_now || felt || rests || pending);
       for (const std::size_t i : rows_.of(g)) {
         averages_[i] = rows_.known[i];
@@ -447,7 +445,6 @@ class Detector {
   // what motion alone shows [N or Nm].
   RowLanes adapts_, counts_, averages_, shown_by_motion_;
   std::vector<double> ages_;  // per segment: since its first settled sample [s]
-  std::vector<char> off_;     // per segment: has the arm shown that it is not as told?
   std::vector<char> fires_;   // per segment: can a test fire, or are statistics all that is asked for?
   std::vector<SegmentScore> scores_;  // per segment: of the sample
   std::vector<SegmentTests> tests_;   // per segment

@@ -27,7 +27,6 @@ struct SegmentScore {
   double peak = 0.0;       // the largest share of its rows
   double score = 0.0, borne = 0.0;  // of all tests, in thresholds; of what no single sample moves
   double collision = 0.0, borne_collision = 0.0;  // of its rows, in thresholds of a collision
-  bool off = false;        // has the arm shown that it is not as told?
   double age = 0.0;        // since its first settled sample [s]
   Seen seen = Seen::little;
 };
@@ -59,12 +58,12 @@ class SegmentLevels {
   // Is what is felt of a segment most likely the arm's own doing: an error of its model in motion?
   bool is_own_doing(std::size_t g) const {
     const Segment& s = segments_[g];
-    return s.off && motion_.moves() && (s.origin != Origin::push || s.lasted > tuning_.hand);
+    return is_off(g) && motion_.moves() && (s.origin != Origin::push || s.lasted > tuning_.hand);
   }
 
   // Has the arm shown that it is not as told, and does it move, or has it since the event began?
   bool has_moved_off(std::size_t g) const {
-    return segments_[g].off && (segments_[g].in_motion || motion_.moves());
+    return is_off(g) && (segments_[g].in_motion || motion_.moves());
   }
 
   // Does a sensor's wrench change faster than motions do? That is not learned as one of their errors.
@@ -79,7 +78,6 @@ class SegmentLevels {
   // A sample, dt [s] after the one before.
   void decide(std::size_t g, const SegmentScore& now, double dt) {
     Segment& s = segments_[g];
-    s.off = now.off;
     if (is_joined(g)) {  // what there was is an offset, and the push is its own event
       come_to_rest(g);
       s.lasted = 0.0;
@@ -87,7 +85,7 @@ class SegmentLevels {
       return;
     }
     const bool quiet = is_quiet(g);
-    const bool may_begin = now.score > 1.0 || now.collision > 1.0 || (s.off && motion_.moves());
+    const bool may_begin = now.score > 1.0 || now.collision > 1.0 || (is_off(g) && motion_.moves());
     if (quiet && may_begin) s.origin = origin(g, now, dt);
     // What creeps may be over its limit a moment before a push is: that has no before.
     const bool recent = s.lasted < tuning_.trend / rows_.slowest(g);
@@ -135,7 +133,6 @@ class SegmentLevels {
   };
 
   struct Segment {
-    bool off = false;  // has the arm shown that it is not as told?
     Holding contact, collision;
     Origin origin = Origin::start;
     bool in_motion = false;  // did the present event begin while the arm moved?
@@ -147,6 +144,9 @@ class SegmentLevels {
     // Its largest mean of the last moments, in limits; the same of the sensors' rows alone.
     double top = 0.0, top_wrench = 0.0;
   };
+
+  // Has the arm shown that it is not as told?
+  bool is_off(std::size_t g) const { return rows_.off[g] != 0; }
 
   // Which rows of a segment: all, or those that its sensor's wrench has.
   enum class Rows { all, wrench };
@@ -177,7 +177,7 @@ class SegmentLevels {
     if (!test.holds || test.since < times_.min_duration) return false;
     if (times_.min_duration <= 0.0) return true;
     const Segment& s = segments_[g];
-    const bool barely = s.contact.highest < tuning_.barely && s.off && motion_.moves();
+    const bool barely = s.contact.highest < tuning_.barely && is_off(g) && motion_.moves();
     const double moments = tuning_.trend / rows_.slowest(g);
     if (barely && test.since < moments) return false;  // an error of the model passes
     switch (now.seen) {
@@ -241,8 +241,8 @@ class SegmentLevels {
   bool may_rest(std::size_t g) const {
     const Segment& s = segments_[g];
     const bool little = s.origin == Origin::start || lately(g) < tuning_.little * s.top;
-    if (!little || !(s.off || s.in_motion)) return false;
-    return motion_.stands() ? s.off : lately(g) < std::max(tuning_.barely, tuning_.trace * s.top);
+    if (!little || !(is_off(g) || s.in_motion)) return false;
+    return motion_.stands() ? is_off(g) : lately(g) < std::max(tuning_.barely, tuning_.trace * s.top);
   }
 
   // Does nothing of a contact load the segment's sensors any more, of such an arm? What its joints
