@@ -101,7 +101,7 @@ class SegmentLevels {
     if (lasts(g, s.contact, now, now.score, now.borne)) levels_[g] = std::max(levels_[g], 1);
     if (lasts(g, s.collision, now, now.collision, now.borne_collision)) levels_[g] = 2;
     if (!is_felt(g)) {
-      s.top = s.top_wrench = s.rest = s.back = s.below = s.lasted = 0.0;
+      s.top = s.top_wrench = s.rest = s.back = s.below = s.lasted = s.clear = 0.0;
       s.in_motion = motion_.moves();
       return;
     }
@@ -138,6 +138,7 @@ class SegmentLevels {
     bool in_motion = false;  // did the present event begin while the arm moved?
     // Of the present event, for how long [s]:
     double lasted = 0.0;
+    double clear = 0.0;  // it has been known to exceed its limits clearly
     double below = 0.0;  // it has been below what releases it
     double rest = 0.0;   // little has been left of it, and that has not changed
     double back = 0.0;   // all has been as before the offset that stands there now
@@ -160,6 +161,7 @@ class SegmentLevels {
     s.lasted += dt;
     s.top = std::max(s.top, lately(g));
     s.top_wrench = std::max(s.top_wrench, lately(g, Rows::wrench));
+    if (s.top > tuning_.barely) s.clear += dt;
     s.rest = lasting((may_rest(g) && is_steady(g)) || only_joints_left(g), dt, s.rest);
     if (s.below >= times_.hold) levels_[g] = 0;
     const double least = tuning_.rest / rows_.slowest(g);
@@ -221,12 +223,21 @@ class SegmentLevels {
     return false;
   }
 
+  // Is what is felt an error of the model, though nothing else has shown that there is one? Joints alone
+  // have felt it, of an arm in motion, hardly over their limits, for longer than pushes take to rise. What
+  // has clearly exceeded them within the last moments may be a push on top of that.
+  bool is_faint(std::size_t g) const {
+    const Segment& s = segments_[g];
+    return s.in_motion && s.top_wrench <= 1.0 && s.clear < tuning_.trend / rows_.slowest(g) &&
+           s.lasted - s.clear > tuning_.rest_moving;
+  }
+
   // Does a push join what most likely is the arm's own doing, or what only joints have felt, of an arm
-  // in motion that is not as told? A sensor's wrench then steps by more than its limit. What lasts for
-  // less than the mean of the last moments has no before.
+  // in motion that is not as told or is felt but faintly? A sensor's wrench then steps by more than its
+  // limit. What lasts for less than the mean of the last moments has no before.
   bool is_joined(std::size_t g) const {
     const Segment& s = segments_[g];
-    if (!is_felt(g) || !has_moved_off(g)) return false;
+    if (!is_felt(g) || !(has_moved_off(g) || is_faint(g))) return false;
     if (s.top_wrench > 1.0 && (s.origin == Origin::push || !is_own_doing(g))) return false;
     if (s.lasted < tuning_.trend / rows_.slowest(g)) return false;
     for (const std::size_t i : rows_.of(g))
@@ -282,7 +293,7 @@ class SegmentLevels {
     Segment& s = segments_[g];
     s.contact.end();
     s.collision.end();
-    s.below = s.top = s.top_wrench = s.rest = s.back = 0.0;
+    s.below = s.top = s.top_wrench = s.rest = s.back = s.clear = 0.0;
   }
 
   const DetectorRows& rows_;
