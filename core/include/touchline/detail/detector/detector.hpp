@@ -61,7 +61,9 @@ class Detector {
         excess_(rows_.size(), 1.0),
         standing_(rows_.size()),
         loadable_(std::move(loadable)),
-        statistics_(rows_.segments() * settings_.tests.size(), 0.0) {
+        statistics_(rows_.segments() * settings_.tests.size(), 0.0),
+        placing_(rows_.size(), 0.0),
+        known_for_(rows_.segments(), 0.0) {
     loadable_.resize(rows_.size(), 1);
     for (const TestSetting& setting : settings_.tests)
       for (std::size_t g = 0; g < fires_.size(); ++g) fires_[g] |= std::isfinite(setting.limits[g]);
@@ -105,6 +107,7 @@ class Detector {
     }
     if (dt > 0.0 && sound_)
       drift_.follow(levels_, offsets_, friction_, meters_, activity(), q, dt);
+    tell_places();
   }
 
   const std::vector<DetectionRow>& rows() const { return rows_.all(); }
@@ -114,6 +117,10 @@ class Detector {
   const RowLanes& limits() const { return rows_.limits; }
   // Per row: one sigma of what the model's errors may have added since the baseline [N or Nm].
   const std::vector<double>& drift() const { return drift_.drift(); }
+  // For places, which may take another offset: per row (residual - offset) / contact threshold; per
+  // segment over how long that offset has been averaged [s].
+  const std::vector<double>& placing() const { return placing_; }
+  const std::vector<double>& quiet_of_places() const { return known_for_; }
   // Per row: how many times as large as told its noise is seen to be, at least 1.
   const std::vector<double>& excess() const { return excess_; }
   // Per row: can a contact load it?
@@ -413,6 +420,19 @@ class Detector {
     friction_.average(averages_, dt);
   }
 
+  // What places are found from.
+  void tell_places() {
+    known_for_ = offsets_.quiet();
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      placing_[i] = rows_.normalized[i];
+      const double share = drift_.lately_share(i);
+      if (!rows_.samples[i].known || !(share > 0.0)) continue;
+      placing_[i] -= share * (offsets_.reference(i) - offsets_.baseline(i)) / rows_[i].contact;
+      double& known_for = known_for_[rows_[i].segment];
+      known_for = std::min(known_for, offsets_.referred(i));
+    }
+  }
+
   // The first moments of a row's noise.
   void look(std::size_t i) {
     if (first_looks_[i].over()) return;
@@ -452,6 +472,7 @@ class Detector {
   std::vector<Standing> standing_;  // per row
   std::vector<char> loadable_;      // per row: can a contact load it?
   std::vector<double> statistics_;
+  std::vector<double> placing_, known_for_;  // for places, see `placing`
   const double* row_ = nullptr;
   double time_ = 0.0, since_ = 0.0;
   bool timed_ = false, placed_ = false, gap_ = false, joint_tests_ = false, sound_ = false;
