@@ -6,7 +6,10 @@ import pytest
 from shapes import chain
 from timeline import Push, ramp, signals
 
+from touchline.model.robot import load_robot
+from touchline.observer.dynamics import contact_loads
 from touchline.pipeline.pipeline import Pipeline
+from touchline.trials.free_motion import MotionMaker, Trajectory
 from touchline.trials.recordings import record_pushes, robot_named
 from touchline.trials.touches import Signals
 
@@ -120,6 +123,38 @@ def test_a_push_that_begins_while_an_error_creeps_over_its_limit_is_no_error():
     assert all(event.status == "located" for event in pipeline.events[7:])
     forces = [row.component in (0, 1, 2) for row in pipeline.thresholds.rows]
     assert np.max(detection.drift[-1][np.array(forces)]) < 0.5  # N
+
+
+def test_a_push_on_an_error_that_has_crept_over_its_limit_is_its_own_event():
+    # The torque of joint 5 errs by ever more as the arm moves: by 1.2 thresholds at last. Nothing
+    # else has shown yet that the arm is not as told.
+    robot, n = load_robot("sara"), 7
+    way = Trajectory(
+        np.linspace(-0.4, 0.5, n),
+        np.full((1, n), 0.2),
+        np.linspace(2.0, 3.5, n)[None, :],
+        np.linspace(0.0, 5.0, n)[None, :],
+        (1e-3, 0.0),
+    )
+    maker = MotionMaker(robot, robot, 1000.0, 4.5)
+    q, qd, loads = maker.loads(way)
+    (threshold,) = (r.contact for r in Pipeline(robot).thresholds.rows if r.joint == 4)
+    loads[:, 4] -= 1.2 * threshold * np.clip((maker.time - 2.0) / 0.6, 0.0, 1.0)
+    pushed = np.clip((maker.time - 3.0) / 0.02, 0.0, 1.0) - np.clip(
+        (maker.time - 3.5) / 0.02, 0.0, 1.0
+    )
+    force = pushed[:, None] * np.array([0.0, 0.0, -20.0])
+    at = np.array([robot.T_world_links(x)["link3"][:3, 3] for x in q])
+    contact = contact_loads(robot, q, "link3", np.hstack([force, np.cross(at, force)]))
+    loads[:, :n] -= contact.torque
+    loads[:, n:] -= contact.wrench.reshape(len(q), -1)
+    s = maker.sensed(q, qd, loads, np.random.default_rng(1))
+    pipeline = Pipeline(robot)
+    pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+    crept, push = spans(pipeline)
+    assert 2.3 < crept[0] < 2.9
+    assert 3.0 < push[0] < 3.05
+    assert push[1] is not None and 3.5 < push[1] < 3.8
 
 
 def test_of_slow_samples_what_trembles_after_a_strong_touch_does_not_prolong_it():

@@ -177,13 +177,13 @@ class Pipeline {
     const Estimate estimate(row, observer_.row_layout());
     const Span<double> normalized{detector_.normalized().data(), detector_.normalized().size()};
     if (touched_) {
-      localizer_.set_state(sample.q, sample.qd, detector_.drift().data(), detector_.quiet().data(),
-                           detector_.excess().data());
+      localizer_.set_state(sample.q, sample.qd, detector_.drift().data(),
+                           detector_.quiet_of_places().data(), detector_.excess().data());
     }
     for (std::size_t segment = 0; segment < levels_.size(); ++segment) {
       const int g = static_cast<int>(segment);
       const bool felt = levels_[segment] > 0.0;
-      localizer_.follow(g, felt, row, normalized.data(), sample.time, sample.q);
+      localizer_.follow(g, felt, row, detector_.placing().data(), sample.time, sample.q);
       const Reports& reports = localizer_.reports();
       if (felt) {
         suspects_.add(localizer_.suspect());

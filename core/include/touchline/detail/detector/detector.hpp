@@ -56,13 +56,14 @@ class Detector {
         averages_(rows_.size()),
         shown_by_motion_(rows_.size()),
         ages_(rows_.segments(), 0.0),
-        off_(rows_.segments(), 0),
         fires_(rows_.segments(), 0),
         scores_(rows_.segments()),
         excess_(rows_.size(), 1.0),
         standing_(rows_.size()),
         loadable_(std::move(loadable)),
-        statistics_(rows_.segments() * settings_.tests.size(), 0.0) {
+        statistics_(rows_.segments() * settings_.tests.size(), 0.0),
+        placing_(rows_.size(), 0.0),
+        known_for_(rows_.segments(), 0.0) {
     loadable_.resize(rows_.size(), 1);
     for (const TestSetting& setting : settings_.tests)
       for (std::size_t g = 0; g < fires_.size(); ++g) fires_[g] |= std::isfinite(setting.limits[g]);
@@ -106,6 +107,7 @@ class Detector {
     }
     if (dt > 0.0 && sound_)
       drift_.follow(levels_, offsets_, friction_, meters_, activity(), q, dt);
+    tell_places();
   }
 
   const std::vector<DetectionRow>& rows() const { return rows_.all(); }
@@ -115,6 +117,10 @@ class Detector {
   const RowLanes& limits() const { return rows_.limits; }
   // Per row: one sigma of what the model's errors may have added since the baseline [N or Nm].
   const std::vector<double>& drift() const { return drift_.drift(); }
+  // For places, which may take another offset: per row (residual - offset) / contact threshold; per
+  // segment over how long that offset has been averaged [s].
+  const std::vector<double>& placing() const { return placing_; }
+  const std::vector<double>& quiet_of_places() const { return known_for_; }
   // Per row: how many times as large as told its noise is seen to be, at least 1.
   const std::vector<double>& excess() const { return excess_; }
   // Per row: can a contact load it?
@@ -241,7 +247,7 @@ class Detector {
       off = off || offsets_.shown(i) > row.contact || meters_.contradicts(i, tuning_);
       if (!std::isfinite(s.innovation)) s.innovation = s.residual;  // samples were lost
     }
-    off_[g] = off && fires_[g];
+    rows_.off[g] = off && fires_[g];
   }
 
   bool read_wrench(std::size_t g, double* wrench, double* innovation) const {
@@ -260,7 +266,7 @@ class Detector {
   }
 
   // Has the arm shown that a segment is not as told, and moves? Then what is seen of its rows counts.
-  bool learns(std::size_t g) const { return off_[g] != 0 && motion_.moves(); }
+  bool learns(std::size_t g) const { return rows_.off[g] != 0 && motion_.moves(); }
 
   // How much has been seen of a segment's noise? The first moments show whether there is more than told.
   Seen seen(std::size_t g) const {
@@ -347,7 +353,6 @@ class Detector {
     const bool moves_off = learns(g);
     for (const std::size_t i : rows_.of(g)) test_row(i, moves_off, s, rows);
     s.age = ages_[g];
-    s.off = off_[g] != 0;
     s.seen = seen(g);
     if (joint_tests_ && placed_) {
       double most = std::numeric_limits<double>::infinity();
@@ -389,7 +394,7 @@ class Detector {
       const bool felt = levels_.is_felt(g), pending = levels_.is_pending(g);
       const bool learns_now =
           learns(g) && dt > 0.0 && (felt ? levels_.is_own_doing(g) : !levels_.steps(g));
-      const bool rests = stopped && off_[g] != 0;
+      const bool rests = stopped && rows_.off[g] != 0;
       const bool usual = !(confirmed || looking || learns_now || felt || rests || pending);
       for (const std::size_t i : rows_.of(g)) {
         averages_[i] = rows_.known[i];
@@ -413,6 +418,19 @@ class Detector {
     }
     offset_ = offsets_.follow_baselines(averages_, shown_by_motion_, dt);
     friction_.average(averages_, dt);
+  }
+
+  // What places are found from.
+  void tell_places() {
+    known_for_ = offsets_.quiet();
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      placing_[i] = rows_.normalized[i];
+      const double share = drift_.lately_share(i);
+      if (!rows_.samples[i].known || !(share > 0.0)) continue;
+      placing_[i] -= share * (offsets_.reference(i) - offsets_.baseline(i)) / rows_[i].contact;
+      double& known_for = known_for_[rows_[i].segment];
+      known_for = std::min(known_for, offsets_.referred(i));
+    }
   }
 
   // The first moments of a row's noise.
@@ -447,7 +465,6 @@ class Detector {
   // what motion alone shows [N or Nm].
   RowLanes adapts_, counts_, averages_, shown_by_motion_;
   std::vector<double> ages_;  // per segment: since its first settled sample [s]
-  std::vector<char> off_;     // per segment: has the arm shown that it is not as told?
   std::vector<char> fires_;   // per segment: can a test fire, or are statistics all that is asked for?
   std::vector<SegmentScore> scores_;  // per segment: of the sample
   std::vector<SegmentTests> tests_;   // per segment
@@ -455,6 +472,7 @@ class Detector {
   std::vector<Standing> standing_;  // per row
   std::vector<char> loadable_;      // per row: can a contact load it?
   std::vector<double> statistics_;
+  std::vector<double> placing_, known_for_;  // for places, see `placing`
   const double* row_ = nullptr;
   double time_ = 0.0, since_ = 0.0;
   bool timed_ = false, placed_ = false, gap_ = false, joint_tests_ = false, sound_ = false;

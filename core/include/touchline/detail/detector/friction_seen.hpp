@@ -61,10 +61,10 @@ class FrictionSeen {
   bool explains_onset(std::size_t i) const {
     if (!explains(i)) return false;
     const Joint& joint = joints_[i];
-    const bool stood = std::fabs(joint.trend) < kStood;
+    const bool stood = std::fabs(joint.trend) < tuning_.friction_stood;
     if (stood || offsets_.quick(i) < offsets_.creep(i)) return true;
     const double change = rows_.samples[i].residual - offsets_.trend(i), lately = joint.now - joint.trend;
-    const double least = kAsQuick * tuning_.creep_share * std::fabs(joint.trend - joint.base);
+    const double least = tuning_.friction_quick * tuning_.creep_share * std::fabs(joint.trend - joint.base);
     return change * lately < 0.0 && std::fabs(lately) >= least;
   }
 
@@ -86,12 +86,6 @@ class FrictionSeen {
   }
 
  private:
-  // Of the part by which a row changes quickly, no unit: other errors come beside friction, and the way
-  // may change by half of it in the same time.
-  static constexpr double kAsQuick = 0.5;
-  // Of its friction, no unit: less of it has come of a joint that stands.
-  static constexpr double kStood = 0.5;
-
   struct Joint {
     bool started = false;
     // The way it goes, -1 to 1: at this sample; filtered as its row is now, in the last moments, and of

@@ -74,10 +74,13 @@ class ModelDrift {
         longest_(longest),
         tuning_(tuning),
         posture_(rows.segments(), joints),
+        lately_(rows.segments(), joints),
         spreads_(rows.size()),
         shown_before_(rows.size()),
         way2_(rows.segments(), 0.0),
         was_quiet_(rows.segments(), 1),
+        is_off_(rows.segments(), 0),
+        lately_share_(rows.segments(), 0.0),
         drift_(rows.size(), 0.0) {}
 
   // Row i is so far off its baseline [N or Nm] for a time dt [s] of motion, `felt` or not.
@@ -103,11 +106,15 @@ class ModelDrift {
       if (quiet && offsets.quiet()[g] > 0.0 && !is_any_lost(g, offsets)) {
         const double tau = std::min(offsets.quiet()[g], longest_);
         posture_.average(g, q, std::min(1.0, dt / tau));
+        const double referred = offsets.referred(rows_.first(g));
+        if (referred > 0.0) lately_.average(g, q, std::min(1.0, dt / referred));
       }
       way2_[g] = posture_.distance2(g, q);
       const DriftShares shares(activity, way2_[g], tuning_);
       const double way2 = std::min(way2_[g], tuning_.drift_farthest * tuning_.drift_farthest);
       const bool moved = levels.has_moved_off(g);
+      if (quiet) is_off_[g] = moved ? 1 : 0;
+      lately_share_[g] = is_off_[g] != 0 ? nearness(way2_[g], lately_.distance2(g, q)) : 0.0;
       for (const std::size_t i : rows_.of(g)) {
         const double shown = moved && rows_[i].seen > 0.0
                                  ? (quiet ? beyond(i, noise) : shown_before_[i]).at(way2, tuning_)
@@ -120,6 +127,13 @@ class ModelDrift {
 
   // Per row: one sigma of it [N or Nm].
   const std::vector<double>& drift() const { return drift_; }
+  // Places take an offset between the baseline of row i and its reference: of the latter so much. A model
+  // errs now about as it did where the arm was near to what it is, so both count by the inverse squares of
+  // the ways since. Only on an arm in motion that is not as told, and of a sensor: friction in joints
+  // comes at once, however near.
+  double lately_share(std::size_t i) const {
+    return rows_.of_wrench(i) ? lately_share_[rows_[i].segment] : 0.0;
+  }
   void go_on_from(const ModelDrift& other, std::size_t of, std::size_t i) {
     spreads_[i] = other.spreads_[of];
   }
@@ -127,6 +141,12 @@ class ModelDrift {
  private:
   MotionSpread::Shown beyond(std::size_t i, const NoiseMeter& noise) const {
     return spreads_[i].beyond(noise.sigma(i), tuning_);
+  }
+
+  // Which part of an offset is of what lies the way `near2` off, if the rest lies `far2` off [rad2].
+  static double nearness(double far2, double near2) {
+    const double sum = far2 + near2;
+    return sum > 0.0 ? far2 / sum : 0.0;
   }
 
   // Is any row of a segment lost that was known before? Its baseline stays where it was averaged.
@@ -139,11 +159,13 @@ class ModelDrift {
   const DetectorRows& rows_;
   double longest_;
   const DetectorTuning& tuning_;
-  BaselinePosture posture_;
+  BaselinePosture posture_, lately_;  // of the baselines, of the references
   std::vector<MotionSpread> spreads_;               // per row
   std::vector<MotionSpread::Shown> shown_before_;   // per row: before the present event
   std::vector<double> way2_;      // per segment: of the joints since the baseline, squared [rad2]
   std::vector<char> was_quiet_;   // per segment: at the last sample
+  std::vector<char> is_off_;      // per segment: has it moved and is not as told, before an event?
+  std::vector<double> lately_share_;  // per segment: see there
   std::vector<double> drift_;     // per row
 };
 

@@ -52,6 +52,7 @@ class DetectorRows {
         limits(rows.size(), 1.0),
         normalized(rows.size(), 0.0),
         shares(rows.size(), 0.0),
+        off(segments, 0),
         rows_(std::move(rows)),
         first_(segments + 1, 0),
         slowest_(segments, kAbsurd) {
@@ -110,6 +111,8 @@ class DetectorRows {
   // size of that, in limits. The latter two are 0 where there is no settled residual.
   RowLanes limits;
   std::vector<double> normalized, shares;
+  // Per segment: has the arm shown that it is not as told?
+  std::vector<char> off;
 
  private:
   std::vector<DetectionRow> rows_;

@@ -27,7 +27,6 @@ struct SegmentScore {
   double peak = 0.0;       // the largest share of its rows
   double score = 0.0, borne = 0.0;  // of all tests, in thresholds; of what no single sample moves
   double collision = 0.0, borne_collision = 0.0;  // of its rows, in thresholds of a collision
-  bool off = false;        // has the arm shown that it is not as told?
   double age = 0.0;        // since its first settled sample [s]
   Seen seen = Seen::little;
 };
@@ -59,12 +58,12 @@ class SegmentLevels {
   // Is what is felt of a segment most likely the arm's own doing: an error of its model in motion?
   bool is_own_doing(std::size_t g) const {
     const Segment& s = segments_[g];
-    return s.off && motion_.moves() && (s.origin != Origin::push || s.lasted > tuning_.hand);
+    return is_off(g) && motion_.moves() && (s.origin != Origin::push || s.lasted > tuning_.hand);
   }
 
   // Has the arm shown that it is not as told, and does it move, or has it since the event began?
   bool has_moved_off(std::size_t g) const {
-    return segments_[g].off && (segments_[g].in_motion || motion_.moves());
+    return is_off(g) && (segments_[g].in_motion || motion_.moves());
   }
 
   // Does a sensor's wrench change faster than motions do? That is not learned as one of their errors.
@@ -79,7 +78,6 @@ class SegmentLevels {
   // A sample, dt [s] after the one before.
   void decide(std::size_t g, const SegmentScore& now, double dt) {
     Segment& s = segments_[g];
-    s.off = now.off;
     if (is_joined(g)) {  // what there was is an offset, and the push is its own event
       come_to_rest(g);
       s.lasted = 0.0;
@@ -87,7 +85,7 @@ class SegmentLevels {
       return;
     }
     const bool quiet = is_quiet(g);
-    const bool may_begin = now.score > 1.0 || now.collision > 1.0 || (s.off && motion_.moves());
+    const bool may_begin = now.score > 1.0 || now.collision > 1.0 || (is_off(g) && motion_.moves());
     if (quiet && may_begin) s.origin = origin(g, now, dt);
     // What creeps may be over its limit a moment before a push is: that has no before.
     const bool recent = s.lasted < tuning_.trend / rows_.slowest(g);
@@ -103,7 +101,7 @@ class SegmentLevels {
     if (lasts(g, s.contact, now, now.score, now.borne)) levels_[g] = std::max(levels_[g], 1);
     if (lasts(g, s.collision, now, now.collision, now.borne_collision)) levels_[g] = 2;
     if (!is_felt(g)) {
-      s.top = s.top_wrench = s.rest = s.back = s.below = s.lasted = 0.0;
+      s.top = s.top_wrench = s.rest = s.back = s.below = s.lasted = s.clear = 0.0;
       s.in_motion = motion_.moves();
       return;
     }
@@ -135,18 +133,21 @@ class SegmentLevels {
   };
 
   struct Segment {
-    bool off = false;  // has the arm shown that it is not as told?
     Holding contact, collision;
     Origin origin = Origin::start;
     bool in_motion = false;  // did the present event begin while the arm moved?
     // Of the present event, for how long [s]:
     double lasted = 0.0;
+    double clear = 0.0;  // it has been known to exceed its limits clearly
     double below = 0.0;  // it has been below what releases it
     double rest = 0.0;   // little has been left of it, and that has not changed
     double back = 0.0;   // all has been as before the offset that stands there now
     // Its largest mean of the last moments, in limits; the same of the sensors' rows alone.
     double top = 0.0, top_wrench = 0.0;
   };
+
+  // Has the arm shown that it is not as told?
+  bool is_off(std::size_t g) const { return rows_.off[g] != 0; }
 
   // Which rows of a segment: all, or those that its sensor's wrench has.
   enum class Rows { all, wrench };
@@ -160,6 +161,7 @@ class SegmentLevels {
     s.lasted += dt;
     s.top = std::max(s.top, lately(g));
     s.top_wrench = std::max(s.top_wrench, lately(g, Rows::wrench));
+    if (s.top > tuning_.barely) s.clear += dt;
     s.rest = lasting((may_rest(g) && is_steady(g)) || only_joints_left(g), dt, s.rest);
     if (s.below >= times_.hold) levels_[g] = 0;
     const double least = tuning_.rest / rows_.slowest(g);
@@ -177,7 +179,7 @@ class SegmentLevels {
     if (!test.holds || test.since < times_.min_duration) return false;
     if (times_.min_duration <= 0.0) return true;
     const Segment& s = segments_[g];
-    const bool barely = s.contact.highest < tuning_.barely && s.off && motion_.moves();
+    const bool barely = s.contact.highest < tuning_.barely && is_off(g) && motion_.moves();
     const double moments = tuning_.trend / rows_.slowest(g);
     if (barely && test.since < moments) return false;  // an error of the model passes
     switch (now.seen) {
@@ -221,12 +223,21 @@ class SegmentLevels {
     return false;
   }
 
+  // Is what is felt an error of the model, though nothing else has shown that there is one? Joints alone
+  // have felt it, of an arm in motion, hardly over their limits, for longer than pushes take to rise. What
+  // has clearly exceeded them within the last moments may be a push on top of that.
+  bool is_faint(std::size_t g) const {
+    const Segment& s = segments_[g];
+    return s.in_motion && s.top_wrench <= 1.0 && s.clear < tuning_.trend / rows_.slowest(g) &&
+           s.lasted - s.clear > tuning_.rest_moving;
+  }
+
   // Does a push join what most likely is the arm's own doing, or what only joints have felt, of an arm
-  // in motion that is not as told? A sensor's wrench then steps by more than its limit. What lasts for
-  // less than the mean of the last moments has no before.
+  // in motion that is not as told or is felt but faintly? A sensor's wrench then steps by more than its
+  // limit. What lasts for less than the mean of the last moments has no before.
   bool is_joined(std::size_t g) const {
     const Segment& s = segments_[g];
-    if (!is_felt(g) || !has_moved_off(g)) return false;
+    if (!is_felt(g) || !(has_moved_off(g) || is_faint(g))) return false;
     if (s.top_wrench > 1.0 && (s.origin == Origin::push || !is_own_doing(g))) return false;
     if (s.lasted < tuning_.trend / rows_.slowest(g)) return false;
     for (const std::size_t i : rows_.of(g))
@@ -241,8 +252,8 @@ class SegmentLevels {
   bool may_rest(std::size_t g) const {
     const Segment& s = segments_[g];
     const bool little = s.origin == Origin::start || lately(g) < tuning_.little * s.top;
-    if (!little || !(s.off || s.in_motion)) return false;
-    return motion_.stands() ? s.off : lately(g) < std::max(tuning_.barely, tuning_.trace * s.top);
+    if (!little || !(is_off(g) || s.in_motion)) return false;
+    return motion_.stands() ? is_off(g) : lately(g) < std::max(tuning_.barely, tuning_.trace * s.top);
   }
 
   // Does nothing of a contact load the segment's sensors any more, of such an arm? What its joints
@@ -282,7 +293,7 @@ class SegmentLevels {
     Segment& s = segments_[g];
     s.contact.end();
     s.collision.end();
-    s.below = s.top = s.top_wrench = s.rest = s.back = 0.0;
+    s.below = s.top = s.top_wrench = s.rest = s.back = s.clear = 0.0;
   }
 
   const DetectorRows& rows_;

@@ -120,6 +120,14 @@ struct DetectorTuning {
   // Times that friction, which are one sigma of it for places. Half: part of it, where a joint is slow,
   // is placed as a contact. Double: joints that turn tell less of places.
   double friction_doubt = 1.5;
+  // Of the part by which a row changes quickly: other errors come beside friction, and the way of its
+  // joint may change by so much less in the same time. Half: more pushes on joints that turn count as
+  // friction. Double: friction beside other errors counts as a push. Of 40 pushes neither changes any.
+  double friction_quick = 0.5;
+  // Of its friction: a joint of which less has come stands, and breaks away before it is seen to move.
+  // Half: one that breaks away is pushed. Double: joints that turn slowly stand, and ten of 40 pushes on
+  // an arm without a sensor are lost.
+  double friction_stood = 0.5;
 
   // ---- When an arm moves ----
   // Slower than this it stands [rad/s]; a hand that pushes an arm moves it, too. Half: trembling
@@ -240,6 +248,8 @@ struct DetectorTuning {
     v("friction_enough", "s", t.friction_enough);
     v("friction_margin", "1", t.friction_margin);
     v("friction_doubt", "1", t.friction_doubt);
+    v("friction_quick", "1", t.friction_quick);
+    v("friction_stood", "1", t.friction_stood);
     v("standing", "rad/s", t.standing);
     v("moving", "rad/s", t.moving);
     v("pause", "s", t.pause);

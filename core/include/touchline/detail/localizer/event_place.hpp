@@ -95,8 +95,7 @@ class EventPlace {
   // the others by probability. `body(surface)` tells what is one body.
   template <class Body>
   void conclude(Body&& body, const LocalizerTuning& t) {
-    // What errs in one sample, the model, errs in the next: they are not that many looks.
-    const double looks = missed_ < 0.0 ? std::min(1.0, t.looks * std::log(t.floor) / missed_) : 1.0;
+    const double looks = independent(t);
     double sum = 0.0, most = -1e300;
     for (int i = 0; i < count_; ++i) most = std::max(most, places_[i].evidence);
     for (int i = 0; i < count_; ++i) sum += std::exp(looks * (places_[i].evidence - most));
@@ -141,6 +140,16 @@ class EventPlace {
   }
 
  private:
+  // How much of the evidence of all samples counts. What errs in one, the model, errs in the next: they
+  // are not that many looks. Of `all` looks with the part `same` of their variance in common the mean
+  // is worth all / (1 + (all - 1) same).
+  double independent(const LocalizerTuning& t) const {
+    const double all = missed_ / std::log(t.floor), sum = variance_ + lasting_;
+    if (!(all > 1.0)) return 1.0;
+    const double same = sum > 0.0 ? lasting_ / sum : 0.0;
+    return std::min(t.looks / all, 1.0 / (1.0 + (all - 1.0) * same));
+  }
+
   // Sorts by probability, but that the most probable body's best place comes first.
   template <class Body>
   void lead(Body&& body) {

@@ -109,8 +109,8 @@ struct LocalizerTuning {
   // No sample rules a place out: its probability is at least this. Half or double: two thirds of a
   // nat of evidence.
   double floor = 1e-3;
-  // Independent looks that an event is worth at most, since a model errs alike in all. Half: less
-  // sure of long events. Double: too sure with errors of the model.
+  // Independent looks that an event is worth at most: less of what errs may be known to err alike in all
+  // than does. Half: less sure of long events. Double: too sure with errors of the model.
   double looks = 3.0;
   // Variance that meshes add to a place [m2]: 0.1 mm. Half or double: noise-free only.
   double smoothness = 1e-8;
