@@ -167,6 +167,7 @@ def _judge(robot: Robot, seen: Seen, findings: Findings) -> None:
     """Judges a recording by the robot as it is."""
     seen.stamps.report(findings)
     seen.table.report(robot, findings)
+    seen.repeats.report(findings)
     if seen.stamps.credible:
         for warning in bandwidth_warnings(bandwidths(robot, None), seen.stamps.period):
             if "> 1)" in warning:
