@@ -6,7 +6,8 @@
 // sensor, it does to others too, to the sensors and joints inboard, or to the speed. So a jump
 // counts as a fault only where nothing else in the sample bears it out. If the new level then
 // stays and lives (its last digits move), it is taken after all, a few samples late, unless there
-// is a sensor inboard that would have had to feel it too.
+// is a sensor inboard that would have had to feel it too. Dry friction that the description knows
+// turns within a sample or two as its joint does: that is no jump.
 //
 // A stuck channel: how often it changes from sample to sample while the arm moves is learned, and
 // so is for how long it keeps a value. Logs that repeat samples repeat all of them, which counts
@@ -86,6 +87,9 @@ class ChannelGates {
         early_(at_.count(), 0),
         fault_(at_.count(), Fault::none) {
     set_floors(robot);
+    for (std::size_t j = 0; j < at_.joints; ++j) {
+      if (robot.joints[j].measured() && robot.joints[j].rough()) rough_.push_back({j, robot.joints[j]});
+    }
     memory_ = std::min(1.0, period_ / tuning_.memory);
     warm_up_ = samples(tuning_.warm_up, tuning_.least_seen);
     held_most_ = std::min(samples(tuning_.held, tuning_.sure + 1), tuning_.held_most);
@@ -246,6 +250,7 @@ class ChannelGates {
   void settle(double dt, bool gap) {
     absurd_ = false;
     absent_ = 0;
+    take_out_friction();
     carry(dt);
     for (std::size_t c = 0; c < at_.count(); ++c) {
       const bool jumps = ratio_[c] > 1.0 && !gap, motion = c < at_.tau();
@@ -263,6 +268,20 @@ class ChannelGates {
     }
     if (gap) std::fill(drift_.begin(), drift_.end(), 0.0);
     find_all_sound();
+  }
+
+  // Of the steps that are too large for their channel: what known friction has made of them counts
+  // for nothing.
+  void take_out_friction() {
+    for (const Rough& of : rough_) {
+      const std::size_t c = at_.tau() + of.number, v = at_.qd() + of.number;
+      if (!(ratio_[c] > 1.0)) continue;
+      const double turned = of.joint.dry_friction(now_[v]) - of.joint.dry_friction(last_[v]);
+      const double rest = now_[c] - last_[c] - turned / (of.joint.sign * of.joint.gain);
+      if (!(std::fabs(rest) < step_[c])) continue;
+      step_[c] = std::fabs(rest);
+      ratio_[c] = step_[c] / gate(c);
+    }
   }
 
   void find_all_sound() {
@@ -680,8 +699,15 @@ class ChannelGates {
             out_.data() + at_.wrench()};
   }
 
+  // A joint with dry friction that the description knows.
+  struct Rough {
+    std::size_t number;
+    JointRow joint;
+  };
+
   GatesTuning tuning_;
   ChannelLayout at_;
+  std::vector<Rough> rough_;
   double period_;
   std::vector<double> floor_;  // of steps that are judged; infinite: not a channel
   std::vector<int> witness_;   // the sensor that feels all that a torque or wrench feels; -1: none
