@@ -48,11 +48,11 @@ def find_frames(evidence: Evidence) -> list[FrameError]:
     if not sensors:
         return []
     chooser = Chooser(evidence, np.ones(len(evidence), dtype=bool))
-    turns = [Column("turn", evidence.joints + 6 * s, axis=a) for s in sensors for a in range(3)]
-    shifts = [Column("shift", c.row, axis=c.axis) for c in turns]
-    if not _sure_columns(chooser.fit_beside((*turns, *shifts))):
+    every = frame_columns(evidence)
+    turns = tuple(c for c in every if c.kind == "turn")
+    if not _sure_columns(chooser.fit_beside(every)):
         return []
-    found = chooser.choose_beside([(), tuple(turns), (*turns, *shifts)])
+    found = chooser.choose_beside([(), turns, every])
     while True:
         sure = _sure_columns(found)
         shifted = {c.row for c in sure if c.kind == "shift"}
@@ -64,6 +64,12 @@ def find_frames(evidence: Evidence) -> list[FrameError]:
         found = chooser.with_errors(chooser.fit(replace(found.problem, columns=columns)))
     off = {c.row for c in _frame_columns(found)}
     return [_error_of(evidence, found, s) for s in sensors if evidence.joints + 6 * s in off]
+
+
+def frame_columns(evidence: Evidence) -> tuple[Column, ...]:
+    """What sensors that are turned or shifted would do: the turns first, then the shifts."""
+    first = [evidence.joints + 6 * s for s in _judged(evidence)]
+    return tuple(Column(kind, row, axis=a) for kind in LEAST for row in first for a in range(3))
 
 
 def with_frames(robot: Robot, frames: Sequence[FrameError]) -> Robot:
