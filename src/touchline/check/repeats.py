@@ -95,7 +95,7 @@ class Repeats:
 def _count(group: _Group, changed: Mask) -> None:
     """Count repeats in steps (M, C) between rows, each with what changed."""
     many = changed.sum(axis=1) >= CHANGE
-    still = ~changed.any(axis=1)
+    still = changed.sum(axis=1) == 0
     group.steps += int((~still).sum())
     group.rested += (~changed[~still]).sum(axis=0)
     edges = np.flatnonzero(np.diff(still, prepend=False, append=False))
