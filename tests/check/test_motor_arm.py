@@ -156,3 +156,67 @@ def test_what_friction_holds_tells_nothing(path, tmp_path):
     s.tau[:] += 0.05 * case.rng.normal(size=s.tau.shape)
     s.tau[:, :5] += 0.8 * np.array(RUBBING[:5]) * case.rng.choice([-1.0, 1.0], 5)
     assert told(case, path, tmp_path) == []
+
+
+LIGHT = TEXT.replace("ur10_robot", "ur3_robot")
+LIGHT_RUBBING = 4.0, 4.0, 2.0, 0.8, 0.8, 0.8  # Nm
+
+
+def moved(path, seed, mass, gains, size):
+    """A light arm with rotors, and friction that differs by a fifth with its sense."""
+    path.write_text(LIGHT)
+    robot = tl.load_robot(path)
+    clean, rng = make_case(robot, (), np.random.default_rng(seed)), np.random.default_rng([seed, 9])
+    loaded = Case(robot, np.random.default_rng(seed), clean.mechanism, clean.samples)
+    if mass:
+        _with_mass(loaded, _last_link(loaded), mass, np.append(rng.uniform(-0.03, 0.03, 2), 0.05))
+    s = clean.samples
+    s.q[:], s.qd[:] = s.q[0] + size * (s.q - s.q[0]), size * s.qd
+    tau = _loads(Robot(robot.description, loaded.mechanism), s.time, s.q, s.qd)[0] * gains
+    for j, dry in enumerate(LIGHT_RUBBING):
+        uneven = 1.0 + 0.2 * rng.uniform(-1.0, 1.0) * np.sign(s.qd[:, j])
+        tau[:, j] += dry * (uneven * np.tanh(s.qd[:, j] / 0.02) + 0.3 * s.qd[:, j])
+        tau[:, j] += 0.1 * dry * np.gradient(s.qd[:, j], s.time)
+    tau += 0.05 * rng.normal(size=tau.shape)
+    return replace(loaded, samples=replace(s, tau=tau))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_wrong_gains_are_no_heavy_link(tmp_path, seed):
+    file = tmp_path / "robot.yaml"
+    case = moved(file, seed, 0.0, np.array([1.0, 1.3, 1.6, 1.0, 1.0, 1.0]), 1.0)
+    lines = told(case, file, tmp_path)
+    assert not any("weighs" in line or "missing at" in line for line in lines), lines
+    assert any("elbow_joint is 1." in line for line in lines), lines
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_load_is_no_wrong_gain(tmp_path, seed):
+    file = tmp_path / "robot.yaml"
+    lines = told(moved(file, seed, 1.0, np.ones(6), 0.3), file, tmp_path)
+    assert any("missing at" in line for line in lines), lines
+    assert not any("times what" in line for line in lines), lines
+
+
+def test_a_small_load_is_told_as_load_or_gains(tmp_path):
+    """Half a kilogram, in a motion so small that its weight is less sure than is asked for."""
+    file = tmp_path / "robot.yaml"
+    lines = told(moved(file, 2, 0.5, np.ones(6), 0.3), file, tmp_path)
+    gains = [line for line in lines if "times what" in line]
+    assert len(gains) == 2, lines
+    found = [re.search(r"load or gains\? (\S+) kg more at ee_link", line) for line in gains]
+    assert all(x is not None and abs(float(x[1]) - 0.5) < 0.1 for x in found), lines
+
+
+def test_gains_that_no_load_explains_are_gains(tmp_path):
+    file = tmp_path / "robot.yaml"
+    case = moved(file, 2, 0.0, np.array([1.0, 1.25, 1.25, 1.0, 1.0, 1.0]), 1.0)
+    lines = [line for line in told(case, file, tmp_path) if "times what" in line]
+    assert len(lines) == 2 and not any("load or" in line for line in lines), lines
+
+
+def test_gains_that_explain_as_much_as_a_link_are_told_beside_it(tmp_path):
+    file = tmp_path / "robot.yaml"
+    case = moved(file, 1, 0.0, np.full(6, 1.4), 1.0)
+    (line,) = [line for line in told(case, file, tmp_path) if "weighs" in line]
+    assert re.search(r"or as well: gains of 1\.\d+ \(shoulder_lift_joint\), 1\.\d+ \(elbow", line)

@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 from touchline.identify.described import description_changes
 from touchline.identify.evidence import gather
 from touchline.identify.fit import Column, column_of
-from touchline.identify.frame import find_frames, with_frames
+from touchline.identify.frame import FrameError, find_frames, joined, with_frames
 from touchline.model.robot import Robot
 from touchline.model.transforms import rotation_rpy, rpy_of
 from touchline.trials.arms import load_arm
 from touchline.trials.free_motion import random_trajectory
 from touchline.trials.wrong_arm import make_wrong_arm, record
 
-WRIST = 1
+BASE, WRIST = 0, 1
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +53,27 @@ def test_a_turned_sensor_is_found_beside_a_payload(robot):
     assert np.degrees(np.arccos((np.trace(R) - 1.0) / 2.0)) < 0.1
     changes = description_changes(robot, new)["force_torque_sensors"]
     assert list(changes) == ["wrist"] and list(changes["wrist"]) == ["pose"]
+
+
+def test_a_shift_is_told_of_a_sensor_that_is_hardly_turned(robot):
+    """As in the second round, when the turn that was found first has been taken out."""
+    sensors = list(robot.description.sensors)
+    shift = 1e-3 * np.array([3.0, 4.0, 0.0])
+    rpy = tuple(np.radians([0.02, -0.02, 0.02]).tolist())
+    sensors[BASE] = replace(sensors[BASE], xyz=tuple(shift.tolist()), rpy=rpy)
+    real = Robot(replace(robot.description, sensors=tuple(sensors)), robot.mechanism)
+    (found,) = find_frames(gather(robot, [[recorded(robot, real, 40.0)]]))
+    assert found.name == "base" and found.shift_error.all()
+    assert (np.abs(found.shift - shift) < np.maximum(1e-3, 3.0 * found.shift_error)).all()
+    assert np.degrees(np.linalg.norm(found.turn - rpy)) < 0.01  # so small that angles add
+
+
+def test_a_later_round_keeps_the_errors_of_what_it_does_not_tell():
+    nothing, one, two = np.zeros(3), np.ones(3), np.full(3, 2.0)
+    first = FrameError("base", one, 0.1 * one, two, 0.2 * one)
+    (found,) = joined([first], [FrameError("base", one, 0.3 * one, nothing, nothing)])
+    np.testing.assert_array_equal([found.turn, found.shift], [two, two])
+    np.testing.assert_allclose([found.turn_error, found.shift_error], [0.3 * one, 0.2 * one])
 
 
 @pytest.mark.parametrize("kind", ["turn", "shift"])

@@ -243,6 +243,16 @@ def test_a_missing_mesh_is_a_warning(tmp_path):
     assert mechanism.links["b"].inertia.mass == 1
 
 
+def test_missing_meshes_of_a_folder_are_told_together(tmp_path):
+    assets = "".join(f'<mesh name="m{i}" file="gone/{i}.stl"/>' for i in range(2))
+    bodies = "".join(
+        f'<body name="b{i}">{INERTIAL}<geom type="mesh" mesh="m{i}"/></body>' for i in range(2)
+    )
+    mechanism = load_mechanism(write(tmp_path, bodies, f"<asset>{assets}</asset>"))
+    (warning,) = [line for line in mechanism.warnings if "no such file" in line]
+    assert "/gone': no such files; no contact is located on link 'b0', 'b1'" in warning
+
+
 def test_a_mass_from_a_missing_mesh_is_an_error(tmp_path):
     body = '<body name="b"><geom type="mesh" mesh="m"/></body>'
     with pytest.raises(InputError, match="body 'b': its mass comes from a mesh that cannot be"):

@@ -365,12 +365,15 @@ def test_shapes_and_their_places(tmp_path):
     assert (mesh.kind, mesh.scale, mesh.path) == ("mesh", (1, 2, -3), str(tmp_path / "m.obj"))
 
 
-def test_meshes_that_a_folder_lacks_are_told_together(tmp_path):
+@pytest.mark.parametrize(
+    ("many", "told"), [("/gone", "/gone"), ("gone", "{here}/gone"), ("file:///gone", "/gone")]
+)
+def test_meshes_that_a_folder_lacks_are_told_together(tmp_path, many, told):
     bodies = "".join(
         f'<link name="l{i}"><inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" '
         f'ixz="0" iyz="0"/></inertial><collision><geometry><mesh filename="{folder}/m{i}.stl"/>'
         "</geometry></collision></link>"
-        for i, folder in enumerate(("/gone", "/gone", "/gone", "/alone"))
+        for i, folder in enumerate((many, many, many, "/alone"))
     )
     joints = "".join(
         f'<joint name="j{i}" type="revolute"><parent link="l{i}"/><child link="l{i + 1}"/>'
@@ -380,7 +383,9 @@ def test_meshes_that_a_folder_lacks_are_told_together(tmp_path):
     path = tmp_path / "arm.urdf"
     path.write_text(f'<robot name="arm">{bodies}{joints}</robot>')
     found = [line for line in load_mechanism(path).warnings if "no such file" in line]
+    folder = told.format(here=tmp_path)
     assert found == [
-        f"{path}: meshes in '/gone': no such files; no contact is located on link 'l0', 'l1', 'l2'",
+        f"{path}: meshes in '{folder}': no such files; "
+        "no contact is located on link 'l0', 'l1', 'l2'",
         f"{path}: mesh '/alone/m3.stl': no such file; no contact is located on link 'l3'",
     ]

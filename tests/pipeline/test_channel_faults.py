@@ -9,6 +9,8 @@ from free_motion import exact_loads
 from test_lost_sensors import robot_named
 
 import touchline as tl
+from touchline.model.description import Friction
+from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
 
 RATE = 1000.0
@@ -308,3 +310,25 @@ def test_a_wild_position_comes_back_in_a_recording_of_short_parts():
         assert part > 0 or wild == ["q.elbow_joint"]
     result = pipeline.update(time[-1] + 1e-3, q[-1], s.qd[rows][-1], tau[-1], wrench[-1])
     assert result.faults == ()
+
+
+@pytest.mark.parametrize(("sign", "gain"), [(1.0, 1.0), (-1.0, 0.5)])
+def test_known_friction_that_turns_with_its_joint_is_no_spike(sign, gain):
+    """At 200 Hz 2 Nm of friction turn within a sample; a spike then is told as ever."""
+    law = Friction(1.0, 0.0, 0.015, 1.1, 0.06)
+    robot, s = robot_named("sara-full"), in_motion("sara-full", rate=200.0)
+    joints = tuple(replace(j, friction=law, sign=sign, gain=gain) for j in robot.description.joints)
+    rough = Robot(replace(robot.description, joints=joints), robot.mechanism)
+    tau = (s.tau + law.dry(s.qd)) / (sign * gain)
+    turning = (s.qd[60:-9] * s.qd[61:-8] < 0).any(axis=1)
+    assert turning.sum() > 3
+    pipeline = tl.Pipeline(rough, period=1 / 200)
+    run(pipeline, replace(s, tau=tau))
+    assert not pipeline.faults and not pipeline.events
+    row = 61 + int(np.flatnonzero(turning)[0])
+    joint = int(np.flatnonzero(s.qd[row - 1] * s.qd[row] < 0)[0])
+    tau[row, joint] += SPIKES["tau"]
+    pipeline = tl.Pipeline(rough, period=1 / 200)
+    run(pipeline, replace(s, tau=tau))
+    assert [str(c.fault) for c in pipeline.faults][:1] == ["spike"]
+    assert pipeline.faults[0].channel == f"tau.{robot.joint_names[joint]}"

@@ -22,6 +22,7 @@ from touchline.model.robot import Robot
 MOVED = 0.02  # rad/s or m/s; slower says nothing of a velocity's sign
 OFF = 0.1  # a velocity's factor may be off by this much
 TELLING = 1.0  # Nm; a smaller expected torque says nothing of a torque's sign
+CHECK_GAIN = "check gain"  # in the words of a factor that has no other name
 GAIN_OFF = 0.2  # friction and a payload change a torque's factor by less
 TAKEN_OUT = 0.15  # below this fraction of the expected torque, gravity is not in the signal
 UNEVEN = 0.2  # of its friction may a motor's joint have more in one sense, without a bias
@@ -277,8 +278,8 @@ def _judge(
         if or_rotor:
             rest = "the masses outboard of it and rotor_inertia: this motion tells no more"
         findings.find(
-            f"torque of {name} is {fit.factor:.3g} times what the model expects: check gain, unit, "
-            + rest
+            f"torque of {name} is {fit.factor:.3g} times what the model expects: {CHECK_GAIN}, "
+            f"unit, {rest}"
         )
     if fit.has_rotor and fit.rotor_torque > max(limit, TELLING):
         findings.find(

@@ -10,7 +10,7 @@ import numpy as np
 from touchline.arrays import Array
 from touchline.check.averages import averaged
 from touchline.check.findings import Findings
-from touchline.check.joints import UNEVEN
+from touchline.check.joints import GAIN_OFF, UNEVEN
 from touchline.identify.evidence import WIDTHS, Evidence, gather
 from touchline.identify.fit import main_links
 from touchline.identify.identification import MOST_TOUCHED, touched_instants
@@ -35,6 +35,7 @@ LEAST_SCALE = 0.1  # of a link's inertia; models are that good at best
 RARE = 2.0 * np.log(100.0)  # of the cost: of a hundred errors of weights one is a link's, at most
 ALIKE = 3.0  # of the cost; explanations closer than that are both told
 SURE = 4.0  # standard errors
+POSSIBLE = 2.0  # standard errors that a load has which could be there instead of wrong gains
 ONE_POSE = 0.1  # rad
 MOST_FOUND = 3
 COULOMB_WIDTH, MOVED = 0.02, 0.02  # rad/s
@@ -67,21 +68,20 @@ class Explanation:
 
 def explain_weights(robot: Robot, parts: Iterable[Samples], findings: Findings) -> Robot:
     """Finds missing or surplus bodies and a tilted base; returns the robot as it then would be."""
-    try:
-        evidence = gather(robot, [averaged(_first(parts), RATE)])
-    except ValueError:
+    evidence = _untouched(robot, parts)
+    if evidence is None:
         return robot
-    evidence = evidence.part(np.arange(0, len(evidence), -(-len(evidence) // INSTANTS)))
-    touched = touched_instants(evidence)
-    if touched.mean() > MOST_TOUCHED or not evidence.used.any():
-        return robot
-    evidence = evidence.part(~touched)
     for _ in range(MOST_FOUND):
         found = [x for x in _explanations(evidence, robot) if x.share >= EXPLAINED]
         found.sort(key=lambda x: x.cost)
         if not found:
             break
         best = found[0]
+        gains = _gains(evidence, robot)
+        if gains is not None and gains.cost < best.cost - ALIKE:
+            break  # of currents: told joint by joint
+        if gains is not None and gains.cost < best.cost + ALIKE:
+            found.insert(1, gains)
         others = [x.short for x in found[1:] if x.cost < best.cost + ALIKE]
         findings.find(best.words + (f"; or as well: {others[0]}" if others else ""))
         for key, value in best.fix.items():
@@ -89,6 +89,31 @@ def explain_weights(robot: Robot, parts: Iterable[Samples], findings: Findings) 
             findings.fixes[key] = [*old, *value] if isinstance(value, list) else value
         robot = best.mended
     return robot
+
+
+def possible_load(robot: Robot, parts: Iterable[Samples]) -> tuple[str, Robot] | None:
+    """The load that explains most of what is off though it is not sure: in words, and the robot."""
+    evidence = _untouched(robot, parts)
+    if evidence is None:
+        return None
+    left, sigma = _off(evidence, robot)
+    loads = [_payload(evidence, robot, left, sigma, node, POSSIBLE) for node in _ends(robot)]
+    told = [x for x in loads if x is not None and x.share >= EXPLAINED and x.fix]
+    best = min(told, key=lambda x: x.cost, default=None)
+    return None if best is None else (best.short, best.mended)
+
+
+def _untouched(robot: Robot, parts: Iterable[Samples]) -> Evidence | None:
+    """Some instants at which nothing seems to touch the robot; None where there are none."""
+    try:
+        evidence = gather(robot, [averaged(_first(parts), RATE)])
+    except ValueError:
+        return None
+    evidence = evidence.part(np.arange(0, len(evidence), -(-len(evidence) // INSTANTS)))
+    touched = touched_instants(evidence)
+    if touched.mean() > MOST_TOUCHED or not evidence.used.any():
+        return None
+    return evidence.part(~touched)
 
 
 def _first(parts: Iterable[Samples]) -> Iterable[Samples]:
@@ -101,17 +126,22 @@ def _first(parts: Iterable[Samples]) -> Iterable[Samples]:
 
 
 def _explanations(evidence: Evidence, robot: Robot) -> list[Explanation]:
+    left, sigma = _off(evidence, robot)
+    found = [_payload(evidence, robot, left, sigma, node) for node in _ends(robot)]
+    found += [_scaled(evidence, robot, left, sigma, node) for node in range(len(robot.nodes))]
+    found.append(_tilt(evidence, robot, left, sigma))
+    return [x for x in found if x is not None]
+
+
+def _off(evidence: Evidence, robot: Robot) -> tuple[Array, Array]:
+    """What is off (N, R), and how much of it a sound robot may leave in each row, 1 sigma (R,)."""
     left = evidence.residual(robot)
     first = evidence.robot.gravity  # that the equations were made with
     if not np.array_equal(first, robot.gravity):
         left += _weights(evidence, robot, robot.gravity) - _weights(evidence, robot, first)
     largest = np.abs(evidence.reading).max(axis=0)
     noise = usual_scatter(left, evidence.used)
-    sigma = np.sqrt(np.maximum(OFFSET, OFFSET_SHARE * largest) ** 2 + noise**2)
-    found = [_payload(evidence, robot, left, sigma, node) for node in _ends(robot)]
-    found += [_scaled(evidence, robot, left, sigma, node) for node in range(len(robot.nodes))]
-    found.append(_tilt(evidence, robot, left, sigma))
-    return [x for x in found if x is not None]
+    return left, np.sqrt(np.maximum(OFFSET, OFFSET_SHARE * largest) ** 2 + noise**2)
 
 
 def _ends(robot: Robot) -> list[int]:
@@ -121,7 +151,7 @@ def _ends(robot: Robot) -> list[int]:
 
 
 def _payload(
-    evidence: Evidence, robot: Robot, left: Array, sigma: Array, node: int
+    evidence: Evidence, robot: Robot, left: Array, sigma: Array, node: int, sure: float = SURE
 ) -> Explanation | None:
     A = evidence.model[:, :, node, :4]
     if not np.abs(A[:, evidence.used]).max(initial=0.0) > 0.0:
@@ -134,7 +164,7 @@ def _payload(
     prior = np.array([0.0, *np.full(3, (0.7 * CENTRE) ** -2.0)])
     values, errors, share, cost = _fit(A, left, sigma, evidence, prior)
     mass, error = float(values[0]), float(errors[0])
-    if abs(mass) < max(LEAST_MASS, SURE * error):
+    if abs(mass) < max(LEAST_MASS, sure * error):
         return None
     centre = expected + np.clip(values[1:] / mass, -CENTRE, CENTRE)
     own = sum(robot.mechanism.links[x].inertia.mass for x in robot.nodes[node].links)
@@ -220,6 +250,25 @@ def _tilt(evidence: Evidence, robot: Robot, left: Array, sigma: Array) -> Explan
     fix = {"gravity": [round(float(x), 4) for x in new]}
     short = f"the base is tilted by {np.degrees(angle):.1f} degrees"
     return Explanation(words, short, share, cost, Robot(robot.description, mechanism), fix)
+
+
+def _gains(evidence: Evidence, robot: Robot) -> Explanation | None:
+    """The gains that motors' currents would need; None where none is off, or no motor is."""
+    joints = robot.description.joints
+    motors = [j for j, joint in enumerate(joints) if joint.torque == "motor" and evidence.used[j]]
+    if not motors:
+        return None
+    left, sigma = _off(evidence, robot)
+    expected = evidence.reading + left  # what the robot as it is now should read
+    A = np.zeros((*left.shape, len(motors)))
+    for k, j in enumerate(motors):
+        A[:, j, k] = expected[:, j]
+    values, errors, share, cost = _fit(A, left, sigma, evidence, np.zeros(len(motors)))
+    off = [k for k in range(len(motors)) if abs(values[k]) > max(GAIN_OFF, POSSIBLE * errors[k])]
+    if not off:
+        return None
+    told = ", ".join(f"{1.0 + values[k]:.2f} ({joints[motors[k]].name})" for k in off)
+    return Explanation("", f"gains of {told}", share, cost, robot, {})
 
 
 def _turned(evidence: Evidence, robot: Robot, change: Array) -> Array:

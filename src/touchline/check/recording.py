@@ -9,8 +9,8 @@ import numpy as np
 from touchline.arrays import Mask
 from touchline.check.coarse import is_off, next_step
 from touchline.check.findings import Findings
-from touchline.check.joints import check_torques, velocity_problems
-from touchline.check.loads import explain_weights
+from touchline.check.joints import CHECK_GAIN, check_torques, velocity_problems
+from touchline.check.loads import explain_weights, possible_load
 from touchline.check.mending import Mending
 from touchline.check.noise import check_noise
 from touchline.check.seen import Seen, look
@@ -81,8 +81,35 @@ def check_recording(robot: Robot, path: Path, findings: Findings) -> None:
             if not _coarse(better):
                 plain = better
                 findings.take(explained)
+        elif again is None:
+            _tell_load(robot, seen, mending, read, plain)
     findings.take(plain)
     _mend_description(robot, mending, findings)
+
+
+def _tell_load(
+    robot: Robot,
+    seen: Seen,
+    mending: Mending,
+    read: Callable[[], Iterator[Samples]],
+    plain: Findings,
+) -> None:
+    """Where gains of motors are off: would one load at the end of the arm do the same?"""
+    motors = [joint.name for joint in robot.description.joints if joint.torque == "motor"]
+    starts = tuple(f"torque of {name} is " for name in motors)
+    lines = [x for x in plain.findings if x.startswith(starts) and f": {CHECK_GAIN}" in x]
+    found = possible_load(robot, mending.apply(read())) if lines else None
+    again = None if found is None else look(found[1], read(), mending)
+    if found is None or again is None:
+        return
+    loaded = Findings()
+    _judge(found[1], again, loaded)
+    joints = [line.partition(" is ")[0] for line in lines]
+    if any(line.partition(" is ")[0] in joints for line in loaded.findings):
+        return
+    words = f": load or gain{'s' * (len(lines) > 1)}? {found[0]} would do the same; {CHECK_GAIN}"
+    told = [x.replace(f": {CHECK_GAIN}", words) if x in lines else x for x in plain.findings]
+    plain.findings[:] = told
 
 
 def _mend_description(robot: Robot, mending: Mending, findings: Findings) -> None:
@@ -167,6 +194,7 @@ def _judge(robot: Robot, seen: Seen, findings: Findings) -> None:
     """Judges a recording by the robot as it is."""
     seen.stamps.report(findings)
     seen.table.report(robot, findings)
+    seen.repeats.report(findings)
     if seen.stamps.credible:
         for warning in bandwidth_warnings(bandwidths(robot, None), seen.stamps.period):
             if "> 1)" in warning:

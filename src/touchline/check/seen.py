@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from touchline.check.mending import Mending
+from touchline.check.repeats import Repeats
 from touchline.check.signals import SignalTable
 from touchline.check.stamps import Stamps
 from touchline.check.windows import WindowMaker, Windows
@@ -25,6 +26,7 @@ class Seen:
     Attributes:
         stamps: of time.
         table: every signal by itself.
+        repeats: rows that hold the numbers of the row before.
         windows: readings beside what the model expects.
         first: the first samples, as logged.
         torque_noise, wrench_noise: the meters of these signals; the latter of six columns a sensor.
@@ -32,6 +34,7 @@ class Seen:
 
     stamps: Stamps
     table: SignalTable
+    repeats: Repeats
     windows: Windows
     first: list[Samples]
     torque_noise: NoiseMeter
@@ -41,7 +44,7 @@ class Seen:
 def look(robot: Robot, parts: Iterable[Samples], mending: Mending) -> Seen | None:
     """Reads a recording once; None where it holds no samples."""
     stamps = maker = None
-    table, first = SignalTable(robot), []
+    table, repeats, first = SignalTable(robot), Repeats(robot), []
     torque = NoiseMeter(len(robot.joint_names))
     wrench = NoiseMeter(6 * len(robot.sensor_names))
     kept = 0
@@ -55,12 +58,13 @@ def look(robot: Robot, parts: Iterable[Samples], mending: Mending) -> Seen | Non
                 stamps, maker = Stamps(period), WindowMaker(robot, period)
             stamps.add(part.time)
             table.add(part)
+            repeats.add(part)
             maker.add(part)
             torque.add(part.tau)
             wrench.add(part.wrench.reshape(len(part), -1))
     if stamps is None or maker is None or not stamps.samples:
         return None
-    return Seen(stamps, table, maker.windows(), first, torque, wrench)
+    return Seen(stamps, table, repeats, maker.windows(), first, torque, wrench)
 
 
 def windows_of(robot: Robot, seen: Seen, mending: Mending) -> Windows:

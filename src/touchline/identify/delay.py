@@ -2,8 +2,9 @@
 """How late torques and sensors come, beside the positions.
 
 A reading that comes D late is what was expected D earlier: reading = M - D dM/dt. One number is
-shared by all torques, and one by the axes of each sensor. Biases, friction and inertias are free
-beside it (Frisch and Waugh, Econometrica 1(4), 1933), so that a wrong model is no delay.
+shared by all torques, and one by the axes of each sensor. Biases, friction, inertias and the frames
+of sensors are free beside it (Frisch and Waugh, Econometrica 1(4), 1933), so that a wrong model is
+no delay.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,6 +17,7 @@ from touchline.arrays import Array, Mask
 from touchline.identify.choice import Chooser
 from touchline.identify.evidence import Evidence
 from touchline.identify.fit import Equations, Problem, applied, column_of, gradient_of
+from touchline.identify.frame import frame_columns
 from touchline.model.robot import Robot
 
 SURE = 4.0  # standard errors
@@ -97,7 +99,8 @@ def _delays(evidence: Evidence, parts: Sequence[Mask]) -> Iterator[list[Delay]]:
     """
     whole = np.ones(len(evidence), dtype=bool)
     chooser = Chooser(evidence, whole)
-    problem = chooser.loaded()
+    loaded = chooser.loaded()
+    problem = replace(loaded, columns=(*loaded.columns, *frame_columns(evidence)))
     fits = [_Beside(chooser, problem, part) for part in (whole, *parts)]
     # What is expected with all that was fitted: a payload's weight changes as the model's does.
     rates = _rates(evidence, evidence.reading + fits[0].left)
@@ -178,7 +181,8 @@ def _applied(chooser: Chooser, problem: Problem, values: Array) -> Array:
     evidence = chooser.evidence
     added = np.zeros(evidence.reading.shape)
     for column, value in zip(problem.columns, values, strict=False):
-        added[:, column.row] += value * column_of(evidence, column, column.row)
+        for r in column.rows:
+            added[:, r] += value * column_of(evidence, column, r)
     bodies = values[len(problem.columns) :].reshape(-1, 10)
     for body, change in zip(problem.bodies, bodies, strict=True):
         added += evidence.model[:, :, body.node] @ change

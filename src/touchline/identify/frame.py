@@ -3,7 +3,8 @@
 
 A sensor's frame is off where its axes are turned against those of what it carries. Biases, a
 payload and inertias are free beside it, for a body whose centre is off looks like a shifted sensor.
-A frame is written only if that foretells parts of time which the fit has not seen.
+A frame is written only if that foretells parts of time which the fit has not seen. A shift is often
+sure only in a second round, once the turn has been taken out.
 """
 
 from collections.abc import Sequence
@@ -47,19 +48,28 @@ def find_frames(evidence: Evidence) -> list[FrameError]:
     if not sensors:
         return []
     chooser = Chooser(evidence, np.ones(len(evidence), dtype=bool))
-    turns = [Column("turn", evidence.joints + 6 * s, axis=a) for s in sensors for a in range(3)]
-    shifts = [Column("shift", c.row, axis=c.axis) for c in turns]
-    if not _sure_columns(chooser.fit_beside((*turns, *shifts))):
+    every = frame_columns(evidence)
+    turns = tuple(c for c in every if c.kind == "turn")
+    if not _sure_columns(chooser.fit_beside(every)):
         return []
-    found = chooser.choose_beside([(), tuple(turns), (*turns, *shifts)])
+    found = chooser.choose_beside([(), turns, every])
     while True:
         sure = _sure_columns(found)
-        free = [c for c in found.problem.columns if c.kind in LEAST]
-        if len(sure) == len(free):
+        shifted = {c.row for c in sure if c.kind == "shift"}
+        # What is left of a turn would be taken for a shift: it is free beside one, however small.
+        kept = [c for c in _frame_columns(found) if c in sure or c.row in shifted]
+        if kept == _frame_columns(found):
             break
-        columns = tuple(c for c in found.problem.columns if c.kind not in LEAST or c in sure)
+        columns = tuple(c for c in found.problem.columns if c.kind not in LEAST or c in kept)
         found = chooser.with_errors(chooser.fit(replace(found.problem, columns=columns)))
-    return [_error_of(evidence, found, s) for s in sensors if _of(found, "turn", s, evidence)[2]]
+    off = {c.row for c in _frame_columns(found)}
+    return [_error_of(evidence, found, s) for s in sensors if evidence.joints + 6 * s in off]
+
+
+def frame_columns(evidence: Evidence) -> tuple[Column, ...]:
+    """What sensors that are turned or shifted would do: the turns first, then the shifts."""
+    first = [evidence.joints + 6 * s for s in _judged(evidence)]
+    return tuple(Column(kind, row, axis=a) for kind in LEAST for row in first for a in range(3))
 
 
 def with_frames(robot: Robot, frames: Sequence[FrameError]) -> Robot:
@@ -78,12 +88,18 @@ def with_frames(robot: Robot, frames: Sequence[FrameError]) -> Robot:
 
 
 def joined(before: Sequence[FrameError], later: Sequence[FrameError]) -> list[FrameError]:
-    """What was found in two rounds; the errors are those of the later one."""
+    """What was found in two rounds; the errors are those of the later one that tells it."""
     found = {frame.name: frame for frame in before}
     for own in later:
         old = found.get(own.name)
         if old is not None:
-            own = replace(own, turn=old.turn + own.turn, shift=old.shift + own.shift)
+            own = FrameError(
+                own.name,
+                old.turn + own.turn,
+                own.turn_error if own.turn_error.any() else old.turn_error,
+                old.shift + own.shift,
+                own.shift_error if own.shift_error.any() else old.shift_error,
+            )
         found[own.name] = own
     return list(found.values())
 
@@ -101,18 +117,22 @@ def _judged(evidence: Evidence) -> list[int]:
     ]
 
 
-def _of(found: Solution, kind: str, s: int, evidence: Evidence) -> tuple[Array, Array, bool]:
-    """Values and errors (3,) of a sensor, and whether they were free."""
+def _of(found: Solution, kind: str, s: int, evidence: Evidence) -> tuple[Array, Array]:
+    """Values and errors (3,) of a sensor; zeros where they were not free."""
     row = evidence.joints + 6 * s
-    values, errors, free = np.zeros(3), np.zeros(3), False
+    values, errors = np.zeros(3), np.zeros(3)
     for column, value, error in zip(found.problem.columns, found.values, found.errors, strict=True):
         if (column.kind, column.row) == (kind, row):
-            values[column.axis], errors[column.axis], free = value, error, True
-    return values, errors, free
+            values[column.axis], errors[column.axis] = value, error
+    return values, errors
+
+
+def _frame_columns(found: Solution) -> list[Column]:
+    return [c for c in found.problem.columns if c.kind in LEAST]
 
 
 def _sure_columns(found: Solution) -> list[Column]:
-    return [c for c in found.problem.columns if c.kind in LEAST and _sure(found, c)]
+    return [c for c in _frame_columns(found) if _sure(found, c)]
 
 
 def _sure(found: Solution, column: Column) -> bool:
@@ -127,8 +147,8 @@ def _sure(found: Solution, column: Column) -> bool:
 
 def _error_of(evidence: Evidence, found: Solution, s: int) -> FrameError:
     name = evidence.robot.sensor_names[s]
-    turn, turn_error, _ = _of(found, "turn", s, evidence)
-    shift, shift_error, _ = _of(found, "shift", s, evidence)
+    turn, turn_error = _of(found, "turn", s, evidence)
+    shift, shift_error = _of(found, "shift", s, evidence)
     return FrameError(name, turn, turn_error, shift, shift_error)
 
 

@@ -37,7 +37,8 @@ class Geometry:
     `size` = full edges. "cylinder": `size` = radius, length; axis z. "sphere": `size` = radius.
     "capsule": `size` = radius, length of the straight part; axis z. "ellipsoid": `size` = half
     axes.
-    `problem` says why a mesh cannot be used; its `path` is None if it was not found.
+    `problem` says why a mesh cannot be used; its `path` is None if it was not found. Where its file
+    is not there, `missing_in` is the folder that should hold it.
     """
 
     kind: str
@@ -48,6 +49,7 @@ class Geometry:
     vertices: Array | None = None
     faces: Index | None = None
     problem: str | None = None
+    missing_in: str | None = None
 
 
 @dataclass(frozen=True)

@@ -192,7 +192,9 @@ class MjcfReader:
                 shapes[bool(model.geom_contype[geom] | model.geom_conaffinity[geom])].append(shape)
         for mesh in self.lost:
             if mesh.body == model.body(body).name:
-                shape = Geometry("mesh", np.eye(4), problem=mesh.problem)
+                shape = Geometry(
+                    "mesh", np.eye(4), problem=mesh.problem, missing_in=mesh.missing_in
+                )
                 shapes[mesh.collides].append(shape)
         mass = Inertia(float(model.body_mass[body]), model.body_ipos[body].copy(), inertia)
         return Link(name, mass, tuple(shapes[True]), tuple(shapes[False]))

@@ -12,11 +12,15 @@ from touchline.model.mesh_file import mesh_problem
 
 @dataclass(frozen=True)
 class LostMesh:
-    """A geom left out because its mesh cannot be read; `body` is the name of its body."""
+    """A geom left out because its mesh cannot be read; `body` is the name of its body.
+
+    Where the file is not there, `missing_in` is the folder that should hold it.
+    """
 
     body: str
     collides: bool
     problem: str
+    missing_in: str | None
 
 
 def compile_mjcf(path: Path) -> tuple[Any, list[LostMesh]]:
@@ -61,24 +65,24 @@ def _leave_out_meshes(spec: Any, path: Path) -> list[LostMesh]:
     for index, body in enumerate(spec.bodies):
         body.name = body.name or f"body_{index}"
     for mesh in [mesh for mesh in spec.meshes if mesh.file]:
-        problem = _problem(spec, mesh.file)
-        if problem is None:
+        # The model's folder is as given, maybe relative.
+        found = Path(spec.modelfiledir or "") / (spec.meshdir or "") / mesh.file
+        missing = not found.is_file()
+        reason = f"no such file: {found}" if missing else mesh_problem(found)
+        if reason is None:
             continue
+        problem = f"mesh '{mesh.file}': {reason}"
         for geom in [geom for geom in spec.geoms if geom.meshname == mesh.name]:
             body = geom.parent
             if not body.explicitinertial and geom.mass != 0 and geom.density != 0:
                 what = f"its mass comes from a mesh that cannot be read: {problem}"
                 problems.append(f"{path}: body '{body.name}': {what}")
-            lost.append(LostMesh(body.name, bool(geom.contype or geom.conaffinity), problem))
+            collides = bool(geom.contype or geom.conaffinity)
+            lost.append(
+                LostMesh(body.name, collides, problem, str(found.parent) if missing else None)
+            )
             spec.delete(geom)
         spec.delete(mesh)
     if problems:
         raise InputError(problems)
     return lost
-
-
-def _problem(spec: Any, file: str) -> str | None:
-    """Return what is wrong with a mesh; the model's folder is as given, maybe relative."""
-    found = Path(spec.modelfiledir or "") / (spec.meshdir or "") / file
-    problem = mesh_problem(found) if found.is_file() else f"no such file: {found}"
-    return f"mesh '{file}': {problem}" if problem else None

@@ -17,6 +17,19 @@ class PackageMissingError(FileNotFoundError):
     """A package is not installed or not where `package_dirs` says; the message names it."""
 
 
+class FileMissingError(FileNotFoundError):
+    """There is no such file.
+
+    Args:
+        message: what was looked for.
+        folder: in which it is not.
+    """
+
+    def __init__(self, message: str, folder: str) -> None:
+        super().__init__(message)
+        self.folder = folder
+
+
 def resolve(uri: str, folder: Path, package_dirs: Sequence[Path] = ()) -> Path:
     """Return the existing file that a model or mesh URI means.
 
@@ -36,8 +49,10 @@ def resolve(uri: str, folder: Path, package_dirs: Sequence[Path] = ()) -> Path:
     path = _local_path(uri)
     path = path if path.is_absolute() else folder / path
     if not path.is_file():
-        what = "is a folder, not a file" if path.is_dir() else "no such file"
-        raise FileNotFoundError(f"{what}: {path}" if str(path) != uri else what)
+        more = f": {path}" if str(path) != uri else ""
+        if path.is_dir():
+            raise FileNotFoundError(f"is a folder, not a file{more}")
+        raise FileMissingError(f"no such file{more}", str(path.parent))
     return path
 
 

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is suspicious about a mechanism but no reason to refuse it."""
 
-import re
 from collections import Counter
 from collections.abc import Collection, Iterator
 from dataclasses import replace
@@ -11,8 +10,6 @@ import numpy as np
 
 from touchline.model.mechanism import Inertia, Joint, Link, Mechanism
 from touchline.model.topology import outboard_links
-
-MISSING = re.compile(r"^mesh '(.*)[/\\][^/\\']+': no such file$")
 
 
 def mechanism_warnings(mechanism: Mechanism, path: Path) -> Mechanism:
@@ -71,26 +68,23 @@ def inertia_problem(body: Inertia) -> str | None:
 
 def mesh_warnings(mechanism: Mechanism) -> Iterator[str]:
     """Yield a line for each reason why surfaces are missing, naming the links that lack theirs."""
-    reasons: dict[str, list[str]] = {}
-    for link in mechanism.links.values():
-        for shape in surface_shapes(link):
-            if shape.problem and link.name not in reasons.setdefault(shape.problem, []):
-                reasons[shape.problem].append(link.name)
-    for reason, links in _together(reasons).items():
+    lacking = [
+        (link.name, shape)
+        for link in mechanism.links.values()
+        for shape in surface_shapes(link)
+        if shape.problem
+    ]
+    files = {shape.problem: shape.missing_in for _, shape in lacking}
+    counts = Counter(files.values())  # of files that are not there, by folder
+    reasons: dict[str, dict[str, None]] = {}
+    for name, shape in lacking:
+        folder = shape.missing_in
+        many = folder is not None and counts[folder] > 1
+        reason = f"meshes in '{folder}': no such files" if many else shape.problem or ""
+        reasons.setdefault(reason, {})[name] = None
+    for reason, links in reasons.items():
         names = ", ".join(f"'{name}'" for name in links)
         yield f"{reason}; no contact is located on link {names}"
-
-
-def _together(reasons: dict[str, list[str]]) -> dict[str, list[str]]:
-    """The reasons, with one for all files of a folder that are not there."""
-    folders = {reason: MISSING.sub(r"meshes in '\1': no such files", reason) for reason in reasons}
-    counts = Counter(folders.values())
-    together: dict[str, list[str]] = {}
-    for reason, links in reasons.items():
-        key = folders[reason] if counts[folders[reason]] > 1 else reason
-        known = together.setdefault(key, [])
-        known += [name for name in links if name not in known]
-    return together
 
 
 def surface_shapes(link: Link) -> tuple:

@@ -3,7 +3,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from touchline.model.mechanism import Array, Geometry, Inertia
 from touchline.model.mesh_file import mesh_problem
-from touchline.model.packages import PackageMissingError, resolve
+from touchline.model.packages import FileMissingError, PackageMissingError, resolve
 from touchline.model.transforms import inertia_matrix, move_inertia, pose_rpy
 
 PRIMITIVES = {"box": ("size",), "sphere": ("radius",)}
@@ -125,19 +125,20 @@ class Reader:
             return None
         scale = self.numbers(shape, "scale", 3, where) if "scale" in shape.attrib else None
         x, y, z = scale or (1.0, 1.0, 1.0)
-        path, problem = self._mesh_path(uri)
-        return Geometry("mesh", T, path=path, scale=(x, y, z), problem=problem)
+        return replace(self._mesh_file(uri, T), scale=(x, y, z))
 
-    def _mesh_path(self, uri: str) -> tuple[str | None, str | None]:
-        """Return the mesh file, if there is one, and why it cannot be used, if so."""
+    def _mesh_file(self, uri: str, T: Array) -> Geometry:
+        """The mesh of a file, with why it cannot be used, if so."""
         try:
             path = resolve(uri, self.path.parent, self.package_dirs)
         except PackageMissingError as error:  # one reason for many meshes
-            return None, str(error)
+            return Geometry("mesh", T, problem=str(error))
         except FileNotFoundError as error:
-            return None, f"mesh '{uri}': {error}"
+            folder = error.folder if isinstance(error, FileMissingError) else None
+            return Geometry("mesh", T, problem=f"mesh '{uri}': {error}", missing_in=folder)
         problem = mesh_problem(path)
-        return str(path), f"mesh '{uri}': {problem}" if problem else None
+        told = f"mesh '{uri}': {problem}" if problem else None
+        return Geometry("mesh", T, path=str(path), problem=told)
 
 
 def named(elements: list[Element], kind: str, fault: Callable[[str, str], None]) -> Iterator:

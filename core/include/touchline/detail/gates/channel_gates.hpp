@@ -6,7 +6,8 @@
 // sensor, it does to others too, to the sensors and joints inboard, or to the speed. So a jump
 // counts as a fault only where nothing else in the sample bears it out. If the new level then
 // stays and lives (its last digits move), it is taken after all, a few samples late, unless there
-// is a sensor inboard that would have had to feel it too.
+// is a sensor inboard that would have had to feel it too. Dry friction that the description knows
+// turns within a sample or two as its joint does: that is no jump.
 //
 // A stuck channel (stuck_watch.hpp), and a velocity that is not the derivative of its position
 // (speed_watch.hpp), are left out. Where a position or a velocity is not believed, the other one of the
@@ -75,7 +76,11 @@ class ChannelGates {
         since_(at_.count()),
         calm_(at_.count()),
         passes_(at_.count(), Passes::no),
-        fault_(at_.count(), Fault::none) {}
+        fault_(at_.count(), Fault::none) {
+    for (std::size_t j = 0; j < at_.joints; ++j) {
+      if (robot.joints[j].measured() && robot.joints[j].rough()) rough_.push_back({j, robot.joints[j]});
+    }
+  }
 
   ChannelGates(const ChannelGates&) = delete;
   ChannelGates& operator=(const ChannelGates&) = delete;
@@ -180,6 +185,7 @@ class ChannelGates {
   void settle(double dt, bool gap) {
     absurd_ = false;
     absent_ = 0;
+    take_out_friction();
     carry(dt);
     for (std::size_t c = 0; c < at_.count(); ++c) {
       const bool jumps = ratio_[c] > 1.0 && !gap, motion = c < at_.tau();
@@ -197,6 +203,20 @@ class ChannelGates {
     }
     if (gap) speeds_.forget_all();
     find_all_sound();
+  }
+
+  // Of the steps that are too large for their channel: what known friction has made of them counts
+  // for nothing.
+  void take_out_friction() {
+    for (const Rough& of : rough_) {
+      const std::size_t c = at_.tau() + of.number, v = at_.qd() + of.number;
+      if (!(ratio_[c] > 1.0)) continue;
+      const double turned = of.joint.dry_friction(now_[v]) - of.joint.dry_friction(last_[v]);
+      const double rest = now_[c] - last_[c] - turned / (of.joint.sign * of.joint.gain);
+      if (!(std::fabs(rest) < step_[c])) continue;
+      step_[c] = std::fabs(rest);
+      ratio_[c] = step_[c] / gate(c);
+    }
   }
 
   void find_all_sound() {
@@ -533,8 +553,15 @@ class ChannelGates {
             out_.data() + at_.wrench()};
   }
 
+  // A joint with dry friction that the description knows.
+  struct Rough {
+    std::size_t number;
+    JointRow joint;
+  };
+
   GatesTuning tuning_;
   ChannelLayout at_;
+  std::vector<Rough> rough_;
   double period_, memory_;  // [s]; part of a mean that one sample is at least
   int warm_up_, held_most_, return_, dwell_;  // [samples]
   GateLimits limits_;
