@@ -85,10 +85,11 @@ class Repeats:
         if not told:
             return
         shares = [f"{g.name} in {100 * g.repeated / self.samples:.1f} %" for g in told]
-        findings.find(
-            "rows repeat the numbers of the row before under a later stamp "
-            f"({', '.join(shares)}): read again before they were new. Velocities and noise are "
-            "wrong there: leave these rows out of the log"
+        findings.note(
+            "time stamps",
+            "  rows repeat the numbers of the row before under a later stamp "
+            f"({', '.join(shares)}): read again before they were new. They tell nothing, and noise "
+            "and velocities that follow from them are wrong",
         )
 
 

@@ -42,7 +42,8 @@ class FrictionSeen {
         if (!shows(i)) continue;
         Joint& joint = joints_[i];
         const bool tells = joint.turned() >= tuning_.friction_turned;
-        if (silent && offsets_.started(i) && tells) joint.learn(unexplained(i, felt, *posture), dt, tuning_);
+        if (silent && offsets_.started(i) && tells)
+          joint.learn(unexplained(i, felt, *posture), dt, tuning_);
         most = std::max(most, joint.shown(rows_[i].contact, tuning_));
       }
       for (const std::size_t i : rows_.of(g))
@@ -164,8 +165,8 @@ class FrictionSeen {
     return wrench_to_parent(posture.pose(node), load(w));
   }
 
-  // What a joint's row has that no contact explains of which the sensor shows no more than it does: one
-  // inboard of the joint does not load it, one outboard by what the sensor shows, `felt`.
+  // What a joint's row has that no contact explains of which the sensor shows no more than it does,
+  // `felt`. One inboard of the joint does not load it; one outboard does by what the sensor shows.
   double unexplained(std::size_t i, const Spatial& felt, const Posture& posture) const {
     const double inboard = off(i);
     double outboard = inboard;
