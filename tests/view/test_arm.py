@@ -246,6 +246,21 @@ def test_whatever_method_feels_the_push_the_arm_moves_away_from_it(robots, metho
     assert 0.03 < way < 0.1  # 0.05 m are asked for
 
 
+@pytest.mark.parametrize("stiffness", [0.2, 1.0])
+def test_a_stretched_arm_is_held_steady_however_stiff_it_is(robots, stiffness):
+    _, full, skin = robots
+    arm = LiveArm(full, skin)
+    arm.set(Conditions(stiffness=stiffness, noise=False))
+    home = arm.q
+    # Stretched and all but straight, joint 3 has a ninth of the inertia that it has at home.
+    arm.lead(np.array([-0.1, 0.0, 0.0, 0.005, 0.0, 0.17, 0.0]) - home)
+    arm._plant.reset(np.array([-0.1, 0.0, 0.0, 0.005, 0.0, 0.17, 0.02]))
+    arm._plant.evaluate()
+    samples, _ = arm.advance(300)
+    assert np.abs(samples.qd).max() < 2.0
+    assert np.abs(samples.qd[-50:]).max() < 0.05
+
+
 def test_resuming_is_smooth_and_ends_on_the_trajectory():
     moving = sinusoids([0.1, 0.2], [0.3, 0.5], [1.0, 0.7], [0.0, 1.0])
     at = Switched(np.array([0.1, 0.2]), moving)

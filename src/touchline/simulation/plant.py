@@ -21,7 +21,7 @@ from touchline.model.robot import Robot
 from touchline.simulation.mujoco_model import Addition, build_model
 
 HOLDING_FREQUENCY = 25.0  # rad/s of a joint on springs of its own
-FASTEST_DECAY = 1.5  # of a damper, per step; Runge-Kutta's limit is 2.8
+FASTEST_DECAY = 1.5  # of a damper, per step; Runge-Kutta's limit is 2.8, of a held torque 2
 
 
 @dataclass(frozen=True)
@@ -151,13 +151,11 @@ class Plant:
             Stiffness and damping (n,) as set: both less where the physics' step is too long for
             the dampers at the present inertia.
         """
-        inertia = np.array([self.inertia_times(e) for e in np.eye(len(q))])
+        inertia = self.inertia()
         if stiffness is None or damping is None:
             stiffness = np.diag(inertia) * HOLDING_FREQUENCY**2
             damping = 2 * np.diag(inertia) * HOLDING_FREQUENCY
-        # The fastest decay must be slow against the step, or the integration is unstable.
-        fastest = np.linalg.eigvals(np.linalg.solve(inertia, np.diag(damping))).real.max()
-        softer = min(1.0, FASTEST_DECAY * self.rate / fastest)
+        softer = steady_share(inertia, damping, self.rate)
         stiffness, damping = softer * stiffness, softer * damping
         m = self.model
         m.jnt_stiffness[m.dof_jntid[self._dofs]], m.dof_damping[self._dofs] = stiffness, damping
@@ -202,6 +200,10 @@ class Plant:
             d.qacc[self._dofs],
             self._motion_torque() if self._shows_motion else None,
         )
+
+    def inertia(self) -> Array:
+        """Mass matrix (n, n), rotors included [kg m2]."""
+        return np.array([self.inertia_times(e) for e in np.eye(len(self._dofs))])
 
     def inertia_times(self, acceleration: Array) -> Array:
         """Mass matrix times `acceleration` (n,), rotors included [Nm or N]."""
@@ -269,6 +271,21 @@ class Plant:
             R = self.data.site_xmat[site].reshape(3, 3)
             weights[s, :3], weights[s, 3:] = R.T @ force, R.T @ np.cross(arm, force)
         return weights
+
+
+def steady_share(inertia: Array, damping: Array, rate: float) -> float:
+    """The share, at most 1, of dampers that stays steady where time goes in steps.
+
+    The fastest decay must be slow against a step, or each step overshoots the one before.
+
+    Args:
+        inertia: (n, n) [kg m2].
+        damping: (n,) of the joints [Nm s/rad].
+        rate: of the steps [Hz].
+    """
+    root = np.sqrt(damping)  # D^1/2 M^-1 D^1/2 has the eigenvalues of M^-1 D, and is symmetric
+    fastest = np.linalg.eigvalsh(root[:, None] * np.linalg.solve(inertia, np.diag(root)))[-1]
+    return min(1.0, FASTEST_DECAY * rate / max(float(fastest), 1e-9))
 
 
 class _Friction:
