@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from touchline.check.delays import common_delay
-from touchline.check.findings import Findings
+from touchline.check.findings import Findings, Kind
 from touchline.check.fit import (
     ANGLE_FACTORS,
     MOMENT_FACTORS,
@@ -151,7 +151,8 @@ def check_torques(
     swapped = swapped_torques(windows, measured)
     for i, k in swapped:
         a, b = robot.joint_names[i], robot.joint_names[k]
-        findings.find(f"torques of {a} and {b} fit each other's joint: the columns seem swapped")
+        line = f"torques of {a} and {b} fit each other's joint: the columns seem swapped"
+        findings.find(line, Kind.SIGNAL)
     inside = {joint for pair in swapped for joint in pair}
     for j in measured:
         name = robot.joint_names[j]
@@ -268,7 +269,7 @@ def _judge(
     name = joint.name
     coarse = [] if or_rotor else torque_words(name, fit)
     for line in coarse:
-        findings.find(line)
+        findings.find(line, Kind.TORQUE, name)
     if (
         not coarse
         and abs(fit.factor - 1) > GAIN_OFF
@@ -279,7 +280,9 @@ def _judge(
             rest = "the masses outboard of it and rotor_inertia: this motion tells no more"
         findings.find(
             f"torque of {name} is {fit.factor:.3g} times what the model expects: {CHECK_GAIN}, "
-            f"unit, {rest}"
+            f"unit, {rest}",
+            Kind.GAIN,
+            name,
         )
     if fit.has_rotor and fit.rotor_torque > max(limit, TELLING):
         findings.find(

@@ -2,13 +2,14 @@
 """A recording beside the description: one pass, then one judgement after another."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from touchline.arrays import Mask
 from touchline.check.coarse import is_off, next_step
-from touchline.check.findings import Findings
+from touchline.check.findings import COARSE, Findings, Kind
 from touchline.check.joints import CHECK_GAIN, check_torques, velocity_problems
 from touchline.check.loads import explain_weights, possible_load
 from touchline.check.mending import Mending
@@ -27,22 +28,6 @@ CHUNK = 1 << 15  # samples that are read at once
 MOST_STEPS = 8  # things that hide each other
 MOMENT = 0.2  # s before and after what was felt: a touch begins unfelt, and filters forget it late
 LEAST_UNTOUCHED = 0.2  # of the samples: a recording of touches has pauses
-
-
-GROSS = (  # words of findings that must be mended before weights mean anything
-    "opposite",
-    "swapped",
-    "use factor",
-    "look like degrees",
-    "polarity:",
-    "frame:",
-    "compensated:",
-    "always",
-    "no value",
-    "milliseconds",
-    "saturated",
-    "infinite",
-)
 
 
 def check_recording(robot: Robot, path: Path, findings: Findings) -> None:
@@ -71,14 +56,14 @@ def check_recording(robot: Robot, path: Path, findings: Findings) -> None:
     plain = Findings()
     _judge(robot, seen, plain)
     # A weight that is wrong makes a light joint's torque look compensated, turned or scaled.
-    if all(line.startswith("torque of ") and " times what " in line for line in _coarse(plain)):
+    if all(finding.kind is Kind.TORQUE for finding in plain.of(*COARSE)):
         explained = Findings()
         mended = explain_weights(robot, mending.apply(read()), explained)
         again = None if mended is robot else look(mended, read(), mending)
         if again is not None:
             better = Findings()
             _judge(mended, again, better)
-            if not _coarse(better):
+            if not better.of(*COARSE):
                 plain = better
                 findings.take(explained)
         elif again is None:
@@ -95,21 +80,21 @@ def _tell_load(
     plain: Findings,
 ) -> None:
     """Where gains of motors are off: would one load at the end of the arm do the same?"""
-    motors = [joint.name for joint in robot.description.joints if joint.torque == "motor"]
-    starts = tuple(f"torque of {name} is " for name in motors)
-    lines = [x for x in plain.findings if x.startswith(starts) and f": {CHECK_GAIN}" in x]
-    found = possible_load(robot, mending.apply(read())) if lines else None
+    motors = {joint.name for joint in robot.description.joints if joint.torque == "motor"}
+    gains = [finding for finding in plain.of(Kind.GAIN) if finding.about in motors]
+    found = possible_load(robot, mending.apply(read())) if gains else None
     again = None if found is None else look(found[1], read(), mending)
     if found is None or again is None:
         return
     loaded = Findings()
     _judge(found[1], again, loaded)
-    joints = [line.partition(" is ")[0] for line in lines]
-    if any(line.partition(" is ")[0] in joints for line in loaded.findings):
+    joints = {finding.about for finding in gains}
+    if any(finding.about in joints for finding in loaded.of(Kind.TORQUE, Kind.GAIN)):
         return
-    words = f": load or gain{'s' * (len(lines) > 1)}? {found[0]} would do the same; {CHECK_GAIN}"
-    told = [x.replace(f": {CHECK_GAIN}", words) if x in lines else x for x in plain.findings]
-    plain.findings[:] = told
+    either = f"load or gain{'s' * (len(gains) > 1)}? {found[0]} would do the same; {CHECK_GAIN}"
+    plain.all = [
+        replace(x, line=x.line.replace(CHECK_GAIN, either)) if x in gains else x for x in plain.all
+    ]
 
 
 def _mend_description(robot: Robot, mending: Mending, findings: Findings) -> None:
@@ -185,11 +170,6 @@ def _mend(
     return mending, seen
 
 
-def _coarse(findings: Findings) -> list[str]:
-    """The findings that must be mended before weights mean anything."""
-    return [line for line in findings.findings if any(word in line for word in GROSS)]
-
-
 def _judge(robot: Robot, seen: Seen, findings: Findings) -> None:
     """Judges a recording by the robot as it is."""
     seen.stamps.report(findings)
@@ -230,6 +210,6 @@ def _compare(robot: Robot, seen: Seen, findings: Findings) -> None:
         kind: {name for k, name in seen.table.dead() if k == kind} for kind in ("tau", "wrench")
     }
     for problem in velocity_problems(robot, windows):
-        findings.find(problem.words)
+        findings.find(problem.words, Kind.SIGNAL)
     check_torques(robot, windows, dead["tau"], joints, findings)
     check_wrenches(robot, windows, dead["wrench"], components, findings)

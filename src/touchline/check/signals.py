@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from touchline.arrays import Array, Mask
-from touchline.check.findings import Findings
+from touchline.check.findings import Findings, Kind
 from touchline.model.description import AXES
 from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
@@ -130,7 +130,7 @@ class SignalTable:
             if self.samples < ENOUGH or self.low[i] != self.high[i]:
                 continue
             if signal.kind in ("tau", "wrench") or signal.name in moving:
-                findings.find(self._dead_words(i))
+                findings.find(self._dead_words(i), Kind.SIGNAL)
         self.report_limits(robot, findings)
 
     def _dead_words(self, i: int) -> str:
@@ -150,13 +150,13 @@ class SignalTable:
     def _report_one(self, i: int, signal: Signal, findings: Findings) -> None:
         column, few = _column(signal), FEW * self.samples
         if self.missing[i] == self.samples:
-            findings.find(f"{column}: no value in the whole recording")
+            findings.find(f"{column}: no value in the whole recording", Kind.SIGNAL)
         elif self.missing[i] > few:
             share = 100 * self.missing[i] / self.samples
             slow = "; interpolate what is sampled more slowly than the rows" if share > MOST else ""
             findings.find(f"{column}: missing in {share:.1f} % of the samples{slow}")
         if self.infinite[i]:
-            findings.find(f"{column}: infinite in {self.infinite[i]} samples")
+            findings.find(f"{column}: infinite in {self.infinite[i]} samples", Kind.SIGNAL)
         if self.at_range[i] <= few:
             self._report_held(i, column, findings)
         else:
@@ -164,7 +164,8 @@ class SignalTable:
             findings.find(
                 f"{column}: at or beyond its range {signal.range:g} in {share:.1f} % of the "
                 f"samples (it reaches {max(abs(self.low[i]), abs(self.high[i])):.4g}): saturated, "
-                "or in other units"
+                "or in other units",
+                Kind.SIGNAL,
             )
 
     def _report_held(self, i: int, column: str, findings: Findings) -> None:
@@ -200,7 +201,7 @@ class SignalTable:
             )
             if degrees:
                 line += ": the positions look like degrees; use factor 0.01745329 in log"
-            findings.find(line)
+            findings.find(line, Kind.SIGNAL if degrees else Kind.FINE)
 
     def _positions(self, robot: Robot) -> Iterator[tuple[str, float, float, float, float]]:
         for i, signal in enumerate(self.signals):

@@ -4,7 +4,7 @@
 import numpy as np
 
 from touchline.arrays import Array
-from touchline.check.findings import Findings
+from touchline.check.findings import Findings, Kind
 from touchline.tuning import DEFAULTS
 
 GAP = DEFAULTS["observer.gap_periods"]  # periods; the observer starts anew after a longer step
@@ -66,7 +66,7 @@ class Stamps:
             f"than {GAP:g} steps, {self.invalid} not a number",
         )
         if not self.credible:
-            findings.find(self.incredible)
+            findings.find(self.incredible, Kind.SIGNAL)
             return
         few = FEW * self.samples
         for count, what in (

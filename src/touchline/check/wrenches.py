@@ -9,7 +9,7 @@ import numpy as np
 
 from touchline.arrays import Array
 from touchline.check.delays import axis_delays, common_delay
-from touchline.check.findings import Findings
+from touchline.check.findings import Findings, Kind
 from touchline.check.fit import FORCE_FACTORS, MOMENT_FACTORS, factor_words
 from touchline.check.model import outboard_mass
 from touchline.check.windows import Windows
@@ -124,7 +124,9 @@ class _SensorCheck:
             words.append(f"sensor {self.sensor.name}: {best.words}")
         force, force_words = self._factor("forces", best, FORCE_FACTORS)
         moment, moment_words = self._factor("moments", best, MOMENT_FACTORS)
-        for line in (*words, *force_words, *moment_words):
+        for line in words:
+            self.findings.find(line, Kind.AXES)
+        for line in (*force_words, *moment_words):
             self.findings.find(line)
         if best.change:
             self.findings.mend("force_torque_sensors", self.sensor.name, **best.change)
