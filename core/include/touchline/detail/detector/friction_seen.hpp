@@ -23,14 +23,25 @@ class FrictionSeen {
   // All that is handed over stays the caller's.
   FrictionSeen(const Observer& observer, const DetectorRows& rows, const RowOffsets& offsets,
                const DetectorTuning& tuning)
-      : observer_(observer), rows_(rows), offsets_(offsets), tuning_(tuning), joints_(rows.size()) {}
+      : observer_(observer),
+        rows_(rows),
+        offsets_(offsets),
+        tuning_(tuning),
+        joints_(rows.size()),
+        shown_(rows.size()),
+        first_(rows.segments()) {
+    for (std::size_t g = 0; g < rows.segments(); ++g) {
+      first_[g] = rows.first(g);
+      while (first_[g] < rows.end(g) && rows.of_wrench(first_[g])) ++first_[g];
+    }
+  }
 
   // Joints that are tested beside a force-torque sensor, which feels none of it; `posture`: null while
   // it is not known.
   void follow(const Posture* posture, double dt) {
     for (std::size_t g = 0; g < rows_.segments(); ++g) {
-      for (const std::size_t i : rows_.of(g)) {
-        if (rows_.of_wrench(i) || !rows_.samples[i].known) continue;
+      for (const std::size_t i : torques_of(g)) {
+        if (!rows_.samples[i].known) continue;
         const double part = std::min(1.0, dt * rows_.bandwidths[i]);
         joints_[i].follow(rows_.samples[i].speed, part, std::min(1.0, part / tuning_.trend), tuning_);
       }
@@ -38,15 +49,16 @@ class FrictionSeen {
       const bool silent = posture != nullptr && is_silent(g);
       const Spatial felt = silent ? felt_by_sensor(g, *posture) : Spatial{};
       double most = 0.0;
-      for (const std::size_t i : rows_.of(g)) {
+      for (const std::size_t i : torques_of(g)) {
         if (!shows(i)) continue;
         Joint& joint = joints_[i];
         const bool tells = joint.turned() >= tuning_.friction_turned;
         if (silent && offsets_.started(i) && tells)
           joint.learn(unexplained(i, felt, *posture), dt, tuning_);
-        most = std::max(most, joint.shown(rows_[i].contact, tuning_));
+        shown_[i] = joint.shown(rows_[i].contact, tuning_);
+        most = std::max(most, shown_[i]);
       }
-      for (const std::size_t i : rows_.of(g))
+      for (const std::size_t i : torques_of(g))
         if (shows(i)) expect(i, most);
     }
   }
@@ -76,8 +88,8 @@ class FrictionSeen {
   // the mean of the last moments.
   void average(const RowLanes& averaged, double dt) {
     for (std::size_t g = 0; g < rows_.segments(); ++g) {
-      for (const std::size_t i : rows_.of(g))
-        if (!rows_.of_wrench(i) && averaged[i] > 0.0) joints_[i].average(offsets_.share(i, dt));
+      for (const std::size_t i : torques_of(g))
+        if (averaged[i] > 0.0) joints_[i].average(offsets_.share(i, dt));
     }
   }
   void rest(std::size_t i) { joints_[i].base = joints_[i].trend; }
@@ -128,9 +140,11 @@ class FrictionSeen {
   };
 
   bool has_sensor(std::size_t g) const { return observer_.layout().segments[g].sensor >= 0; }
-  bool shows(std::size_t i) const {
-    return !rows_.of_wrench(i) && rows_.samples[i].known && rows_[i].seen > 0.0;
-  }
+  // Rows of torques stand behind those of the segment's wrench.
+  RowRange wrench_of(std::size_t g) const { return {rows_.first(g), first_[g]}; }
+  RowRange torques_of(std::size_t g) const { return {first_[g], rows_.end(g)}; }
+  // Of a torque.
+  bool shows(std::size_t i) const { return rows_.samples[i].known && rows_[i].seen > 0.0; }
 
   // What may have come of the friction of a joint; `other`: the most that one beside it has shown. A
   // joint of which little has been seen may have as much, or as stood there when it was moving at the
@@ -140,15 +154,14 @@ class FrictionSeen {
     const double contact = rows_[i].contact;
     if (offsets_.shown(i) > contact && offsets_.anchor(i) * joint.base < 0.0)
       other = std::max(other, std::fabs(offsets_.anchor(i)));
-    const double own = joint.shown(contact, tuning_);
-    joint.added = std::max(own, (1.0 - joint.sure(tuning_)) * other) * joint.turned();
+    const double by_other = other > 0.0 ? (1.0 - joint.sure(tuning_)) * other : 0.0;
+    joint.added = std::max(shown_[i], by_other) * joint.turned();
   }
 
   // Does the sensor of a segment feel nothing?
   bool is_silent(std::size_t g) const {
     bool any = false;
-    for (const std::size_t i : rows_.of(g)) {
-      if (!rows_.of_wrench(i)) continue;
+    for (const std::size_t i : wrench_of(g)) {
       if (!rows_.samples[i].known || !offsets_.started(i)) return false;
       any = true;
       if (std::fabs(off(i)) > rows_.limit(i)) return false;
@@ -159,8 +172,7 @@ class FrictionSeen {
   // What a segment's sensor shows, in world [N, Nm].
   Spatial felt_by_sensor(std::size_t g, const Posture& posture) const {
     double w[6] = {};
-    for (const std::size_t i : rows_.of(g))
-      if (rows_.of_wrench(i)) w[rows_[i].component] = off(i);
+    for (const std::size_t i : wrench_of(g)) w[rows_[i].component] = off(i);
     const int node = observer_.sensors()[observer_.layout().segments[g].sensor].node;
     return wrench_to_parent(posture.pose(node), load(w));
   }
@@ -183,6 +195,8 @@ class FrictionSeen {
   const RowOffsets& offsets_;
   const DetectorTuning& tuning_;
   std::vector<Joint> joints_;  // per row
+  std::vector<double> shown_;  // per row: the friction that it has shown [N or Nm]
+  std::vector<std::size_t> first_;  // per segment: its first row of a torque
 };
 
 }  // namespace touchline

@@ -40,7 +40,10 @@ inline void tangents(const Vec3& n, Vec3& s, Vec3& t) {
 class ForceFitter {
  public:
   explicit ForceFitter(const PlaceSettings& settings)
-      : settings_(settings), cone_(std::atan(settings.friction)), turns_(turns()) {}
+      : settings_(settings),
+        cone_(std::atan(settings.friction)),
+        surely_in_cone_(std::cos(cone_) + kCosineRounding),
+        turns_(turns()) {}
 
   // The force at `point` that explains best, in the friction cone of the outward `normal`, or, if
   // it may be `grasped`, in any direction. Beyond a chi2 of `limit` nothing is worked out, nor where
@@ -108,6 +111,7 @@ class ForceFitter {
 
   double cone_cost(double cosine) const {
     if (cosine <= 0.0) return std::numeric_limits<double>::infinity();
+    if (cosine > surely_in_cone_) return 0.0;  // as nearly always: the angle is dear
     const double beyond = std::acos(std::min(1.0, cosine)) - cone_;
     if (beyond <= 0.0) return 0.0;
     return beyond * beyond / (settings_.cone_softness * settings_.cone_softness);
@@ -210,6 +214,7 @@ class ForceFitter {
   }
 
  private:
+  static constexpr double kCosineRounding = 1e-9;  // of a cosine, far above what it errs by
   static constexpr double kRounding = 1e-9;  // a part of chi2, far above what it errs by
 
   // Directions around the cone, and those that lie half a step, a quarter and an eighth to either
@@ -328,7 +333,8 @@ class ForceFitter {
   }
 
   const PlaceSettings& settings_;
-  double cone_;
+  double cone_;            // half of its opening [rad]
+  double surely_in_cone_;  // a cosine: above it nothing is beyond the cone
   const Turns& turns_;
 };
 
