@@ -134,6 +134,34 @@ def test_wrong_columns_are_refused(tmp_path):
         table.write({"z": [1.0]})
 
 
+@pytest.mark.parametrize("y", [[1.0], 1.0, np.ones((2, 1))])
+def test_columns_of_other_lengths_or_shapes_are_refused(tmp_path, y):
+    table = TableWriter(tmp_path / "t.parquet", {"x": "f8", "y": "f8", "word": "str"})
+    with pytest.raises(ValueError, match="different lengths or shapes"):
+        table.write({"x": [1.0, 2.0], "y": y, "word": ["a", "b"]})
+
+
+def test_groups_hold_the_same_however_rows_came(tmp_path, small_parts):
+    """A group is written from one place in memory, again and again."""
+    x = np.arange(95.0)
+    x[[3, 41, 94]] = np.nan
+    words = [None if k % 7 == 0 else f"w{k}" for k in range(95)]
+    read = []
+    for step in (1, 17, 40, 95):
+        path = tmp_path / f"{step}.parquet"
+        with TableWriter(path, {"x": "f8", "word": "str", "n": "i8"}) as table:
+            for i in range(0, 95, step):
+                rows = slice(i, i + step)
+                n = np.arange(95)[rows]
+                table.write({"x": x[rows], "word": words[rows], "n": n})
+        read.append(pq.read_table(path))
+        groups = pq.ParquetFile(path).metadata
+        assert groups.row_group(0).num_rows == 40
+    assert all(one.equals(read[0]) for one in read)
+    assert read[0]["x"].null_count == 3 and read[0]["word"].to_pylist() == words
+    np.testing.assert_array_equal(read[0]["x"].to_numpy(), x)
+
+
 def test_place_that_cannot_be_written(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be written"):

@@ -86,7 +86,14 @@ class TableWriter:
         self._count = 0  # closed parts
         self._part_seconds = PART_SECONDS if part_seconds is None else part_seconds
         self._rows = 0
-        self._waiting: list[Any] = []  # batches that make no row group yet
+        floats = [field.name for field in self._schema if pa.types.is_float64(field.type)]
+        self._slots = {name: slot for slot, name in enumerate(floats)}
+        # Rows that make no row group yet: in place for the next group too, as memory that is asked
+        # for and given back over and over costs more than what is copied into it.
+        self._numbers = np.empty((len(floats), 0))
+        self._others: dict[str, list[Any]] = {
+            name: [] for name in self._schema.names if name not in self._slots
+        }
         self._waiting_rows = 0
         self._writer: Any = None
         self._part_rows, self._part_began = 0, 0.0
@@ -109,50 +116,81 @@ class TableWriter:
         Raises:
             ValueError: columns are missing, unknown or of different lengths.
         """
-        import pyarrow as pa
-
         names = self._schema.names
         if set(columns) != set(names):
             odd = sorted(set(columns) ^ set(names))
             raise ValueError(f"{self.path}: missing or unknown columns: {', '.join(odd)}")
-        arrays = [_arrow_array(columns[field.name], field.type) for field in self._schema]
-        batch = pa.RecordBatch.from_arrays(arrays, schema=self._schema)
-        if batch.num_rows:
-            self._append(batch)
+        numbers = [np.asarray(columns[name], np.float64) for name in self._slots]
+        others = {
+            name: _arrow_array(columns[name], self._schema.field(name).type)
+            for name in self._others
+        }
+        lengths = {len(values) if values.ndim == 1 else -1 for values in numbers}
+        lengths |= {len(values) for values in others.values()}
+        if len(lengths) != 1 or -1 in lengths:
+            raise ValueError(f"{self.path}: columns of different lengths or shapes")
+        if rows := lengths.pop():
+            self._append(numbers, others, rows)
 
-    def _append(self, batch: Any) -> None:
+    def _append(self, numbers: Sequence[np.ndarray], others: Mapping[str, Any], rows: int) -> None:
         if not self._part_rows:
             self._part_began = time.monotonic()
-        self._waiting.append(batch)
-        self._waiting_rows += batch.num_rows
-        self._part_rows += batch.num_rows
-        self._rows += batch.num_rows
+        self._part_rows += rows
+        self._rows += rows
+        first = 0
+        while first < rows:
+            begin = self._waiting_rows
+            end = min(begin + rows - first, _GROUP_ROWS)
+            self._make_room(end)
+            last = first + end - begin
+            for slot, values in enumerate(numbers):
+                self._numbers[slot, begin:end] = values[first:last]
+            for name, values in others.items():
+                self._others[name].append(values[first:last])
+            self._waiting_rows, first = end, last
+            if end == _GROUP_ROWS:
+                self._write_group()
         if (
             self._part_rows >= PART_ROWS
             or time.monotonic() - self._part_began >= self._part_seconds
         ):
             self._close_part()
-        elif self._waiting_rows >= _GROUP_ROWS:
-            self._write_groups(rest=False)
 
-    def _write_groups(self, rest: bool) -> None:
-        """Write what waits in groups of one size, which does not depend on time; or all of it."""
+    def _make_room(self, rows: int) -> None:
+        """Room for so many rows; a short table never takes the room of a whole group."""
+        held = self._numbers
+        if rows > held.shape[1]:
+            room = min(max(rows, 2 * held.shape[1]), _GROUP_ROWS)
+            self._numbers = np.empty((len(held), room))
+            self._numbers[:, : held.shape[1]] = held
+
+    def _write_group(self) -> None:
+        """Write what waits."""
         import pyarrow as pa
 
         if self._writer is None:
             self.parts.mkdir(exist_ok=True)
             self._writer = _parquet_writer(self._part(self._count, False), self._schema)
-        table = pa.Table.from_batches(self._waiting).combine_chunks()
-        whole = table.num_rows if rest else table.num_rows // _GROUP_ROWS * _GROUP_ROWS
-        self._writer.write_table(table.slice(0, whole), row_group_size=_GROUP_ROWS)
-        self._waiting = table.slice(whole).to_batches()
-        self._waiting_rows = table.num_rows - whole
+        numbers = self._numbers[:, : self._waiting_rows]
+        # Where a sum finds no NaN, arrow need not look at each number.
+        whole = ~np.isnan(numbers.sum(axis=1))
+        arrays = [
+            pa.chunked_array(self._others[name])
+            if (slot := self._slots.get(name)) is None
+            else pa.array(numbers[slot], from_pandas=not whole[slot])
+            for name in self._schema.names
+        ]
+        table = pa.Table.from_arrays(arrays, schema=self._schema).combine_chunks()
+        self._writer.write_table(table, row_group_size=_GROUP_ROWS)
+        for held in self._others.values():
+            held.clear()
+        self._waiting_rows = 0
 
     def _close_part(self) -> None:
         if not self._part_rows:
             return
-        if self._waiting:
-            self._write_groups(rest=True)
+        if self._waiting_rows:
+            self._write_group()
         self._writer.close()
         self._writer, self._part_rows = None, 0
         os.rename(self._part(self._count, False), self._part(self._count, True))
@@ -211,12 +249,10 @@ def _arrow_type(kind: Any) -> Any:
 
 
 def _arrow_array(values: Any, kind: Any) -> Any:
-    """NaN and None become null. Where a sum finds no NaN, arrow need not look at each number."""
+    """NaN and None become null."""
     import pyarrow as pa
 
-    numbers = isinstance(values, np.ndarray) and values.dtype == np.float64
-    whole = numbers and not np.isnan(values.sum())
-    return pa.array(values, type=kind, from_pandas=not whole)
+    return pa.array(values, type=kind, from_pandas=True)
 
 
 def _parquet_writer(path: Path | str, schema: Any) -> Any:
@@ -311,7 +347,7 @@ class EstimateWriter:
             (self._sensors, sensor_wrench),
             (self._segments, segment_wrench),
         ):
-            table = np.asfortranarray(np.reshape(values, (len(time), len(names))))
+            table = np.reshape(values, (len(time), len(names)))
             columns |= {name: table[:, j] for j, name in enumerate(names)}
         self.table.write(columns | extra)
 

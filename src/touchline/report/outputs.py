@@ -150,11 +150,15 @@ class Outputs:
 
     def events(self, events: Sequence[Event]) -> None:
         """Bring `events.json` up to date: an event is in it soon after it is known."""
-        state = [(event.cleared, event.level) for event in events]
-        told = [self._told(event) for event in events]  # in time: what tells of widgets goes on
+        for event in events:
+            if event.id not in self._lines:
+                self._told(event)  # in time: what tells of widgets goes on
         began = monotonic()
-        if state != self._written and began >= self._write_next:
-            _write_lines(self.directory / EVENTS, told)
+        if began < self._write_next:
+            return
+        state = [(event.cleared, event.level) for event in events]
+        if state != self._written:
+            _write_lines(self.directory / EVENTS, [self._told(event) for event in events])
             ended = monotonic()
             self._written, self._write_next = state, ended + REST * (ended - began)
 
