@@ -87,6 +87,23 @@ def results(made, tmp_path_factory):
     return out
 
 
+def test_links_keep_their_names(made, tmp_path):
+    """As a data set on disk has them, whose files are called by their hashes."""
+    folder, store = tmp_path / "set", tmp_path / "store"
+    (folder / "arm").mkdir(parents=True)
+    store.mkdir()
+    shutil.copy(made / "a" / "whole.parquet", store / "0a1b2c")
+    (folder / "arm" / "one.parquet").symlink_to(store / "0a1b2c")
+    (folder / "arm" / "again.parquet").symlink_to(store / "0a1b2c")
+    (folder / "lost.parquet").symlink_to(tmp_path / "nowhere")
+    plan = make_plan([str(folder)], "sara")
+    told = {recording.name: recording.problem for recording in plan}
+    assert told == {"arm/again": "", "lost": "a link that leads nowhere"}
+    assert run(folder, "--robot", "sara", "--out", tmp_path / "out") == 3
+    found = rows(tmp_path / "out")
+    assert found["arm/again"]["status"] == "ok" and found["lost"]["status"] == "skipped"
+
+
 def test_every_recording_has_its_row(made, results):
     found = rows(results)
     assert {name: row["status"] for name, row in found.items()} == STATUS

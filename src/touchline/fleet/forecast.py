@@ -9,7 +9,7 @@ from pathlib import Path
 from touchline.errors import InputError
 from touchline.fleet.figures import HOUR, lasting
 from touchline.fleet.manifest import MANIFEST, Manifest
-from touchline.fleet.plan import Recording
+from touchline.fleet.plan import Recording, briefly
 from touchline.logs.log import open_log
 from touchline.logs.source import HEAD_ROWS
 from touchline.model.description import RobotDescription
@@ -126,7 +126,7 @@ def forecast_text(told: Forecast) -> str:
             length = f"{told.durations[recording.name] / HOUR:.3f}"
         words = f"  with {recording.robot}"
         if recording.problem:
-            words, length = f"  ({recording.problem})", ""
+            words, length = f"  ({briefly(recording.problem, recording.source)})", ""
         verb = "skip" if recording.problem else "analyze"
         lines.append(
             f"{verb:8}{recording.size / 1e6:9.1f} MB {length:>8} h  {recording.name}{words}"

@@ -3,6 +3,7 @@
 
 import csv
 import glob
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,6 +49,11 @@ class Recording:
         return self.url or str(self.log)
 
 
+def briefly(reason: str, source: str) -> str:
+    """A reason without the place of the recording, whose name stands beside it."""
+    return reason.removeprefix(f"{source}: ")
+
+
 def is_single(logs: Sequence[str]) -> bool:
     """Whether what was named is one recording, and neither a folder of several nor a list."""
     if len(logs) != 1 or is_url(logs[0]) or glob.has_magic(logs[0]) and not Path(logs[0]).exists():
@@ -70,22 +76,28 @@ def make_plan(logs: Sequence[str], robot: str | None) -> list[Recording]:
         InputError: something does not exist, or nothing was found.
     """
     local: dict[Path, tuple[str, str]] = {}  # log -> robot, problem
+    targets: set[Path] = set()  # of links, so that no recording comes twice
     remote: dict[str, tuple[int, str]] = {}  # URL -> size, robot
     for word in logs:
         for log, own in _named(word):
             if is_url(log):
                 remote |= {url: (size, robot or own) for url, size in found(log, ENDINGS)}
                 continue
-            chosen = robot or own or _nearest_robot(Path(log))
-            local.setdefault(Path(log).resolve(), (chosen, "" if chosen else NO_ROBOT))
+            # A link keeps its own name: what it leads to may be called by its hash alone.
+            path = Path(os.path.abspath(log))
+            if path.resolve() in targets:
+                continue
+            targets.add(path.resolve())
+            chosen = robot or own or _nearest_robot(path)
+            local[path] = (chosen, "" if chosen else NO_ROBOT)
     if not local and not remote:
-        raise InputError(f"{', '.join(logs)}: no recordings there")
+        raise InputError(f"{', '.join(logs)}: no recordings there ({', '.join(ENDINGS)})")
     paths = {url: _as_path(url) for url in remote}
     names = _names([*local, *paths.values()])
     plan = []
     for log, (chosen, problem) in local.items():
         if not problem and not log.exists():
-            problem = "no such file"
+            problem = "a link that leads nowhere" if log.is_symlink() else "no such file"
         plan.append(Recording(log, chosen, names[log], _size(log), problem))
     for url, (size, chosen) in remote.items():
         problem = "" if chosen else NO_ROBOT
@@ -202,7 +214,7 @@ def _list_rows(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def _nearest_robot(log: Path) -> str:
-    for folder in log.resolve().parents:
+    for folder in (*log.parents, *log.resolve().parents):
         if (folder / ROBOT_FILE).is_file():
             return str(folder / ROBOT_FILE)
     return ""

@@ -16,7 +16,7 @@ from touchline.fleet.cluster import Cluster
 from touchline.fleet.figures import FIGURES, lasting, make_figures
 from touchline.fleet.manifest import Manifest, Row, configuration_hash
 from touchline.fleet.page import write_page
-from touchline.fleet.plan import Recording, make_plan
+from touchline.fleet.plan import Recording, briefly, make_plan
 from touchline.fleet.pool import Pool
 from touchline.fleet.tables import table_rows, write_tables
 from touchline.fleet.work import Job, blank
@@ -212,7 +212,7 @@ def _bar(jobs: list[Job]) -> Any:
 def outcome_text(outcome: Outcome, out: Path) -> str:
     """What became of the recordings: each that is not ok, and a line of sums."""
     lines = [
-        f"{row['status']:8} {row['name']}: {row['reason']}"
+        f"{row['status']:8} {row['name']}: {briefly(row['reason'], row['log'])}"
         for row in outcome.rows
         if row["status"] != "ok"
     ]

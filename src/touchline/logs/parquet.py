@@ -53,7 +53,11 @@ class ParquetSource:
             self._selection = select_columns(description, naming, list(self.columns), str(path))
             self._check_types(naming.time.name)
             naming = in_seconds(
-                naming, path, self.warnings, lambda: self.head()["time"], self._unit(naming)
+                naming,
+                path,
+                self.warnings,
+                lambda: self._first_stamps(naming.time.name),
+                self._unit(naming),
             )
             self._selection = select_columns(description, naming, list(self.columns), str(path))
             if not self._file.metadata.num_rows:
@@ -108,6 +112,14 @@ class ParquetSource:
     def head(self) -> Block:
         """The first rows."""
         return next(self._blocks(HEAD_ROWS), self._selection.assemble(lambda _: np.empty(0), 0))
+
+    def _first_stamps(self, time: str) -> np.ndarray:
+        """As they are written; no other column is unpacked for them."""
+        try:
+            batches = self._file.iter_batches(batch_size=HEAD_ROWS, columns=[time])
+            return next((numbers(batch.column(time)) for batch in batches), np.empty(0))
+        except damages() as error:
+            raise InputError(f"{self.path}: damaged after row 0: {first_line(error)}") from error
 
     def blocks(self) -> Iterator[Block]:
         """All rows.
