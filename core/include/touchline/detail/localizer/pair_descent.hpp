@@ -88,6 +88,7 @@ class PairDescent {
   // One damped Gauss-Newton step of the points; its length [m], 0 where it is not worth it.
   double step(Pair& s) {
     constexpr int n = PairFit::kUnknowns;
+    for (const PairEnd& e : s.ends) view_.expect(e.surface, e.place);
     double H[n * n], x[n];
     std::copy_n(H_, n * n, H);
     std::copy_n(g_, n, x);

@@ -20,7 +20,10 @@ class PairFit {
   static constexpr int kUnknowns = 10;  // three of each force, two of each place
 
   PairFit(const PairView& view, const LocalizerSettings& settings)
-      : view_(view), settings_(settings), cone_(std::atan(settings.friction)) {}
+      : view_(view),
+        settings_(settings),
+        cone_(std::atan(settings.friction)),
+        inside_(std::cos(cone_) + kRounding) {}
 
   // The forces at given points that explain best, in closed form; where they are `bound`, with what
   // is beyond the friction cones, unless even without they cost as much as `worth`.
@@ -101,6 +104,7 @@ class PairFit {
   }
 
  private:
+  static constexpr double kRounding = 1e-9;  // of cosines, far above what they err by
   static constexpr int kTurns = 3;  // of the cones, linearized anew: a bound on time
   // Cost of the cones that is not worth a turn: so much, and a part of the misfit.
   static constexpr double kBeyond = 0.01, kPart = 0.01;
@@ -132,7 +136,9 @@ class PairFit {
   double beyond(const PairEnd& e) const {
     const double size = norm(e.force);
     if (!(size > 0.0)) return 0.0;
-    const double angle = std::acos(std::clamp(-dot(e.normal, e.force) / size, -1.0, 1.0)) - cone_;
+    const double cosine = -dot(e.normal, e.force) / size;
+    if (cosine > inside_) return 0.0;
+    const double angle = std::acos(std::clamp(cosine, -1.0, 1.0)) - cone_;
     return std::max(0.0, angle) / settings_.cone_softness;
   }
 
@@ -192,7 +198,7 @@ class PairFit {
 
   const PairView& view_;
   const LocalizerSettings& settings_;
-  double cone_;
+  double cone_, inside_;  // its angle [rad]; a cosine that is surely within it
   // Of the points at hand: the two bodies, what forces at both do to the normal equations of the
   // wrenches (12, 6), and those (12); and the normal equations of the forces.
   int bodies_[2] = {};

@@ -125,6 +125,9 @@ class PairView {
     return p;
   }
 
+  // `nearest` will be asked for what is near that place.
+  void expect(int surface, int near) const { (*surfaces_)[surface].mesh.expect(near); }
+
   // Where a point of a body was when the rows felt it.
   Vec3 earlier(const Vec3& p, int body) const {
     const Spatial& v = twists_[body];

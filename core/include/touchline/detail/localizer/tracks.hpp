@@ -49,8 +49,9 @@ class Tracks {
     follow_contacts(s, g, bandwidth, time, read_all);
     if (suspect_.any() || settings_.first_entry || !measurement_.has_wrench()) return;
     if (time - looked_[g].time < kLook || s.state.is(Tracking::suspected)) return;
-    suspect_ = look_again(g, read_all);
-    if (read_all()) lone_.take_out(g, time);
+    if (!read_all()) return;
+    suspect_ = look_again(g);
+    lone_.take_out(g, time);
   }
 
   // A channel that would show alone what is felt in the last sample, or what the known contacts leave.
@@ -99,8 +100,10 @@ class Tracks {
     reports_.clear();
     suspect_ = {};
     now_ = {g, bandwidth, time, 0.0};
-    if (s.known.contacts.count == 0 && !settings_.first_entry && read_all()) suspect_ = lone_.find(g);
-    if (!(suspect_.any() ? read_all() : read())) {
+    bool told = read_all();
+    if (told && s.known.contacts.count == 0 && !settings_.first_entry) suspect_ = lone_.find(g);
+    if (told && !suspect_.any()) told = lone_.take_out(g, time);
+    if (!told) {
       const JointEstimate& known = s.known.contacts;
       report(known.count > 0 ? known.known[0].serial : s.touched.first, single_.clear());
       return;
@@ -137,9 +140,7 @@ class Tracks {
   }
 
   // Is all that is felt, after all, one channel's?
-  template <class Read>
-  Suspect look_again(int g, Read&& read_all) {
-    if (!read_all()) return {};
+  Suspect look_again(int g) {
     const Suspect alone = lone_.find(g);
     const Look before = std::exchange(looked_[g], Look{now_.time, lone_.size()});
     const double passed = now_.time - before.time;

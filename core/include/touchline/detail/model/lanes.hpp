@@ -10,6 +10,10 @@
 #include <cstddef>
 #include <cstring>
 
+#if defined(__AVX__) && (defined(__GNUC__) || defined(__clang__))
+#include <immintrin.h>
+#endif
+
 namespace touchline {
 
 #if defined(__GNUC__) || defined(__clang__)
@@ -80,6 +84,19 @@ inline Lanes load_lanes(const double* from) {
 }
 inline void store_lanes(const Lanes& v, double* to) { std::memcpy(to, &v, sizeof v); }
 
+// As many floats, as doubles.
+inline Lanes lanes_of_floats(const float* from) {
+#if defined(__AVX__) && (defined(__GNUC__) || defined(__clang__))
+  return _mm256_cvtps_pd(_mm_loadu_ps(from));
+#elif defined(__GNUC__) || defined(__clang__)
+  float __attribute__((vector_size(kLanes * sizeof(float)))) v;
+  std::memcpy(&v, from, sizeof v);
+  return __builtin_convertvector(v, Lanes);
+#else
+  return *from;
+#endif
+}
+
 // `count` signals of kLanes samples, `stride` from one sample to the next: each signal side by side.
 inline void gather(const double* from, std::size_t stride, std::size_t count, Lanes* to) {
   if (count < kLanes) {
@@ -125,9 +142,13 @@ inline Lanes larger(const Lanes& a, const Lanes& b) { return a > b ? a : b; }
 inline Lanes smaller(const Lanes& a, const Lanes& b) { return a < b ? a : b; }
 
 inline bool any_below(const Lanes& a, const Lanes& b) {
+#if defined(__AVX__) && (defined(__GNUC__) || defined(__clang__))
+  return _mm256_movemask_pd(_mm256_cmp_pd(a, b, _CMP_LT_OQ)) != 0;
+#else
   bool any = false;
   for (int k = 0; k < kLanes; ++k) any |= lane(a, k) < lane(b, k);
   return any;
+#endif
 }
 
 // To 2e-8 (Abramowitz and Stegun, Handbook of Mathematical Functions, 4.4.46).

@@ -80,12 +80,24 @@ class Mesh {
   template <class Visit>
   void crossings(const ForceLine& line, Visit&& visit) const {
     const Vec3 inverse = invert(line.direction);
-    visit_triangles(
-        [&](const Box& box, int) { return crosses(box, line.origin, inverse); },
-        [&](const Triangle& tri) {
-          double t;
-          if (crosses(tri, line, t)) visit(Crossing{t, tri.face, tri.normal});
-        });
+    if (empty()) return;
+    int stack[2 * kDepth], size = 0;
+    stack[size++] = tree_->root;
+    while (size > 0) {
+      const int child = stack[--size];
+      if (child < 0) {
+        cross_leaf(~child, line, visit);
+        continue;
+      }
+      const Four& four = tree_->fours[child];
+      bool crossed[Four::kChildren];
+      four.crosses(line.origin, inverse, crossed);
+      for (int i = 0; i < Four::kChildren; ++i) {
+        if (!crossed[i]) continue;
+        tree_->fetch(four.child[i]);
+        stack[size++] = four.child[i];
+      }
+    }
   }
 
   // The point of the surface nearest to the line, if nearer than `limit`. `near`: the place of a
@@ -159,6 +171,14 @@ class Mesh {
     look();
   }
 
+  // What is near a triangle will be looked at soon: has it brought from memory while something else is
+  // done.
+  void expect(int near) const {
+    if (near < 0) return;
+    fetch_lines(&tree_->triangles[near], sizeof(Triangle));
+    tree_->fetch(~tree_->side_of[near]);
+  }
+
   // The point of the surface nearest to `p`, if nearer than `limit`. `near`: the place of a triangle
   // that may be near: then there is less to search. `looked` grows by the number of places that were
   // looked into: what it took, on any machine.
@@ -176,6 +196,7 @@ class Mesh {
       double bound;
       int child;  // as in `Four`
     } stack[2 * kDepth];
+    Found found;
     int size = 0;
     stack[size++] = {0.0, tree_->root};
     while (size > 0) {
@@ -184,15 +205,16 @@ class Mesh {
       if (entry.bound >= far) continue;
       ++looked;
       if (entry.child < 0) {
-        offer_leaf(~entry.child, p, best);
+        offer_leaf(~entry.child, p, best, found);
         continue;
       }
       const Four& four = tree_->fours[entry.child];
-      double bound[Four::kBoxes];
+      double bound[Four::kRoom];
       four.outside(p, bound);
       const auto push = [&](int i) {
-        stack[size] = {bound[i], four.child[i]};
-        size += bound[i] < far;
+        if (!(bound[i] < far)) return;
+        tree_->fetch(four.child[i]);
+        stack[size++] = {bound[i], four.child[i]};
       };
       // The nearer half is visited first, and in each half the nearer box.
       const int one = bound[4] > bound[5] ? 2 : 0, other = 2 - one;
@@ -202,6 +224,14 @@ class Mesh {
       push(third);
       push(2 * one + 1 - first);
       push(first);
+    }
+    if (found.side >= 0) {
+      const TriangleLanes& side = tree_->side_by_side[found.side];
+      const Numbers& numbers = tree_->numbers[found.side];
+      const int k = found.lane;
+      best.face = numbers.face[k];
+      best.place = numbers.place + k;
+      best.normal = {lane(side.normal.x, k), lane(side.normal.y, k), lane(side.normal.z, k)};
     }
     return best;
   }
@@ -213,6 +243,7 @@ class Mesh {
   }
 
  private:
+  static constexpr std::size_t kLine = 64;  // bytes of a line of a cache
   static constexpr int kLeaf = 4;  // triangles of a leaf
   static constexpr int kTogether = 4;    // triangles looked at at once, however many lanes there are
   static constexpr int kNearLooked = 2;  // places: a triangle near a line takes as long as so many boxes
@@ -231,12 +262,13 @@ class Mesh {
     int count;  // triangles of a leaf; 0: an inner box
   };
 
-  // Four boxes side by side: the children of the two children of an inner box, those two behind them.
-  // Where one of the two is a leaf, it stands there alone.
+  // Four boxes side by side: the children of the two children of an inner box, and those two. Where one
+  // of the two is a leaf, it stands there alone.
   struct Four {
-    static constexpr int kBoxes = 8;  // room: the last two are none
-    float low[3][kBoxes], high[3][kBoxes];
-    int child[4];  // another four, or ~ the number of a leaf's box
+    static constexpr int kChildren = 4, kRoom = 8;  // room: for the two, of which no four lanes are full
+    float half_low[3][2], half_high[3][2];
+    float low[3][kChildren], high[3][kChildren];
+    int child[kChildren];  // another four, or ~ the number of a leaf's first triangles side by side
 
     void put(int i, const Box& box) {
       const float* const ends[2] = {&box.low.x, &box.high.x};
@@ -245,7 +277,14 @@ class Mesh {
         high[axis][i] = ends[1][axis];
       }
     }
-    // No point is as near as to this.
+    void put_half(int i, const Box& box) {
+      const float* const ends[2] = {&box.low.x, &box.high.x};
+      for (int axis = 0; axis < 3; ++axis) {
+        half_low[axis][i] = ends[0][axis];
+        half_high[axis][i] = ends[1][axis];
+      }
+    }
+    // No point is as near as to this, and no line crosses it.
     void put_none(int i) {
       for (int axis = 0; axis < 3; ++axis) {
         low[axis][i] = kInfinity;
@@ -253,38 +292,61 @@ class Mesh {
       }
     }
 
-    // The square of how far a point is outside of each of the six.
+    // The square of how far a point is outside of each of the four, and of the two behind them. What
+    // is beyond the two in their lanes has no meaning.
     void outside(const Vec3& p, double* out) const {
-      const double at[3] = {p.x, p.y, p.z};
-      for (int i = 0; i < 6; i += kLanes) {
-        Lanes sum{};
-        for (int axis = 0; axis < 3; ++axis) {
-          const Lanes x = all_lanes(at[axis]);
-          const Lanes beyond = larger(floats(low[axis] + i) - x, x - floats(high[axis] + i));
-          const Lanes d = larger(beyond, Lanes{});
-          sum = axis == 0 ? d * d : sum + d * d;
-        }
-        store_lanes(sum, out + i);
-      }
+      const BasicVec3<Lanes> at = many(p);
+      for (int i = 0; i < kChildren; i += kLanes)
+        store_lanes(outside(at, &low[0][i], &high[0][i], kChildren), out + i);
+      for (int i = 0; i < 2; i += kLanes)
+        store_lanes(outside(at, &half_low[0][i], &half_high[0][i], 2), out + kChildren + i);
     }
 
+    // Does a line through `o` cross each of the four?
+    void crosses(const Vec3& o, const Vec3& inverse, bool* out) const {
+      const BasicVec3<Lanes> from = many(o), by = many(inverse);
+      for (int i = 0; i < kChildren; i += kLanes) {
+        const Lanes x0 = (lanes_of_floats(low[0] + i) - from.x) * by.x,
+                    x1 = (lanes_of_floats(high[0] + i) - from.x) * by.x,
+                    y0 = (lanes_of_floats(low[1] + i) - from.y) * by.y,
+                    y1 = (lanes_of_floats(high[1] + i) - from.y) * by.y,
+                    z0 = (lanes_of_floats(low[2] + i) - from.z) * by.z,
+                    z1 = (lanes_of_floats(high[2] + i) - from.z) * by.z;
+        const Lanes enter = larger(larger(smaller(x0, x1), smaller(y0, y1)), smaller(z0, z1));
+        const Lanes leave = smaller(smaller(larger(x0, x1), larger(y0, y1)), larger(z0, z1));
+        for (int k = 0; k < kLanes; ++k)
+          out[i + k] = child[i + k] != kNone && lane(enter, k) <= lane(leave, k);
+      }
+    }
+    static constexpr int kNone = std::numeric_limits<int>::max();  // where there is no child
+
    private:
-    static Lanes floats(const float* from) {
-#if defined(__GNUC__) || defined(__clang__)
-      float __attribute__((vector_size(kLanes * sizeof(float)))) v;
-      std::memcpy(&v, from, sizeof v);
-      return __builtin_convertvector(v, Lanes);
-#else
-      return *from;
-#endif
+    static Lanes outside(const BasicVec3<Lanes>& at, const float* low, const float* high,
+                         int stride) {
+      const Lanes* const x = &at.x;
+      Lanes sum{};
+      for (int axis = 0; axis < 3; ++axis, low += stride, high += stride) {
+        const Lanes beyond = larger(lanes_of_floats(low) - x[axis], x[axis] - lanes_of_floats(high));
+        const Lanes d = larger(beyond, Lanes{});
+        sum = axis == 0 ? d * d : sum + d * d;
+      }
+      return sum;
     }
   };
 
-  // Triangles side by side; what is beyond the last one repeats it.
-  struct TriangleLanes {
-    BasicVec3<Lanes> a, ab, ac, normal;
-    int place, count;  // of the first in `triangles`; how many there are
+  // Triangles side by side; what is beyond the last one repeats it. Whole lines of a cache: what decides
+  // whether the others are looked at comes first.
+  struct alignas(64) TriangleLanes {
+    BasicVec3<Lanes> a, normal, ab, ac;
+  };
+  // Of such: the place of the first in `triangles`, how many there are, and their faces.
+  struct Numbers {
+    int place, count;
     int face[kLanes];
+  };
+  // The nearest one so far among them; -1: none.
+  struct Found {
+    int side = -1, lane = 0;
   };
 
   // The directions of all normals in a box: within an angle of a cosine about an axis.
@@ -363,18 +425,19 @@ class Mesh {
         while (boxes[begin].count == 0) ++begin;
         faces[i] = facing(boxes[begin].next, boxes[end].next + boxes[end].count);
       }
+      side_of.resize(triangles.size());
       root = boxes.empty() ? 0 : gather(0);
-      for (const Box& box : boxes) {
-        first.push_back(static_cast<int>(side_by_side.size()));
-        for (int i = 0; i < box.count; i += kLanes)
-          side_by_side.push_back(lanes_of(box.next + i, std::min(kLanes, box.count - i)));
-      }
-      first.push_back(static_cast<int>(side_by_side.size()));
+    }
+
+    // What stands at a child of a four will be looked at soon.
+    void fetch(int child) const {
+      child < 0 ? fetch_lines(side_by_side.data() + ~child, sizeof(TriangleLanes))
+                : fetch_lines(fours.data() + child, sizeof(Four));
     }
 
     // The fours of a box and of all in it; how it is called in `Four::child`.
     int gather(int box) {
-      if (boxes[box].count > 0) return ~box;
+      if (boxes[box].count > 0) return ~put_side_by_side(boxes[box].next, boxes[box].count);
       const int index = static_cast<int>(fours.size());
       fours.push_back({});
       Four four{};
@@ -383,11 +446,12 @@ class Mesh {
         const int own = halves[half];
         const bool leaf = boxes[own].count > 0;
         const int of[2] = {leaf ? own : own + 1, boxes[own].next};
-        four.put(4 + half, boxes[own]);
+        four.put_half(half, boxes[own]);
         for (int i = 0; i < 2; ++i) {
           const int at = 2 * half + i;
           if (leaf && i == 1) {
             four.put_none(at);
+            four.child[at] = Four::kNone;
             continue;
           }
           four.put(at, boxes[of[i]]);
@@ -398,13 +462,25 @@ class Mesh {
       return index;
     }
 
+    // Triangles of a leaf, side by side; the number of the first of those.
+    int put_side_by_side(int begin, int count) {
+      const int first = static_cast<int>(side_by_side.size());
+      for (int i = 0; i < count; i += kLanes) {
+        for (int k = 0; k < std::min(kLanes, count - i); ++k)
+          side_of[begin + i + k] = static_cast<int>(side_by_side.size());
+        side_by_side.push_back(lanes_of(begin + i, count - i));
+        Numbers own{begin + i, count - i, {}};
+        for (int k = 0; k < kLanes; ++k)
+          own.face[k] = triangles[begin + std::min(i + k, count - 1)].face;
+        numbers.push_back(own);
+      }
+      return first;
+    }
+
     TriangleLanes lanes_of(int begin, int count) const {
       TriangleLanes out{};
-      out.place = begin;
-      out.count = count;
       for (int k = 0; k < kLanes; ++k) {
         const Triangle& t = triangles[begin + std::min(k, count - 1)];
-        out.face[k] = t.face;
         for (const auto& [to, from] : {std::pair{&out.a, &t.a}, std::pair{&out.ab, &t.ab},
                                        std::pair{&out.ac, &t.ac}, std::pair{&out.normal, &t.normal}}) {
           set_lane(to->x, k, from->x);
@@ -489,7 +565,8 @@ class Mesh {
     std::vector<Four> fours;
     int root = 0;  // as in `Four::child`
     std::vector<TriangleLanes> side_by_side;  // of the leaves
-    std::vector<int> first;  // of them, per box; and their number
+    std::vector<int> side_of;  // per triangle: where it stands there
+    std::vector<Numbers> numbers;  // of each of those; `count`: with those of the leaf that follow
   };
 
   static std::vector<Triangle> triangles_of(const std::vector<Vec3>& vertices,
@@ -510,14 +587,8 @@ class Mesh {
     return triangles;
   }
 
-  // Calls `visit(Triangle)` for all in boxes that are `reached(Box, its number)`, in no order.
-  template <class Reached, class Visit>
-  void visit_triangles(Reached&& reached, Visit&& visit) const {
-    Walk walk;
-    visit_triangles(walk, [] { return true; }, reached, visit);
-  }
-
-  // The same from where `walk` is, as long as it `may` go on.
+  // Calls `visit(Triangle)` for all in boxes that are `reached(Box, its number)`, in no order, from where
+  // `walk` is, as long as it `may` go on.
   template <class May, class Reached, class Visit>
   void visit_triangles(Walk& walk, May&& may, Reached&& reached, Visit&& visit) const {
     if (empty()) walk.waiting_ = 0;
@@ -549,17 +620,6 @@ class Mesh {
   static Vec3 invert(const Vec3& d) {
     const auto inverse = [](double x) { return 1.0 / (std::fabs(x) > 1e-200 ? x : 1e-200); };
     return {inverse(d.x), inverse(d.y), inverse(d.z)};
-  }
-
-  // Does the line through `o` cross the box?
-  static bool crosses(const Box& box, const Vec3& o, const Vec3& inverse) {
-    const Vec3 low = exact(box.low) - o, high = exact(box.high) - o;
-    const double x0 = low.x * inverse.x, x1 = high.x * inverse.x;
-    const double y0 = low.y * inverse.y, y1 = high.y * inverse.y;
-    const double z0 = low.z * inverse.z, z1 = high.z * inverse.z;
-    const double enter = std::max({std::min(x0, x1), std::min(y0, y1), std::min(z0, z1)});
-    const double leave = std::min({std::max(x0, x1), std::max(y0, y1), std::max(z0, z1)});
-    return enter <= leave;
   }
 
   static bool crosses(const Triangle& tri, const ForceLine& line, double& t) {
@@ -625,22 +685,43 @@ class Mesh {
     return true;
   }
 
-  // The triangles of a leaf, side by side; each as if alone and in their order, to the last bit.
-  void offer_leaf(int box, const Vec3& p, SurfacePoint& best) const {
-    const TriangleLanes* const all = tree_->side_by_side.data();
-    const TriangleLanes* const end = all + tree_->first[box + 1];
-    for (const TriangleLanes* side = all + tree_->first[box]; side != end; ++side) {
-      const BasicVec3<Lanes> ap = many(p) - side->a;
-      const Lanes above = dot(side->normal, ap), plane = larger(above, -above);
+  // The triangles of a leaf, side by side; each as if alone and in their order, to the last bit. What
+  // repeats another one is no nearer.
+  void offer_leaf(int side, const Vec3& p, SurfacePoint& best, Found& found) const {
+    for (int left = kLanes; left > 0; ++side) {
+      const TriangleLanes& own = tree_->side_by_side[side];
+      if (kLanes < kLeaf) left = tree_->numbers[side].count;
+      left -= kLanes;
+      const BasicVec3<Lanes> ap = many(p) - own.a;
+      const Lanes above = dot(own.normal, ap), plane = larger(above, -above);
       if (!any_below(plane, all_lanes(best.distance))) continue;
-      const BasicVec3<Lanes> point = nearest_on(*side, ap), way = point - many(p);
+      const BasicVec3<Lanes> point = nearest_on(own, ap), way = point - many(p);
       const Lanes distance = root(dot(way, way));
-      for (int k = 0; k < side->count; ++k) {
+      if (!any_below(distance, all_lanes(best.distance))) continue;
+      for (int k = 0; k < kLanes; ++k) {
         if (!(lane(plane, k) < best.distance && lane(distance, k) < best.distance)) continue;
-        const auto at = [k](const BasicVec3<Lanes>& v) {
-          return Vec3{lane(v.x, k), lane(v.y, k), lane(v.z, k)};
-        };
-        best = {lane(distance, k), side->face[k], side->place + k, at(point), at(side->normal)};
+        best.distance = lane(distance, k);
+        best.point = {lane(point.x, k), lane(point.y, k), lane(point.z, k)};
+        found = {side, k};
+      }
+    }
+  }
+
+  // Calls `visit(Crossing)` for those of a leaf that a line crosses, in their order.
+  template <class Visit>
+  void cross_leaf(int side, const ForceLine& line, Visit&& visit) const {
+    for (int left = kLanes; left > 0; ++side) {
+      const TriangleLanes& own = tree_->side_by_side[side];
+      if (kLanes < kLeaf) left = tree_->numbers[side].count;
+      left -= kLanes;
+      Lanes t;
+      const Lanes crossed = crosses(own.a, own.ab, own.ac, line, t);
+      if (!any_below(all_lanes(0.0), crossed)) continue;
+      const Numbers& numbers = tree_->numbers[side];
+      for (int k = 0; k < std::min(kLanes, numbers.count); ++k) {
+        if (!(lane(crossed, k) > 0.0)) continue;
+        visit(Crossing{lane(t, k), numbers.face[k],
+                       {lane(own.normal.x, k), lane(own.normal.y, k), lane(own.normal.z, k)}});
       }
     }
   }
@@ -772,6 +853,16 @@ class Mesh {
     choose((d3 >= zero) & (d4 <= d3), b);
     choose((d1 <= zero) & (d2 <= zero), tri.a);
     return at;
+  }
+
+  // Asks for so many bytes from memory, and does not wait for them.
+  static void fetch_lines(const void* at, std::size_t bytes) {
+#if defined(__GNUC__) || defined(__clang__)
+    for (std::size_t i = 0; i < bytes; i += kLine)
+      __builtin_prefetch(static_cast<const char*>(at) + i);
+#else
+    static_cast<void>(at), static_cast<void>(bytes);
+#endif
   }
 
   static Vec3 exact(const BasicVec3<float>& v) { return {v.x, v.y, v.z}; }

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "touchline/detail/gates/fault.hpp"
@@ -37,7 +38,8 @@ class LoneChannel {
         inner_(observer.sensors().size(), -1),
         out_until_(at_.count(), -kAbsurd),
         rows_(measurement.most_rows()),
-        column_(measurement.most_rows()) {
+        column_(measurement.most_rows()),
+        columns_(kWide * measurement.most_rows()) {
     weighed_.reserve(at_.joints + 12 * at_.sensors);  // each torque; six axes, and six pairs of them
     for (const Segment& segment : observer.layout().segments) {
       for (const int outer : segment.successors) inner_[outer] = segment.sensor;
@@ -55,7 +57,9 @@ class LoneChannel {
     for (int i = 0; i < size; ++i) all_ += rows_[i] * rows_[i];
     if (free > 0 && all_ < chi2_limit(size - free, kArrival)) return {};  // they explain it alone
     weighed_.clear();
-    visit_channels(g, [this](int channel, int other) { weigh(channel, other); });
+    count_ = 0;
+    visit_channels(g, [this](int channel, int other) { add(channel, other); });
+    weigh();
     const Weighed best = likeliest();
     const double left = all_ - best.explains;
     const double limit = chi2_limit(std::max(1, size - 1 - free), kNoise);
@@ -94,6 +98,7 @@ class LoneChannel {
   }
 
  private:
+  static constexpr int kWide = 8;         // channels that are weighed side by side: whole registers
   static constexpr int kLeast = 5;        // rows: of fewer, a contact leaves nothing over
   static constexpr int kTorques = 4;      // beside the sensor: fewer say little of a push's axis
   static constexpr double kAnything = 1e3;  // [N, Nm] sigma of what tells nothing
@@ -171,16 +176,35 @@ class LoneChannel {
     return touchline::load(values);
   }
 
-  void weigh(int channel, int other) {
+  // To those that are weighed together.
+  void add(int channel, int other) {
     const int size = measurement_.size();
-    measurement_.whiten(column_.data(), 1);
-    double along = 0.0, square = 0.0;
-    for (int i = 0; i < size; ++i) {
-      along += column_[i] * rows_[i];
-      square += column_[i] * column_[i];
+    for (int i = 0; i < size; ++i) columns_[kWide * i + count_] = column_[i];
+    channels_[count_] = {channel, other};
+    if (++count_ == kWide) weigh();
+  }
+
+  // Weighs those that have been added; each as if alone, to the last bit.
+  void weigh() {
+    const int size = measurement_.size();
+    measurement_.whiten_rows<kWide>(columns_.data());
+    double along[kWide], square[kWide];
+    for (int c = 0; c < kWide; c += kLanes) {
+      Lanes a = all_lanes(0.0), b = all_lanes(0.0);
+      for (int i = 0; i < size; ++i) {
+        const Lanes x = load_lanes(columns_.data() + kWide * i + c);
+        a += x * all_lanes(rows_[i]);
+        b += x * x;
+      }
+      store_lanes(a, along + c);
+      store_lanes(b, square + c);
     }
-    if (!(square > 0.0)) return;
-    weighed_.push_back({{channel, other, along / square}, along * along / square});
+    for (int k = 0; k < count_; ++k) {
+      if (!(square[k] > 0.0)) continue;
+      weighed_.push_back({{channels_[k].first, channels_[k].second, along[k] / square[k]},
+                          along[k] * along[k] / square[k]});
+    }
+    count_ = 0;
   }
 
   // The channel that explains most of those that the other segment at their sensor bears out.
@@ -244,7 +268,9 @@ class LoneChannel {
   std::vector<int> inner_;  // per sensor: the next six-axis one inboard; -1: there is none
   std::vector<double> out_until_;  // per channel [s]
   bool any_out_ = false;
-  std::vector<double> rows_, column_;  // to the scale of the noise
+  std::vector<double> rows_, column_, columns_;  // to the scale of the noise; `kWide` side by side,
+  std::pair<int, int> channels_[kWide];          // and of which channels they are
+  int count_ = 0;
   double all_ = 0.0;  // squared length of the rows
   std::vector<Weighed> weighed_;
 };

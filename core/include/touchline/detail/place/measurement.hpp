@@ -174,6 +174,12 @@ class Measurement {
   // To the scale of the noise: independent rows of variance one.
   void whiten(double* rows, int stride) const { solve_lower(factor_.data(), size_, rows, stride); }
 
+  // The same of `width` of them that stand side by side; see `solve_lower_rows`.
+  template <int width>
+  void whiten_rows(double* rows) const {
+    solve_lower_rows<width>(factor_.data(), size_, rows);
+  }
+
   // Takes out a contact that is known: its wrench `w` on the body of `node`, `lag` [s] old.
   void take_out(int node, const Spatial& w, double lag) {
     double values[6];
