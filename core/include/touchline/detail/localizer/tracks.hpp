@@ -88,7 +88,7 @@ class Tracks {
   // What known contacts explain takes so many units of a sample's work, and each but the first so many
   // more. Such a part is left at least for what arrives beside them. Where a pair is looked for one
   // contact has such a part, and in the first sample of a touch, when no cache has the meshes yet.
-  static constexpr int kKnown = 500, kEachKnown = 80, kLeast = 6, kBesidePair = 3, kFirst = 2;
+  static constexpr int kKnown = 500, kEachKnown = 80, kLeast = 6, kBesidePair = 3, kFirst = 4;
 
   void report(int serial, const Answer& answer) { reports_.add(serial, answer); }
   void report(const KnownContact& k) { reports_.add(k); }
