@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <initializer_list>
+#include <utility>
 #include <vector>
 
 namespace touchline::arrays {
@@ -77,16 +78,26 @@ inline nb::object line(const std::vector<double>& values) {
   return out.release();
 }
 
+// Where a slice of columns begins and ends.
+inline std::pair<std::size_t, std::size_t> ends(nb::handle part) {
+  Py_ssize_t start, stop, step;
+  if (!PySlice_Check(part.ptr())) throw nb::type_error("not a slice");
+  if (PySlice_Unpack(part.ptr(), &start, &stop, &step) < 0) throw nb::python_error();
+  if (start < 0 || stop < start || step != 1) throw nb::type_error("not a slice of columns");
+  return {static_cast<std::size_t>(start), static_cast<std::size_t>(stop)};
+}
+
 // Columns of an array of float64 (..., width) as a view: (..., count), or (..., count / columns,
 // columns) unless `columns` is 0.
-inline nb::object view(nb::handle object, std::size_t first, std::size_t count,
-                       std::size_t columns) {
+inline nb::object view(nb::handle object, nb::handle part, std::size_t columns) {
+  const auto [first, last] = ends(part);
+  const std::size_t count = last - first;
   if (!PyArray_Check(object.ptr())) throw nb::type_error("not an array");
   PyArrayObject* array = reinterpret_cast<PyArrayObject*>(object.ptr());
   constexpr int kMostAxes = 4;
   const int axes = PyArray_NDIM(array);
   if (PyArray_TYPE(array) != NPY_DOUBLE || axes < 1 || axes > kMostAxes ||
-      static_cast<std::size_t>(PyArray_DIMS(array)[axes - 1]) < first + count)
+      static_cast<std::size_t>(PyArray_DIMS(array)[axes - 1]) < last)
     throw nb::type_error("not an array of float64 with these columns");
   npy_intp dims[kMostAxes + 1], strides[kMostAxes + 1];
   std::copy_n(PyArray_DIMS(array), axes, dims);
@@ -108,6 +119,16 @@ inline nb::object view(nb::handle object, std::size_t first, std::size_t count,
   if (PyArray_SetBaseObject(reinterpret_cast<PyArrayObject*>(out.ptr()), object.ptr()) < 0)
     throw nb::python_error();
   return out;
+}
+
+// The number at the beginning of a slice of an array of float64 with one axis, as an integer.
+inline long long whole(nb::handle object, nb::handle part) {
+  const std::size_t at = ends(part).first;
+  if (length(object) <= at || PyArray_TYPE(reinterpret_cast<PyArrayObject*>(object.ptr())) != NPY_DOUBLE)
+    throw nb::type_error("not an array of float64 with this number");
+  PyArrayObject* array = reinterpret_cast<PyArrayObject*>(object.ptr());
+  return static_cast<long long>(
+      *static_cast<const double*>(PyArray_GETPTR1(array, static_cast<npy_intp>(at))));
 }
 
 // Numbers row by row as a new array.

@@ -238,9 +238,10 @@ void bind(nanobind::module_& m) {
   localization::bind(m);
   detection::bind(m);
   pipelines::bind(m);
-  m.def("view", &arrays::view, "rows"_a, "first"_a, "count"_a, "columns"_a,
-        nb::sig("def view(rows: " TOUCHLINE_ARRAY ", first: int, count: int, columns: int) -> "
-                TOUCHLINE_ARRAY));
+  m.def("view", &arrays::view, "rows"_a, "part"_a, "columns"_a,
+        nb::sig("def view(rows: " TOUCHLINE_ARRAY ", part: slice, columns: int) -> " TOUCHLINE_ARRAY));
+  m.def("whole", &arrays::whole, "row"_a, "part"_a,
+        nb::sig("def whole(row: " TOUCHLINE_ARRAY ", part: slice) -> int"));
   live::bind(m);
   live::bind_ros(m);
   nb::class_<Observer>(m, "Observer")

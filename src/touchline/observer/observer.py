@@ -11,7 +11,7 @@ from touchline.model.robot import Robot
 from touchline.native import core
 from touchline.value import Value, told_shortly
 
-view = core.view
+view, whole = core.view, core.whole
 
 METHODS = ("segment", "paper")
 DISCRETIZATIONS = ("automatic", "tustin", "exponential")
@@ -52,8 +52,7 @@ class Estimate(Value):
         return Estimate(rows, self._slices)
 
     def _part(self, name: str, columns: int = 0) -> Array:
-        part = self._slices[name]
-        return view(self.rows, part.start, part.stop - part.start, columns)
+        return view(self.rows, self._slices[name], columns)
 
     def _wrenches(self, name: str) -> Array:
         return self._part(name, 6)
@@ -61,7 +60,7 @@ class Estimate(Value):
     @property
     def tau_ext(self) -> Array:
         """External joint torques (n,) [Nm], low-passed with the observer's bandwidth (eq. 17)."""
-        return self._part("tau_ext")
+        return view(self.rows, self._slices["tau_ext"], 0)
 
     @property
     def sensor_wrench(self) -> Array:
@@ -71,7 +70,7 @@ class Estimate(Value):
     @property
     def segment_wrench(self) -> Array:
         """External wrench (m, 6) [N, Nm] on each segment alone, world axes, about the origin."""
-        return self._wrenches("segment_wrench")
+        return view(self.rows, self._slices["segment_wrench"], 6)
 
     @property
     def segment_torque(self) -> Array:
@@ -125,7 +124,7 @@ class Estimate(Value):
     def health(self) -> Any:
         """Health bits (see `touchline.Health`): an int, or (N,) integers for a recording."""
         if self.rows.ndim == 1:
-            return int(self.rows[self._slices["health"].start])
+            return whole(self.rows, self._slices["health"])
         return self._part("health")[..., 0].astype(np.uint32)
 
 
