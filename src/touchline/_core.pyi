@@ -524,6 +524,8 @@ class Pipeline:
 
 def view(rows: numpy.typing.NDArray[numpy.float64], part: slice, columns: int) -> numpy.typing.NDArray[numpy.float64]: ...
 
+def whole(row: numpy.typing.NDArray[numpy.float64], part: slice) -> int: ...
+
 def go_ahead() -> bool:
     """
     Gives the calling thread real-time priority, or else a niceness of -11, as the system lets this
