@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 
+from touchline.bench.localization.course import follow_course
 from touchline.trials.cell import Cell
 from touchline.trials.scene import make_pipeline, make_scene, told_and_real
 
@@ -33,3 +34,39 @@ def test_a_place_that_creeps_is_no_surer_than_right(run):
     variances, axes = np.linalg.eigh(second[0].covariance)
     assert np.linalg.norm(off) < 0.01
     assert np.sum((axes[:, 1:].T @ off) ** 2 / variances[1:]) < MOST
+
+
+@pytest.mark.parametrize(
+    ("run", "seed"),
+    [
+        pytest.param(95, 5, id="behind the link, where one more curve explains"),
+        pytest.param(29, 6, id="along a curve on a round link"),
+        pytest.param(69, 0, id="three centimetres along the link"),
+    ],
+)
+def test_what_forces_that_change_leave_open_is_not_located(run, seed):
+    """A place is sure only where the equations tell it, with the unrest of both hands."""
+    robot, _, skin = told_and_real(CELL, run)
+    scene = make_scene(CELL, run, seed)
+    pipeline, s = make_pipeline(robot, skin), scene.signals
+    pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+    course = follow_course(pipeline, scene)
+    assert course.samples > 1900
+    assert course.wrong == 0
+
+
+def test_a_newcomer_is_in_its_region_all_the_time():
+    robot, _, skin = told_and_real(CELL, 29)
+    scene = make_scene(CELL, 29, 6)
+    pipeline, s = make_pipeline(robot, skin), scene.signals
+    pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+    table, link = pipeline.contacts, scene.touches[1][0].patch.link
+    onset = scene.touches[1][1]
+    late = s.time[table.sample] > onset + 0.05
+    mine = np.flatnonzero(late & (table.columns()["link"] == link))
+    assert len(mine) > 1500
+    for row in mine[::50]:
+        contact, place = table[int(row)], scene.places[1, table.sample[row]]
+        variances, axes = np.linalg.eigh(contact.covariance)
+        off = axes[:, 1:].T @ (contact.position - place)
+        assert np.sum(off**2 / variances[1:]) < MOST

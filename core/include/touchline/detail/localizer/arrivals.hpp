@@ -7,9 +7,11 @@
 #pragma once
 
 #include <algorithm>
+#include <vector>
 
 #include "touchline/detail/localizer/known_fit.hpp"
 #include "touchline/detail/localizer/reports.hpp"
+#include "touchline/detail/localizer/rival_places.hpp"
 #include "touchline/detail/localizer/segment_contacts.hpp"
 #include "touchline/detail/localizer/slides.hpp"
 #include "touchline/detail/place/lone_channel.hpp"
@@ -20,7 +22,8 @@ namespace touchline {
 class Arrivals {
  public:
   Arrivals(SingleContact& single, Measurement& measurement, const LocalizerSettings& settings,
-           JointFit& fit, KnownFit& known, Reports& reports, LoneChannel& lone, double period)
+           JointFit& fit, KnownFit& known, Reports& reports, LoneChannel& lone,
+           std::vector<RivalPlaces>& rivals, double period)
       : single_(single),
         measurement_(measurement),
         settings_(settings),
@@ -29,6 +32,7 @@ class Arrivals {
         known_(known),
         reports_(reports),
         slides_(single, measurement, settings, fit, known, reports),
+        rivals_(rivals),
         period_(period) {}
 
   // From this sample on something is not explained.
@@ -61,7 +65,8 @@ class Arrivals {
     const SegmentSample& now = now_;
     suspect_ = {};
     Reference& before = s.known.before;
-    before.contacts.creep(std::max(0.0, now.time - before.time), now.bandwidth, settings_, 1.0);
+    before.contacts.creep(std::max(0.0, now.time - before.time), now.bandwidth, settings_,
+                           settings_.unrest_lasts);
     before.time = now.time;
     before.contacts.age(now.bandwidth, now.time, settings_);
     if (subsided(s)) return;
@@ -129,6 +134,7 @@ class Arrivals {
     }
     if (!placed(a) && !lasting) return;
     if (a.count == 0) a.status = Status::not_separable;  // no force is left, but it does not fit
+    doubt_if_wide(a, settings_);
     reports_.add(number(s), a);
   }
 
@@ -264,12 +270,14 @@ class Arrivals {
     const int old = all.count;
     for (int c = 0; c < old; ++c) reports_.add(all.known[c]);
     reports_.add(newcomer, a);
+    reports_.doubt_last_if_wide(settings_);
     read();
     Change change;
     if (freed_) change = Change::of_forces(old, settings_.force_scale);
     KnownContact added =
         found_contact(newcomer, a, single_.surfaces(), s.unexplained.age, now_.brief());
     added.unrest.expect(all.unrest());
+    rivals_[now_.segment].begin(all, change, added, a, now_.time);
     all.add(added, settings_);
     fit_.weigh(all, measurement_);
     fit_.begin(measurement_, all);
@@ -286,6 +294,7 @@ class Arrivals {
   KnownFit& known_;
   Reports& reports_;
   Slides slides_;
+  std::vector<RivalPlaces>& rivals_;  // per segment
   double period_;
   SegmentSample now_;
   Answer answer_;

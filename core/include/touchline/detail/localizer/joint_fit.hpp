@@ -134,6 +134,30 @@ class JointFit {
     return cost;
   }
 
+  // The log of how well an estimate foresees the part `independence` of a sample. How large those
+  // unknowns are that have changed does not count: nothing was foreseen of them.
+  double log_evidence(const JointEstimate& estimate, const Change& change, double independence) {
+    constexpr double kNever = -std::numeric_limits<double>::infinity();
+    if (!(independence > 0.0)) return 0.0;
+    if (!prior(estimate, change)) return kNever;
+    double volume = log_volume(change);
+    std::copy(prior_, prior_ + n_ * n_, factor_);
+    if (!factor(factor_, n_)) return kNever;
+    volume = log_determinant(factor_, n_) - volume;
+    know(independence, factor_);
+    double H[kSize * kSize];
+    std::copy(factor_, factor_ + n_ * n_, H);
+    if (!factor(factor_, n_)) return kNever;
+    volume -= log_determinant(factor_, n_);
+    volume += log_volume(change, H);
+    double x[kSize];
+    for (int i = 0; i < n_; ++i) x[i] = independence * b_[i];
+    solve_cholesky(factor_, n_, x);
+    double cost = independence * square_;
+    for (int i = 0; i < n_; ++i) cost -= independence * b_[i] * x[i];
+    return 0.5 * (volume - cost);
+  }
+
   // Takes over what a sample tells. What has changed is as this sample says; of the rest it tells
   // something new in part only, `independence`: its noise is filtered.
   void accept(JointEstimate& estimate, const Change& change, double independence) {
@@ -246,6 +270,20 @@ class JointFit {
     std::copy(estimate.covariance, estimate.covariance + n_ * n_, prior_);
     for (int i = 0; i < n_; ++i) prior_[i * (n_ + 1)] += change.added[i];
     return invert_all(prior_, n_);
+  }
+
+  // Log of the determinant of the information on what has changed, the rest being known.
+  double log_volume(const Change& change, const double* information = nullptr) const {
+    const double* H = information != nullptr ? information : prior_;
+    int changed[kSize], m = 0;
+    for (int i = 0; i < n_; ++i) {
+      if (change.added[i] > 0.0) changed[m++] = i;
+    }
+    double part[kSize * kSize];
+    for (int i = 0; i < m; ++i) {
+      for (int j = 0; j <= i; ++j) part[i * m + j] = H[changed[i] * n_ + changed[j]];
+    }
+    return m > 0 && cholesky(part, m, 1e-15) ? log_determinant(part, m) : 0.0;
   }
 
   // And with a part of the sample: the lower triangle.

@@ -278,6 +278,14 @@ inline bool agrees(const KnownContact& known, const Answer& a, const LinkSurface
   return false;
 }
 
+// One of several is located where its region holds nine tenths of the probability within the radius of
+// a place: a long one at 1.65 sigmas, a round one at 1.52 times the root of its trace.
+inline void doubt_if_wide(Answer& a, const LocalizerSettings& t) {
+  constexpr double kNinety = 1.645;  // sigmas
+  if (a.status == Status::located && !(kNinety * a.spread < t.place_radius))
+    a.status = Status::ambiguous;
+}
+
 // Can a contact that is known have slid `way` [m] at most to where it is found?
 inline bool within_reach(const KnownContact& known, const Answer& a, const LinkSurfaces& surfaces,
                          double way, const LocalizerTuning& t) {

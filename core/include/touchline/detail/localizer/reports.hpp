@@ -44,6 +44,9 @@ class Reports {
   }
   Answer& answer(int i) { return reports_[i].answer; }
   void doubt_last() { reports_[count_ - 1].answer.status = Status::ambiguous; }
+  void doubt_last_if_wide(const LocalizerSettings& settings) {
+    doubt_if_wide(reports_[count_ - 1].answer, settings);
+  }
   void change_force(int i, const Vec3& force) {
     reports_[i].answer.force = reports_[i].answer.candidates[0].fit.force = force;
   }

@@ -63,6 +63,7 @@ class Slides {
         answer_.status = Status::ambiguous;
       slide.seen = time;
       slide.place = answer_;
+      if (before.count > 1) doubt_if_wide(slide.place, settings_);
     } else {
       slider = *slide.slider;
     }

@@ -15,6 +15,7 @@
 #include "touchline/detail/localizer/known_fit.hpp"
 #include "touchline/detail/localizer/merging.hpp"
 #include "touchline/detail/localizer/reports.hpp"
+#include "touchline/detail/localizer/rival_places.hpp"
 #include "touchline/detail/localizer/segment_contacts.hpp"
 #include "touchline/detail/localizer/twins.hpp"
 #include "touchline/detail/localizer/work_share.hpp"
@@ -37,8 +38,9 @@ class Tracks {
         reports_(single.surfaces()),
         pasts_(segments, Past(measurement.posture().nodes().size(), settings.past_worn)),
         looked_(segments),
+        rivals_(segments, RivalPlaces(single.surfaces(), settings)),
         share_(settings.search_work),
-        arrivals_(single, measurement, settings, fit_, known_, reports_, lone_, period),
+        arrivals_(single, measurement, settings, fit_, known_, reports_, lone_, rivals_, period),
         merging_(single.surfaces(), settings, fit_, known_, reports_),
         twins_(single.surfaces(), measurement, settings, fit_, known_, reports_, rows, segments,
                period) {}
@@ -62,6 +64,7 @@ class Tracks {
   // Segment g is touched anew.
   int begin(int g) {
     pasts_[g].restart();
+    rivals_[g].drop();
     single_.forget(g);
     return reports_.next();
   }
@@ -92,6 +95,10 @@ class Tracks {
 
   void report(int serial, const Answer& answer) { reports_.add(serial, answer); }
   void report(const KnownContact& k) { reports_.add(k); }
+  void report_one_of_several(const KnownContact& k) {
+    report(k);
+    reports_.doubt_last_if_wide(settings_);
+  }
   void end(int serial) { reports_.end(serial); }
 
   template <class Read>
@@ -270,7 +277,8 @@ class Tracks {
     Known& known = s.known;
     const double passed = std::max(0.0, std::min(now_.time - known.updated, now_.brief()));
     if (passed > 0.0) known.updated = now_.time;
-    fit_.accept(known.contacts, known_.change(), 0.5 * now_.bandwidth * passed);
+    const double independence = 0.5 * now_.bandwidth * passed;
+    fit_.accept(known.contacts, known_.change(), independence);
     known.contacts.watch(now_.time, now_.bandwidth, settings_);
     const bool risen = known.contacts.coming(now_.bandwidth) < settings_.risen_note;
     s.refer(now_.time, (risen ? settings_.lasting : settings_.refit) * now_.brief());
@@ -290,7 +298,14 @@ class Tracks {
     }
     accept(s);
     merging_.follow(s, now_);
-    for (int c = 0; c < known.count; ++c) report(known.known[c]);
+    KnownContact newcomer;
+    RivalPlaces& rivals = rivals_[now_.segment];
+    const bool contested = rivals.any();
+    if (contested)
+      spent_ += kEachKnown *
+                rivals.follow(s.known, now_, measurement_, fit_, known_.change(), newcomer);
+    for (const KnownContact* k = known.known; k != known.known + known.count; ++k)
+      report_one_of_several(k->serial == newcomer.serial ? newcomer : *k);
     release(s);
     s.enter_known();
   }
@@ -322,6 +337,7 @@ class Tracks {
   Reports reports_;
   std::vector<Past> pasts_;  // per segment: of its whole wrench
   std::vector<Look> looked_;  // per segment
+  std::vector<RivalPlaces> rivals_;  // per segment: of the newcomer admitted last
   // Units of work: of the sample; of the segment at hand, its part and what it has spent of it.
   WorkShare share_;
   int own_ = 0, spent_ = 0;
