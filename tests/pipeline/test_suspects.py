@@ -88,6 +88,34 @@ def test_a_push_is_not_suspected(arm, link, force):
     assert events != [] and events[0].level == "collision"
 
 
+@pytest.mark.parametrize("force", [[-9.0, 0.0, 0.0], [-11.0, 11.0, 0.0]])
+def test_a_push_along_axes_of_a_sensor_is_wrong_by_more_than_they_carry(force):
+    """On the link that carries the sensor: one axis, or two as if they were swapped."""
+    robot = robot_named("ur5")
+    at = -0.06 * np.array(force) / np.linalg.norm(force)
+    push = ScriptedContact(
+        "shoulder_link", at, np.array(force), Profile(BEGIN, 0.4, 0.07, 0.07), force_frame="link"
+    )
+    settings = Run(seed=3, noise=SensorNoise(), model_error=0.02, physics=2000.0)
+    pipeline = tl.Pipeline(robot)
+    _, told, events = heard(pipeline, scripted(robot, [push], 1.4, 0.5, settings).samples)
+    assert told == []
+    assert [event.status for event in events] == ["ambiguous"]
+
+
+def test_what_a_push_might_be_is_told_after_a_second():
+    """A force axis drifts beyond all that it carries, as slowly as a hand may push."""
+    robot = robot_named("ur5")
+    settings = Run(seed=3, noise=SensorNoise(), model_error=0.02, physics=2000.0)
+    samples = scripted(robot, [], 2.4, 0.5, settings).samples
+    first = int(np.searchsorted(samples.time, BEGIN))
+    samples.wrench[first:, 0, 0] -= np.minimum(150.0 * (samples.time[first:] - BEGIN), 12.0)
+    _, told, events = heard(tl.Pipeline(robot), samples)
+    assert {change.channel for change in told} == {"base.fx"}
+    assert BEGIN + 0.95 < samples.time[told[0].sample] < BEGIN + 1.3
+    assert all(event.level == "contact" for event in events)
+
+
 @pytest.mark.parametrize("begin", [BEGIN - 0.1, BEGIN + 0.2])
 def test_axes_of_the_base_sensor_that_are_swapped_are_named_and_place_no_push(arm, begin):
     """They are swapped before a push, or during it: their error looks like a push on the base."""

@@ -149,7 +149,7 @@ class Pipeline {
     std::copy(detector_.levels().begin(), detector_.levels().end(), levels_.begin());
     classifier_.step(sample.time, row, levels_.data());
     recorder_.begin();
-    suspects_.begin();
+    suspects_.begin(sample);
     count_ = 0;
     if (touched()) localize(sample, row);
     suspects_.finish(sample.time, [this](int channel, double until) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which channels alone explain what is felt, and have done so for long enough to be told. No
-// allocation per sample.
+// Which channels alone explain what is felt, and have done so for long enough to be told. A wrong sign
+// or scale is wrong by a multiple of what a channel carries. What is wrong by more, and may be a push
+// along an axis of a sensor, has to last for longer than most pushes do. No allocation per sample.
 // Theory: docs/theory.md, section 3.5.
 #pragma once
 
@@ -12,6 +13,7 @@
 #include "touchline/detail/gates/fault.hpp"
 #include "touchline/detail/place/lone_channel.hpp"
 #include "touchline/robot.hpp"
+#include "touchline/sample.hpp"
 
 namespace touchline {
 
@@ -23,9 +25,12 @@ class SuspectWatch {
         least_(at_.count(), std::numeric_limits<double>::infinity()),
         now_(at_.count(), 0),
         told_(at_.count(), 0),
+        beyond_(at_.count(), 0),
         since_(at_.count(), kNever),
         seen_(at_.count(), -kNever),
-        until_(at_.count(), -kNever) {
+        until_(at_.count(), -kNever),
+        sensors_(robot.sensors),
+        read_(6 * at_.sensors, std::numeric_limits<double>::quiet_NaN()) {
     for (const DetectionRow& row : robot.rows) {
       const int sensor = layout.segments[row.segment].sensor;
       if (row.joint >= 0) least_[at_.tau() + row.joint] = kLeast * row.contact;
@@ -35,11 +40,27 @@ class SuspectWatch {
   }
 
   // A sample begins; `add` takes what is suspected of a segment; then `finish`.
-  void begin() { std::fill(now_.begin(), now_.end(), 0); }
+  void begin(const Sample& sample) {
+    std::fill(now_.begin(), now_.end(), 0);
+    const double dt = sample.time - time_;
+    time_ = sample.time;
+    for (std::size_t s = 0; s < sensors_.size(); ++s) {
+      const double x = dt > 0.0 ? sensors_[s].bandwidth * dt : 0.0, follows = x / (1.0 + x);
+      for (std::size_t i = 6 * s; i < 6 * s + 6; ++i) {
+        const double now = sensors_[s].sign * sample.wrench[i] - sensors_[s].bias[i - 6 * s];
+        if (read_[i] != read_[i]) read_[i] = now;
+        else if (now == now) read_[i] += follows * (now - read_[i]);
+      }
+    }
+  }
   void add(const Suspect& suspect) {
     if (!suspect.any() || !suspect.told || !(std::fabs(suspect.error) > least_[suspect.channel])) return;
-    now_[suspect.channel] = 1;
-    if (suspect.other >= 0) now_[suspect.other] = 1;
+    const char beyond = suspect.touched && is_beyond(suspect) ? 1 : 0;
+    for (const int c : {suspect.channel, suspect.other}) {
+      if (c < 0) continue;
+      now_[c] = 1;
+      beyond_[c] = std::max(beyond_[c], beyond);  // a scale is never wrong by more, so it was none
+    }
     any_ = true;
   }
   // Calls `out(channel, until)` for each that tells nothing until then [s].
@@ -49,9 +70,13 @@ class SuspectWatch {
     any_ = false;
     for (std::size_t c = 0; c < now_.size(); ++c) {
       if (now_[c] != 0) seen_[c] = time;
-      if (!(time - seen_[c] < kMissed)) since_[c] = kNever;
-      else if (!(since_[c] <= time)) since_[c] = time;
-      if (now_[c] != 0 && time - since_[c] >= kDwell) out(static_cast<int>(c), until_[c] = time + kOut);
+      if (!(time - seen_[c] < kMissed)) {
+        since_[c] = kNever;
+        beyond_[c] = 0;
+      }
+      if (now_[c] != 0 && !(since_[c] <= time)) since_[c] = time;
+      const double dwell = beyond_[c] != 0 ? kLasts : kDwell;
+      if (now_[c] != 0 && time - since_[c] >= dwell) out(static_cast<int>(c), until_[c] = time + kOut);
       told_[c] = time < until_[c];
       any_ = any_ || since_[c] < kNever || !(time >= until_[c]);
     }
@@ -64,14 +89,38 @@ class SuspectWatch {
   static constexpr double kNever = std::numeric_limits<double>::infinity();
   static constexpr double kOut = 2.0;     // [s] for which it tells nothing after that
   static constexpr double kDwell = 0.02;  // [s] for which it explains all: a contact rises to more
+  // [s] of what may be a push, too. Biases and drifts are all that is wrong by more than a multiple: of
+  // the two seconds in which these are to be told it takes half.
+  static constexpr double kLasts = 1.0;
+  // Times what a channel carries: a wrong sign is wrong by twice of it, and filters and noise by the rest.
+  static constexpr double kMultiple = 3.0;
+  // Of the error: what two swapped axes may differ by beside it, by noise and the model's errors.
+  static constexpr double kUnlike = 0.5;
   static constexpr double kMissed = 0.01; // [s] for which noise may hide it
   static constexpr double kLeast = 0.7;   // of the threshold of a contact: what it must be wrong by
 
+  // Is a force wrong by more than a multiple of what its axis carries, or two that are swapped by
+  // something else than they differ by? What they carry is what they read, less the error. Of what is
+  // compensated before it is read nothing is known. No push loads a moment alone.
+  bool is_beyond(const Suspect& suspect) const {
+    if (suspect.channel < static_cast<int>(at_.wrench())) return false;
+    const std::size_t i = suspect.channel - at_.wrench();
+    if (i % 6 >= 3 || sensors_[i / 6].gravity_compensated) return false;
+    const double error = suspect.error;  // of a load, which is read with the other sign
+    const double carried = read_[i] + error;
+    if (suspect.other < 0) return std::fabs(error) > kMultiple * std::fabs(carried);
+    const double other = read_[suspect.other - at_.wrench()] - error;
+    return std::fabs(error - (carried - other)) > kUnlike * std::fabs(error);
+  }
+
   ChannelLayout at_;
   std::vector<double> least_;  // [N, Nm]
-  std::vector<char> now_, told_;
+  std::vector<char> now_, told_, beyond_;
   bool any_ = false;
   std::vector<double> since_, seen_, until_;  // [s]
+  std::vector<SensorRow> sensors_;
+  std::vector<double> read_;  // per axis: readings as the filters have them [N, Nm]
+  double time_ = std::numeric_limits<double>::quiet_NaN();  // [s]
 };
 
 }  // namespace touchline

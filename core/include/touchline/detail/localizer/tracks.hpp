@@ -53,6 +53,7 @@ class Tracks {
     if (time - looked_[g].time < kLook || s.state.is(Tracking::suspected)) return;
     if (!read_all()) return;
     suspect_ = look_again(g);
+    suspect_.touched = s.state.is(Tracking::single);
     lone_.take_out(g, time);
   }
 
@@ -179,6 +180,7 @@ class Tracks {
   // --- none is known yet: suspected, pair ---
   void suspected(SegmentContacts& s) {
     const Answer& a = locate(s);
+    suspect_.touched = placed(a);
     if (may_be_one_channel(s, a)) {
       reports_.add_doubted(s.touched.first, a);
       if (s.state.is(Tracking::pair)) twins_.forget(s);

@@ -25,6 +25,7 @@ struct Suspect {
   int other = -1;    // the one that it is swapped with; -1: none
   double error = 0.0;
   bool told = true;  // else what is felt begins no contact, but a contact may be near that does it, too
+  bool touched = false;  // a contact at a place that is known would do it, too
   bool any() const { return channel >= 0; }
 };
 
