@@ -41,10 +41,11 @@ struct Touched {
 };
 
 // Suspected: since when one contact has explained all [s], and since when and until when it was not
-// clear whether a contact is felt, or one faulty channel [s].
+// clear whether a contact is felt, or one faulty channel [s], and whether a contact would do it throughout.
 struct Suspected {
   struct Doubt {
     double since, last;
+    bool touched = true;
   };
   std::optional<double> explained;
   std::optional<Doubt> one_channel;

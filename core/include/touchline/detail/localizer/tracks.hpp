@@ -228,18 +228,20 @@ class Tracks {
 
   // Is all that is felt, or was it of late, what one faulty channel would show? Then it takes a contact
   // that is found for a while to say that there is one after all, or one more: that is another event,
-  // unless the doubt was as short as noise is.
+  // unless the doubt was as short as noise is, or a contact explained all the while.
   bool may_be_one_channel(SegmentContacts& s, const Answer& a) {
     std::optional<Suspected::Doubt>& doubt = s.suspected.one_channel;
     if (suspect_.any() || (doubt && !placed(a))) {
       if (!doubt) doubt = Suspected::Doubt{now_.time, now_.time};
       doubt->last = now_.time;
+      doubt->touched = doubt->touched && placed(a);
     }
     if (!doubt) return false;
     if (now_.time - doubt->last < now_.brief()) return true;
     const bool lasted = doubt->last - doubt->since >= now_.brief();
+    const bool same = doubt->touched;
     doubt.reset();
-    if (!lasted) return false;
+    if (!lasted || same) return false;
     reports_.end(s.touched.first);
     s.touched.first = reports_.next();
     return false;
