@@ -103,6 +103,24 @@ def test_a_push_along_axes_of_a_sensor_is_wrong_by_more_than_they_carry(force):
     assert [event.status for event in events] == ["ambiguous"]
 
 
+@pytest.mark.parametrize("more", [[0.0, 4.0, 0.0], [0.0, 0.0, -5.0]])
+def test_a_push_along_an_axis_that_turns_stays_one_event(more):
+    """It turns 0.3 s after it began: from then on one axis alone does not explain it."""
+    robot, at = robot_named("ur5"), np.array([0.06, 0.0, 0.0])
+    pushes = [
+        ScriptedContact(
+            "shoulder_link", at, np.array(force), Profile(*when, 0.07, 0.07), force_frame="link"
+        )
+        for force, when in (([-9.0, 0.0, 0.0], (BEGIN, 0.8)), (more, (BEGIN + 0.3, 0.3)))
+    ]
+    settings = Run(seed=3, noise=SensorNoise(), model_error=0.02, physics=2000.0)
+    pipeline = tl.Pipeline(robot)
+    _, told, events = heard(pipeline, scripted(robot, pushes, 1.9, 0.5, settings).samples)
+    assert told == []
+    assert len(events) == 1 and events[0].detected < BEGIN + 0.05
+    assert events[0].cleared > BEGIN + 0.9
+
+
 def test_what_a_push_might_be_is_told_after_a_second():
     """A force axis drifts beyond all that it carries, as slowly as a hand may push."""
     robot = robot_named("ur5")
