@@ -41,7 +41,7 @@ struct Touched {
 };
 
 // Suspected: since when one contact has explained all [s], and since when and until when it was not
-// clear whether a contact is felt, or one faulty channel [s], and whether a contact would do it throughout.
+// clear whether a contact is felt, or one faulty channel [s]. `touched`: a contact explained it throughout.
 struct Suspected {
   struct Doubt {
     double since, last;

@@ -228,7 +228,7 @@ class Tracks {
 
   // Is all that is felt, or was it of late, what one faulty channel would show? Then it takes a contact
   // that is found for a while to say that there is one after all, or one more: that is another event,
-  // unless the doubt was as short as noise is, or a contact explained all the while.
+  // unless the doubt was as short as noise is. Where a contact explained all the while, it is the same.
   bool may_be_one_channel(SegmentContacts& s, const Answer& a) {
     std::optional<Suspected::Doubt>& doubt = s.suspected.one_channel;
     if (suspect_.any() || (doubt && !placed(a))) {
