@@ -233,14 +233,7 @@ class RivalPlaces {
   void take(Rival& r, const Known& known, const SegmentSample& now, JointFit& fit,
             const Measurement& measurement, const Change& change) {
     const double passed = std::clamp(now.time - r.updated, 0.0, now.brief());
-    for (int c = 0; c < r.contacts.count; ++c) {
-      const KnownContact& from = known.contacts.known[c];
-      KnownContact& k = r.contacts.known[c];
-      k.age = from.age;
-      k.lag = from.lag;
-      k.unrest = from.unrest;
-      k.gone = from.gone;
-    }
+    keep_history(known.contacts, r.contacts);
     r.contacts.creep(std::max(0.0, now.time - r.crept), now.bandwidth, settings_,
                      settings_.unrest_lasts);
     r.crept = now.time;
@@ -254,6 +247,17 @@ class RivalPlaces {
     fit.begin(measurement, r.contacts);
     r.evidence += fit.log_evidence(r.contacts, free, independence);
     fit.accept(r.contacts, free, independence);
+  }
+
+  // What the contacts have shown since they began does not depend on where the newcomer is.
+  static void keep_history(const JointEstimate& from, JointEstimate& to) {
+    for (int c = 0; c < to.count; ++c) {
+      const KnownContact& k = from.known[c];
+      to.known[c].age = k.age;
+      to.known[c].lag = k.lag;
+      to.known[c].unrest = k.unrest;
+      to.known[c].gone = k.gone;
+    }
   }
 
   // How far a force is outside of its cone.
@@ -280,12 +284,7 @@ class RivalPlaces {
   // Rival i is what is known from now on.
   void lead(Known& known, int i) {
     JointEstimate taken = rivals_[i].contacts;
-    for (int c = 0; c < taken.count; ++c) {
-      taken.known[c].age = known.contacts.known[c].age;
-      taken.known[c].lag = known.contacts.known[c].lag;
-      taken.known[c].unrest = known.contacts.known[c].unrest;
-      taken.known[c].gone = known.contacts.known[c].gone;
-    }
+    keep_history(known.contacts, taken);
     known.contacts = taken;
     known.crept = rivals_[i].crept;
     known.updated = rivals_[i].updated;
