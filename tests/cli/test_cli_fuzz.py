@@ -11,7 +11,7 @@ import touchline as tl
 from touchline.cli import main
 from touchline.cli.fuzz import Parser, damaged, fuzz, fuzz_apart, parsers, read_one
 
-RUNS, SEED = 40, 1
+RUNS, SEED = 25, 1
 
 
 def test_a_damage_is_the_same_again_and_is_one():

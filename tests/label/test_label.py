@@ -280,6 +280,34 @@ def test_hdf5(robot, episodes, tmp_path, layout):
         assert main(["label", str(path), "--robot", "sara", *own[:2]]) == 2
 
 
+def test_damaged_hdf5_is_refused_in_one_line_and_stays_as_it_was(episodes, tmp_path, capsys):
+    h5py = pytest.importorskip("h5py", reason="h5py is not installed: touchline[hdf5]")
+    path, s = tmp_path / "trajectory.h5", episodes[TOUCHED]
+    with h5py.File(path, "w") as file:
+        file["obs/joint_positions"], file["obs/joint_torques"] = s.q, s.tau
+        file["obs/joint_velocities"], file["obs/wrench"] = s.qd, s.wrench.reshape(len(s.q), -1)
+    whole = path.read_bytes()
+    command = ["label", str(path), "--robot", "sara", "--rate", str(RATE)]
+    assert main(command) == 0
+    for name in (b"joint_positions", b"joint_torques", b"TREE", b"SNOD", b"HEAP"):
+        damaged = whole.replace(name, name[::-1])
+        assert damaged != whole
+        path.write_bytes(damaged)
+        assert main(command) == 2
+        assert path.read_bytes() == damaged and list(tmp_path.iterdir()) == [path]
+        assert len(capsys.readouterr().err.strip().splitlines()) == 1
+
+
+def test_hdf5_that_claims_more_than_it_holds_is_refused_unread(robot, tmp_path, capsys):
+    h5py = pytest.importorskip("h5py", reason="h5py is not installed: touchline[hdf5]")
+    path, n = tmp_path / "trajectory.h5", len(robot.joint_names)
+    with h5py.File(path, "w") as file:
+        for name in ("joint_positions", "joint_velocities", "joint_torques"):
+            file.create_dataset(f"obs/{name}", (10**10, n), "f8", chunks=(1000, n))
+    assert main(["label", str(path), "--robot", "sara", "--rate", str(RATE)]) == 2
+    assert "claims 560000 MB and holds 0.0" in capsys.readouterr().err
+
+
 CREATE = """
 import sys
 import numpy as np

@@ -4,9 +4,12 @@
 import csv
 import gzip
 import io
+import json
 import multiprocessing
 import os
 import resource
+import shutil
+import struct
 import tempfile
 import time
 import traceback
@@ -14,6 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -73,6 +77,13 @@ noise: {q: 0.0, qd: 2.0e-4, tau: 0.05, base: [0.05, 0.05, 0.05, 0.01, 0.01, 0.01
 observer: {bandwidth: 100.0}
 """
 OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+RATE = 1000.0  # samples per second of all recordings
+TOUCHED = 600  # samples of the recording that is analyzed
+RESULTS = (
+    *("analysis.json", "events.json"),
+    *("postures.parquet", "estimates.parquet", "contacts.parquet"),
+)
+LEROBOT = ("data/chunk-000/file-000.parquet", "meta/info.json", "meta/stats.json")
 COLUMNS = ("time", "q.j", "qd.j", "tau.j", *(f"base.{a}{b}" for a in "fm" for b in "xyz"))
 
 
@@ -157,6 +168,7 @@ def parsers(folder: Path) -> list[Parser]:
     from touchline.model.loading import load_description
     from touchline.model.mesh_file import MeshError, read_mesh
     from touchline.model.robot import load_robot
+    from touchline.native import core
 
     (folder / "two.urdf").write_bytes(URDF)
     (folder / "whole.yaml").write_bytes(YAML)
@@ -165,23 +177,70 @@ def parsers(folder: Path) -> list[Parser]:
     def log(path: Path) -> object:
         return read_log(path, description)
 
+    def exported(path: Path) -> object:
+        path.write_bytes(_sealed(path.read_bytes()))
+        return core.read_robot(str(path))
+
     table = _table()
+    bag, results, lerobot = _bag(table, folder), _results(folder), _lerobot(table, folder)
     mesh = {"read": read_mesh, "refuses": MeshError}
     return [
         Parser("yaml", "damaged.yaml", (YAML,), load_robot),
         Parser("URDF", "damaged.urdf", (URDF,), load_robot),
         Parser("MJCF", "damaged.xml", (MJCF,), load_robot),
+        Parser("exported robot", "damaged.touchline", (_exported(folder),), exported, ValueError),
         Parser("mesh OBJ", "damaged.obj", (OBJ,), **mesh),
         Parser("mesh STL", "damaged.stl", (_stl(), _ascii_stl()), **mesh),
         Parser("CSV", "damaged.csv", (_csv(table),), log),
         Parser("CSV.gz", "damaged.csv.gz", (gzip.compress(_csv(table), mtime=0),), log),
-        Parser("Parquet", "damaged.parquet", (_parquet(table, folder),), log),
+        Parser("Parquet", "damaged.parquet", (_parquet(table, folder / "whole.parquet"),), log),
         Parser("MCAP, CDR", "damaged.mcap", (_mcap(table, folder),), log),
+        Parser("rosbag2 sqlite3", "damaged.db3", (next(bag.glob("*.db3")).read_bytes(),), log),
+        _within(bag, "metadata.yaml", log),
+        *(_within(results, name, _replay) for name in RESULTS),
+        *(_within(lerobot, name, _labelling(folder)) for name in LEROBOT),
+        *_hdf5(table, folder),
     ]
 
 
-def _table() -> np.ndarray:
-    time = np.arange(30) * 1e-3
+def _within(whole: Path, name: str, read: Callable[[Path], object]) -> Parser:
+    """A file within a folder, which is read as a whole with that file damaged."""
+
+    def read_with(path: Path) -> object:
+        copy = whole.with_name("damaged_folder")
+        shutil.rmtree(copy, ignore_errors=True)
+        shutil.copytree(whole, copy)
+        shutil.copyfile(path, copy / name)
+        return read(copy)
+
+    kind, ending = name.rsplit("/", 1)[-1].rsplit(".", 1)
+    title = f"{whole.name} {kind}.{ending}"
+    return Parser(title, f"damaged_file.{ending}", ((whole / name).read_bytes(),), read_with)
+
+
+def _replay(folder: Path) -> object:
+    from touchline.view.replay import Replay
+
+    return Replay(folder)
+
+
+def _labelling(folder: Path) -> Callable[[Path], object]:
+    """Adds the touch channel to a data set."""
+    from touchline.label.naming import Given
+    from touchline.label.run import label
+    from touchline.model.robot import load_robot
+
+    robot = load_robot(folder / "whole.yaml")
+    names = [f"observation.{signal}" for signal in ("q", "qd", "tau", "wrench")]
+
+    def read(path: Path) -> object:
+        return label(path, robot, None, Given(*names, rate=RATE))
+
+    return read
+
+
+def _table(rows: int = 30) -> np.ndarray:
+    time = np.arange(rows) / RATE
     waves = [0.1 * k * np.sin(9.0 * time + k) for k in range(1, len(COLUMNS))]
     return np.round(np.column_stack([time, *waves]), 6)
 
@@ -194,13 +253,113 @@ def _csv(table: np.ndarray) -> bytes:
     return text.getvalue().encode()
 
 
-def _parquet(table: np.ndarray, folder: Path) -> bytes:
+def _parquet(table: np.ndarray, path: Path) -> bytes:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    path = folder / "whole.parquet"
     pq.write_table(pa.table(dict(zip(COLUMNS, table.T, strict=True))), path)
     return path.read_bytes()
+
+
+def _exported(folder: Path) -> bytes:
+    import touchline as tl
+
+    path = folder / "whole.touchline"
+    tl.Pipeline(tl.load_robot(folder / "whole.yaml")).export(path)
+    return path.read_bytes()
+
+
+def _sealed(data: bytes) -> bytes:
+    """An exported robot whose length and checksum are right again: its reader then reads on."""
+    head, body = data[:12], data[28:]
+    checksum = 0xCBF29CE484222325  # FNV-1a of 64 bits, as in robot_file.hpp
+    for byte in body:
+        checksum = (checksum ^ byte) * 0x100000001B3 % 2**64
+    return head + struct.pack("<QQ", len(body), checksum) + body
+
+
+def _bag(table: np.ndarray, folder: Path) -> Path:
+    """A rosbag2 of one joint's states and one sensor's wrenches."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    from touchline.logs.cdr import JOINT_STATE, WRENCH_STAMPED
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    types = store.types
+    vector = types["geometry_msgs/msg/Vector3"]
+    path = folder / "bag"
+    shutil.rmtree(path, ignore_errors=True)
+    with Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as file:
+        kinds = {"/joint_states": JOINT_STATE, "/base/wrench": WRENCH_STAMPED}
+        topics = {t: file.add_connection(t, k, typestore=store) for t, k in kinds.items()}
+        for row in table:
+            at = round(row[0] * 1e9)
+            stamp = types["builtin_interfaces/msg/Time"](sec=0, nanosec=at)
+            header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="base")
+            fields = {"position": row[1:2], "velocity": row[2:3], "effort": row[3:4]}
+            parts = {"force": vector(*row[4:7]), "torque": vector(*row[7:10])}
+            wrench = types["geometry_msgs/msg/Wrench"](**parts)
+            messages = {
+                "/joint_states": types[JOINT_STATE](header=header, name=["j"], **fields),
+                "/base/wrench": types[WRENCH_STAMPED](header=header, wrench=wrench),
+            }
+            for topic, message in messages.items():
+                file.write(topics[topic], at, store.serialize_cdr(message, kinds[topic]))
+    return path
+
+
+def _results(folder: Path) -> Path:
+    """What `analyze` writes of a recording with a touch."""
+    from touchline.report.results import analyze
+
+    table = _table(TOUCHED)
+    table[TOUCHED // 2 :, COLUMNS.index("base.fx")] += 30.0
+    log = folder / "touched.parquet"
+    _parquet(table, log)
+    analyze(log, folder / "whole.yaml", folder / "results")
+    return folder / "results"
+
+
+def _lerobot(table: np.ndarray, folder: Path) -> Path:
+    """A data set of one episode, as LeRobot v3 writes it."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    path = folder / "lerobot"
+    for name in LEROBOT:
+        (path / name).parent.mkdir(parents=True, exist_ok=True)
+    columns: dict[str, Any] = {"timestamp": table[:, 0].astype(np.float32)}
+    counters = ("episode_index", "frame_index", "index", "task_index")
+    columns |= {name: np.zeros(len(table), int) for name in counters}
+    features = {name: {"dtype": "int64", "shape": [1], "names": None} for name in columns}
+    for name, values in _observations(table).items():
+        flat = pa.array(values.astype(np.float32).ravel())
+        columns[f"observation.{name}"] = pa.FixedSizeListArray.from_arrays(flat, values.shape[1])
+        shape = {"dtype": "float32", "shape": [values.shape[1]], "names": None}
+        features[f"observation.{name}"] = shape
+    pq.write_table(pa.table(columns), path / LEROBOT[0])
+    info = {"codebase_version": "v3.0", "fps": int(RATE), "features": features}
+    (path / LEROBOT[1]).write_text(json.dumps(info), "utf-8")
+    (path / LEROBOT[2]).write_text(json.dumps({"timestamp": {"mean": [0.0]}}), "utf-8")
+    return path
+
+
+def _hdf5(table: np.ndarray, folder: Path) -> list[Parser]:
+    """None where h5py is not installed."""
+    try:
+        import h5py
+    except ImportError:
+        return []
+    path = folder / "whole.h5"
+    with h5py.File(path, "w") as file:
+        for name, values in _observations(table).items():
+            file[f"observation.{name}"] = values
+    return [Parser("HDF5", "damaged.h5", (path.read_bytes(),), _labelling(folder))]
+
+
+def _observations(table: np.ndarray) -> dict[str, np.ndarray]:
+    return {"q": table[:, 1:2], "qd": table[:, 2:3], "tau": table[:, 3:4], "wrench": table[:, 4:]}
 
 
 def _mcap(table: np.ndarray, folder: Path) -> bytes:
