@@ -62,6 +62,16 @@ def test_export_tells_what_it_cannot_do(tmp_path, capsys):
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
+def test_export_replaces_an_exported_robot_and_nothing_else(tmp_path, capsys):
+    out, described = tmp_path / "sara.touchline", tmp_path / "robot.yaml"
+    described.write_text("name: mine\n")
+    for _ in range(2):
+        assert main(["export", "sara", "--out", str(out)]) == 0
+    assert main(["export", "sara", "--out", str(described)]) == 2
+    assert "robot.yaml: exists and is no exported robot" in capsys.readouterr().err
+    assert described.read_text() == "name: mine\n"
+
+
 def test_export_makes_the_folder_of_its_file(tmp_path):
     out = tmp_path / "new" / "sara.touchline"
     assert main(["export", "sara", "--out", str(out)]) == 0
