@@ -66,6 +66,18 @@ def test_a_contact_slides_beside_another_that_is_held(held, speed, seed):
 
 
 @NOISE
+@pytest.mark.parametrize("rest", [0.05, 0.6])
+def test_an_event_of_a_contact_that_slid_has_the_place_of_its_time(rest, seed):
+    """Where it was for longest, at a time when it was there."""
+    slid = push("link2", 0.2, way=(0.5, 0.15, 0.06))
+    pipeline = follow(ROBOT, Q, [push("link6", 0.06), slid], 0.9 + rest, seed)
+    event = next(event for event in pipeline.events if event.link == "link2")
+    assert event.status == "located"
+    then = where(ROBOT, Q, slid, event.time_of_position)
+    assert np.linalg.norm(event.position - then) < 0.0225
+
+
+@NOISE
 @pytest.mark.parametrize(("lifts", "stays"), [("link2", "link6"), ("link6", "link2")])
 def test_one_of_two_lifts_and_the_other_keeps_its_identity(lifts, stays, seed):
     pushes = [push("link2", 0.06), push("link6", 0.2)]

@@ -70,3 +70,17 @@ def test_a_newcomer_is_in_its_region_all_the_time():
         variances, axes = np.linalg.eigh(contact.covariance)
         off = axes[:, 1:].T @ (contact.position - place)
         assert np.sum(off**2 / variances[1:]) < MOST
+
+
+@pytest.mark.parametrize(("run", "seed"), [(95, 5), (69, 7)])
+def test_an_event_is_no_surer_of_its_place_than_any_sample(run, seed):
+    """Samples that are ambiguous all along are wrong alike: their evidence does not add up to a place."""
+    robot, _, skin = told_and_real(CELL, run)
+    scene = make_scene(CELL, run, seed)
+    pipeline, s = make_pipeline(robot, skin), scene.signals
+    pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+    table = pipeline.contacts.columns()
+    for event in pipeline.events:
+        said = set(table["status"][table["event"] == event.id].tolist())
+        assert event.status != "located" or "located" in said
+    assert follow_course(pipeline, scene).false == 0

@@ -130,7 +130,7 @@ struct Event {
   double body_probability = kUnknown;
   Vec3 position = kNowhere;           // [m] in world at `time_of_position`, from all strong samples
   Vec3 position_link = kNowhere;      // [m] the same in the link's frame
-  double time_of_position = kUnknown;  // of the last strong sample [s]
+  double time_of_position = kUnknown;  // of the last strong sample that found it there [s]
   double position_std = kUnknown;     // [m]
   Candidates candidates;              // at `time_of_position`
   int joint = -1;                     // the most distal loaded one

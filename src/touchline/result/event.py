@@ -29,7 +29,7 @@ class Event(Value):
         body_probability: how likely that body was touched, 0 to 1.
         position: (3,) [m] the touched point in world at `time_of_position`, from strong samples.
         position_link: (3,) [m] the same point in the frame of `link`.
-        time_of_position: time of the last strong sample [s].
+        time_of_position: of the last strong sample that found it there [s].
         position_std: root of the trace of its covariance [m].
         candidates: all explanations, best first, at `time_of_position`.
         joint: the most distal loaded joint; None where no torque tells.

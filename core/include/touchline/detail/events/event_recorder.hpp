@@ -57,7 +57,7 @@ class EventRecorder {
       e.sum.resize(mean_.size());
     }
     changes_.reserve(3 * events_.size());  // each ends, another begins in its place and changes
-    scratch_.q.resize(rest_.size(), kUnknown);
+    scratch_.q = localizer.memories(0).front().q;
     scratch_.links = localizer.memories(0).front().links;
     for (const DetectionRow& row : robot.rows) {
       if (row.joint >= 0) limits_[row.joint] = row.contact;
@@ -290,7 +290,7 @@ class EventRecorder {
     out.status = status == Status::none ? Status::wrench_only : status;
     const int count = std::min(scratch_.event.count(), Candidates::kMost);
     if (count == 0) return;
-    observer_.tree().sweep(scratch_.q.data(), rest_.data(), state_);
+    observer_.tree().sweep(localizer_.positions(scratch_), rest_.data(), state_);
     Vec3 best;  // in the frame of the node
     for (int i = 0; i < count; ++i) {
       const Place& p = scratch_.event.place(i);

@@ -94,7 +94,8 @@ class Arrivals {
       // A contact beside forces that are held has fewer unknowns than a channel beside free ones. But a
       // known contact that lets go is likelier than a new one that pushes against it.
       const bool contested = placed(a);
-      if (!contested || opposes(s, a)) suspect_ = suspect_beside_free_forces(s, contested, read);
+      const int against = contested ? opposed(s, a) : -1;
+      if (!contested || against >= 0) suspect_ = suspect_beside_free_forces(s, against, read);
     }
     if (suspect_.any()) {  // what has come is no contact, as far as is felt
       for (int c = 0; c < s.known.contacts.count; ++c) reports_.add(before.contacts.known[c]);
@@ -180,12 +181,19 @@ class Arrivals {
     return false;
   }
 
-  // Does what is left push against a known contact?
-  bool opposes(const SegmentContacts& s, const Answer& a) const {
+  // Which known contact does what is left push against most? -1: none.
+  int opposed(const SegmentContacts& s, const Answer& a) const {
     const JointEstimate& before = s.known.before.contacts;
-    for (int c = 0; c < before.count; ++c)
-      if (dot(before.known[c].force, a.force) < 0.0) return true;
-    return false;
+    int most = -1;
+    double along = 0.0;
+    for (int c = 0; c < before.count; ++c) {
+      const Vec3& f = before.known[c].force;
+      const double here = dot(f, a.force) / std::max(norm(f), 1e-9);
+      if (here >= along) continue;
+      along = here;
+      most = c;
+    }
+    return most;
   }
 
   // The known contacts explain all, with the forces of the last fit.
@@ -223,14 +231,18 @@ class Arrivals {
     return answer_;
   }
 
-  // A channel that explains alone what the known contacts leave, their forces free. `contested`: so does
-  // a new contact, with their forces held.
+  // A channel that explains alone what the known contacts leave, their forces free. `opposed`: so does a
+  // new contact, with their forces held, that pushes against this one. Then only that one's is free: with
+  // all of them, a channel would explain nearly any new contact.
   template <class Read>
-  Suspect suspect_beside_free_forces(SegmentContacts& s, bool contested, Read&& read) {
+  Suspect suspect_beside_free_forces(SegmentContacts& s, int opposed, Read&& read) {
     const JointEstimate& known = s.known.before.contacts;
+    const bool contested = opposed >= 0;
+    const Change change = contested ? Change::of_force(opposed, settings_.force_scale)
+                                    : Change::of_forces(known.count, settings_.force_scale);
     read();
-    fit_.take_out(known, Change::of_forces(known.count, settings_.force_scale), measurement_);
-    return lone_.find(now_.segment, 3 * known.count, contested);
+    fit_.take_out(known, change, measurement_);
+    return lone_.find(now_.segment, contested ? 3 : 3 * known.count, contested);
   }
 
   // The same with their forces free, where there are equations enough: three for each, and five.

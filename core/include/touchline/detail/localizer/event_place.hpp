@@ -22,11 +22,17 @@ struct Place {
   double last = 0.0;      // probability in the sample at hand
   double share = 0.0;     // probability of the place
   double radius = 0.0;    // one sigma of a patch that it stands for, 0: a point [m]
+  double time = 0.0;      // of the last sample that found it here [s]
+  int slot = -1;          // where what belongs to that time is kept; -1: no sample has named it
+  bool sure = false;      // was a sample sure of it?
 };
 
 class EventPlace {
  public:
   static constexpr int kPlaces = 12;  // room
+  // Of the distance within which a sample counts to a place: one that is nearer finds it there. A
+  // contact that slides on counts for longer, but has left it.
+  static constexpr double kHere = 0.5;
 
   void restart() { *this = EventPlace{}; }
 
@@ -59,9 +65,10 @@ class EventPlace {
     return true;
   }
 
-  void add(int surface, const Vec3& point, double probability, double variance,
-           const LocalizerSettings& t) {
-    if (!(variance > 0.0) || probability < t.floor) return;
+  // `sure`: the sample is sure of it. Returns the slot for what belongs to its time; -1: it is not there.
+  int add(int surface, const Vec3& point, double probability, double variance, bool sure,
+          const LocalizerSettings& t) {
+    if (!(variance > 0.0) || probability < t.floor) return -1;
     const double near = std::max(t.place_radius, t.agree_sigmas * std::sqrt(variance));
     Place* place = nullptr;
     double least = near;
@@ -77,6 +84,10 @@ class EventPlace {
     place->weight += weight;
     place->point = place->point + (weight / place->weight) * (point - place->point);
     place->last += probability;
+    place->sure = place->sure || sure;
+    if (norm(place->point - point) > kHere * near) return -1;
+    place->time = time_;
+    return place->slot;
   }
 
   // `variance` of the sample's best place, of which the part `lasting` is that of the next as well.
@@ -127,7 +138,8 @@ class EventPlace {
 
   int count() const { return count_; }
   const Place& place(int i) const { return places_[i]; }
-  double time() const { return time_; }
+  // At which the most probable place was found there last [s].
+  double time() const { return count_ > 0 && places_[0].slot >= 0 ? places_[0].time : time_; }
   bool mostly_unexplained() const { return 2 * unexplained_ > samples_; }
   int frequent(int a, int b) const { return statuses_[a] >= statuses_[b] ? a : b; }
 
@@ -176,16 +188,19 @@ class EventPlace {
 
   Place* fresh(int surface) {
     Place* place = places_;
+    int slot = count_;
     if (count_ < kPlaces) {
       place = &places_[count_++];
     } else {
       place = std::min_element(places_, places_ + kPlaces, [](const Place& a, const Place& b) {
         return a.evidence < b.evidence;
       });
+      slot = place->slot;
     }
     *place = Place{};
     place->surface = surface;
     place->evidence = missed_;
+    place->slot = slot;
     return place;
   }
 

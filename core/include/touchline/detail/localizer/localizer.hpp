@@ -32,7 +32,7 @@ class Localizer {
         memories_(observer.row_layout().segments, std::vector<Memory>(Reports::kMost + 1)) {
     for (std::vector<Memory>& of_segment : memories_) {
       for (Memory& m : of_segment) {
-        m.q.resize(observer.row_layout().joints, kNaN);
+        m.q.resize((EventPlace::kPlaces + 1) * observer.row_layout().joints, kNaN);
         m.links = links_.shares();
       }
     }
@@ -148,7 +148,7 @@ class Localizer {
   struct Memory {
     int serial = -1;
     EventPlace event;
-    std::vector<double> q;
+    std::vector<double> q;  // of each place's slot, and last those of the last strong sample
     bool undetermined = false;  // were there fewer equations than unknowns?
     std::vector<BodyShare> links;  // what joint torques say of each body, if `revision` is not -1
     int revision = -1;
@@ -165,6 +165,12 @@ class Localizer {
     if (m.revision >= 0) m.event.share_out(m.links, node, settings_);
   }
 
+  // Joint positions at the time of its most probable place.
+  const double* positions(const Memory& m) const {
+    const bool named = m.event.count() > 0 && m.event.place(0).slot >= 0;
+    return m.q.data() + (named ? m.event.place(0).slot : EventPlace::kPlaces) * joints();
+  }
+
   Status status(const Memory& m) const {
     const EventPlace& event = m.event;
     if (event.count() == 0 || event.mostly_unexplained())
@@ -176,7 +182,9 @@ class Localizer {
         here += b.share;
     }
     const bool sharp = event.variance() < settings_.spread_limit() * settings_.spread_limit();
-    return here >= settings_.certain && sharp && !m.undetermined ? Status::located : Status::ambiguous;
+    // What no sample has been sure of is not sure.
+    const bool sure = event.place(0).sure && here >= settings_.certain && sharp && !m.undetermined;
+    return sure ? Status::located : Status::ambiguous;
   }
 
  private:
@@ -216,17 +224,23 @@ class Localizer {
       m.revision = links_.revision();
     }
     if (!m.event.begin_sample(strength, time, 0.5 * period_ * bandwidth(g), settings_)) return;
-    std::copy(q, q + m.q.size(), m.q.begin());
+    keep(m, EventPlace::kPlaces, q);
     const bool explained =
         answer.status == Status::located || answer.status == Status::ambiguous;
     if (!m.event.open(static_cast<int>(answer.status), explained)) return;
     m.undetermined = answer.rank < answer.unknowns;
     for (int i = 0; i < answer.count; ++i) {
       const Candidate& k = answer.candidates[i];
-      m.event.add(k.surface, single_.surfaces().to_node(k.point, surfaces()[k.surface].node),
-                  k.weight, k.along[0] + k.along[2], settings_);
+      const Vec3 point = single_.surfaces().to_node(k.point, surfaces()[k.surface].node);
+      const bool sure = i == 0 && answer.status == Status::located;
+      keep(m, m.event.add(k.surface, point, k.weight, k.along[0] + k.along[2], sure, settings_), q);
     }
     m.event.close(explained ? answer.spread * answer.spread : kNaN, answer.lasting, settings_);
+  }
+
+  // Joint positions of a sample.
+  void keep(Memory& m, int slot, const double* q) {
+    if (slot >= 0) std::copy(q, q + joints(), m.q.begin() + slot * joints());
   }
 
   // What the step of the joint torques says of each body.
