@@ -1,7 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Numbers that a user asks for, checked before the work."""
+"""Numbers that a user asks for, checked before the work, and those that are told."""
 
 from touchline.errors import InputError
+
+
+def counted(number: int, word: str, plural: str = "s") -> str:
+    """So many of something, in words: "1 event", "2 events"."""
+    return f"{number} {word}{plural * (number != 1)}"
 
 
 def check_least(least: float, **options: float) -> None:

@@ -18,6 +18,7 @@ from touchline.detector.tail import Tail
 from touchline.detector.thresholds import make_thresholds, row_name
 from touchline.errors import InputError
 from touchline.logs import write_table
+from touchline.model.description import LevelDescription
 from touchline.model.robot import Robot
 from touchline.model.robot_file import write_description
 from touchline.model.values import METHODS
@@ -103,6 +104,17 @@ def test_a_calibration_holds_for_its_rate_alone(result):
     thresholds = make_thresholds(tl.load_robot(result.out), 1e-4)
     assert not thresholds.calibrated
     assert "calibrated at 500 Hz, not at 10000 Hz" in str(thresholds.note)
+
+
+def test_at_another_rate_errors_of_the_model_are_still_no_contact(result):
+    robot = tl.load_robot(result.out)
+    calibrated, slow = make_thresholds(robot, 1 / RATE), make_thresholds(robot, 1 / 15.0)
+    for own, row in zip(calibrated.rows, slow.rows, strict=True):
+        assert row.contact >= 0.999 * own.contact and row.collision >= row.contact
+    given = replace(robot.description.detection, contact=LevelDescription(torque=0.7))
+    told = tl.model.robot.Robot(replace(robot.description, detection=given), robot.mechanism)
+    rows = make_thresholds(told, 1 / 15.0).rows
+    assert {row.contact for row in rows if row.component < 0} == {0.7}
 
 
 def test_alarms_of_the_detector_at_work_are_as_many_as_foreseen(robot, maker, result):

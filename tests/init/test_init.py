@@ -8,7 +8,7 @@ import pytest
 
 import touchline as tl
 from touchline.cli import main
-from touchline.init.contents import Contents
+from touchline.init.contents import Contents, JointStates
 from touchline.init.signals import find_signals
 from touchline.logs import open_log
 from touchline.model.guess import UNKNOWN, cautions, family_of, guess_description
@@ -53,6 +53,7 @@ def real(name):
     ("name", "torque", "locked"),
     [
         ("panda", "sensor", ["panda_finger_joint1"]),
+        ("ur3", "motor", []),
         ("ur5", "motor", []),
         ("ur10_robot", "motor", []),
         ("xarm7", "motor", []),
@@ -171,6 +172,46 @@ def test_joints_that_a_recording_lacks_are_locked(tmp_path, capsys):
     joints = {j.name: j.torque for j in tl.load_robot(out).description.joints}
     assert joints == {"j2": "sensor", "j3": "none", "j4": "sensor"}
     assert tl.load_robot(out).description.locked == {"j1": 0.0, "j5": 0.0, "j6": 0.0}
+
+
+def test_torques_that_are_all_zero_give_way_to_others(tmp_path):
+    joints = [f"j{i + 1}" for i in range(6)]
+    mechanism, zeros = load_mechanism(chain(tmp_path)), table(joints, tau="TorqueSm{i1}").columns
+    others = {f"Torque{i + 1}": np.sin(np.arange(50.0)) for i in range(6)}
+    assert find_signals(Contents(zeros), mechanism, joints).log["tau"] == "TorqueSm{i1}"
+    assert find_signals(Contents(zeros | others), mechanism, joints).log["tau"] == "Torque{i1}"
+
+
+@pytest.mark.parametrize(
+    ("names", "how"),
+    [
+        (("Base", "Shoulder", "Elbow"), "their order"),
+        (("left_j3", "left_j1", "left_j2", "gripper"), "what stands around them"),
+        (("j1.pos", "j2.pos", "j3.pos", "j10.pos"), "what stands around them"),
+    ],
+)
+def test_joints_of_other_names_are_taken(tmp_path, names, how):
+    mechanism, joints = load_mechanism(chain(tmp_path, 3)), ["j1", "j2", "j3"]
+    contents = Contents(joint_states={"/arm": JointStates(names, True, True)})
+    found = find_signals(contents, mechanism, joints)
+    expected = dict(zip(joints, sorted(names[:3]) if "left_j3" in names else names, strict=False))
+    assert found.log == {"topics": {"joint_states": "/arm"}, "joint_names": expected}
+    assert found.has_torque and not found.absent
+    assert any(f"taken by {how}" in line for line in found.statements)
+
+
+def test_joints_of_another_number_are_not_taken(tmp_path):
+    mechanism = load_mechanism(chain(tmp_path, 3))
+    contents = Contents(joint_states={"/arm": JointStates(("a", "b"), True, True)})
+    found = find_signals(contents, mechanism, ["j1", "j2", "j3"])
+    assert not found.log and any("no topic of joint states" in x for x in found.statements)
+
+
+def test_a_bag_of_ros_1_is_answered_with_its_conversion(tmp_path, capsys):
+    bag = tmp_path / "run.bag"
+    bag.write_bytes(b"#ROSBAG V2.0")
+    assert main(["init", str(chain(tmp_path)), str(bag), "--out", str(tmp_path / "r.yaml")]) == 2
+    assert f"rosbags-convert --src {bag} --dst {tmp_path / 'run'}" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["i{i1}", "motor_current_{i}", "{}.current"])

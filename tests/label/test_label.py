@@ -216,6 +216,8 @@ def test_what_cannot_be_used_is_told(lerobot, tmp_path, capsys):
     assert "no such file" in told(tmp_path / "none")
     (tmp_path / "a.txt").write_text("x")
     assert "must be a LeRobot data set" in told(tmp_path / "a.txt")
+    one = next((lerobot / "data").rglob("*.parquet"))
+    assert "name the folder that holds meta/info.json" in told(one)
     (tmp_path / "empty").mkdir()
     assert "neither a LeRobot data set" in told(tmp_path / "empty")
 

@@ -14,11 +14,13 @@ from scipy.optimize import nnls
 
 from touchline.arrays import Array
 from touchline.check.findings import Findings
-from touchline.check.fit import MOMENT_FACTORS, factor_words, robust_line
+from touchline.check.fit import MOMENT_FACTORS, NEAR, factor_words, robust_line
 from touchline.check.joints import (
+    SURE,
     TAKEN_OUT,
     TELLING,
     TorqueFit,
+    driving,
     fit_torque,
     judged_joints,
     swapped_torques,
@@ -44,6 +46,7 @@ MOVED = 0.05  # rad or m; a joint that moved less tells nothing of the sense of 
 FOLLOWS = 0.3  # of its own size may be left of a reading that is a multiple of what is expected
 MOST_BESIDE = 3  # changes that are tried beside wrong weights
 SHARED = 0.6  # of the joints must show a common factor
+SHOWN = 0.03  # of the weights; a compensation by a model that is as far off leaves less
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,11 @@ def next_step(robot: Robot, seen: Seen, mending: Mending) -> Step | None:
             for name, problem in zip(names, problems, strict=True)
         ]
         return Step(tuple(words), replace(mending, velocity=velocity))
-    return _torques(robot, seen, mending) or _wrenches(robot, seen, mending)
+    return (
+        _torques(robot, seen, mending)
+        or _driven(robot, seen, mending)
+        or _wrenches(robot, seen, mending)
+    )
 
 
 def _degrees(robot: Robot, seen: Seen, mending: Mending) -> Step:
@@ -117,7 +124,8 @@ def _torques(robot: Robot, seen: Seen, mending: Mending) -> Step | None:
     joints = _joints(robot, seen, mending, telling)
     if joints is not None:
         return joints
-    units = _units(robot, windows, telling, measured, mending)
+    units = _currents(robot, windows, telling, measured, mending)
+    units = units or _units(robot, windows, telling, measured, mending)
     if units is not None:
         # What a swinging joint needs beside its weight can look like a part of all that it needs.
         left = total_misfit(robot, windows_of(robot, seen, units.mending), telling)
@@ -130,6 +138,34 @@ def _torques(robot: Robot, seen: Seen, mending: Mending) -> Step | None:
         # Torques that nothing is in are off whatever else is mended.
         change = _change(robot, seen, mending, measured, heard)
     return change
+
+
+def _driven(robot: Robot, seen: Seen, mending: Mending) -> Step | None:
+    """Torques that work with the motion: of opposite sign, where no load tells it.
+
+    A driver may take off more friction than there is, so a torque that is no motor's is believed
+    only where another one was found to have the wrong sign.
+    """
+    windows = seen.windows
+    dead = {name for kind, name in seen.table.dead() if kind == "tau"}
+    others = bool((mending.torque < 0.0).any())
+    told, joints = [], []
+    for j in judged_joints(robot, windows, dead):
+        joint = robot.description.joints[j]
+        known = joint.friction.coulomb or joint.friction.viscous
+        if mending.torque[j] < 0.0 or known or not (others or joint.torque == "motor"):
+            continue
+        fit = fit_torque(windows, j)
+        if j in telling_joints(robot, seen) and fit is not None and fit.certain:
+            continue
+        torque = driving(windows, j)
+        if torque > 0.0:
+            joints.append(j)
+            told.append(
+                f"torque of {joint.name} works with its motion ({torque:.2g} Nm) where friction "
+                f"would work against it: opposite sign; set the other sign ({joint.name}: sign)"
+            )
+    return Step(tuple(told), mending.scaled("torque", joints, -1.0)) if joints else None
 
 
 def _heard(windows: Windows, j: int) -> bool:
@@ -328,6 +364,8 @@ def _weightless(
     joints = robot.description.joints
     if mending.weights is not None or any(joints[j].compensated != "none" for j in measured):
         return
+    if _weights_shown(robot, windows, measured):
+        return
     expected = windows.expected_torque - gravity_loads(robot, windows.q).torque
     left = total_misfit(robot, replace(windows, expected_torque=expected), measured)
     words = (
@@ -335,6 +373,54 @@ def _weightless(
         "compensated: gravity"
     )
     yield Step((words,), replace(mending, weights=robot), left)
+
+
+def _weights_shown(robot: Robot, windows: Windows, measured: list[int]) -> dict[int, float]:
+    """By what factor torques follow the weights, of the joints whose torque surely does.
+
+    However small it is: a current in amperes may be a tenth of the torque. Nothing where too few
+    joints do.
+    """
+    gravity = gravity_loads(robot, windows.q).torque
+    found = {}
+    for j in measured:
+        moving = windows.expected_torque[:, j] - gravity[:, j]
+        qd = windows.qd[:, j]
+        columns = [gravity[:, j], moving, np.tanh(qd / DRY_SPEED), qd, np.ones(len(qd))]
+        X, y = np.column_stack(columns), windows.torque[:, j]
+        known = np.isfinite(X).all(axis=1) & np.isfinite(y)
+        line = robust_line(X[known], y[known]) if known.any() else None
+        if line is not None and line.coefficients[0] > max(SURE * line.errors[0], SHOWN):
+            found[j] = float(line.coefficients[0])
+    return found if len(found) >= max(2, SHARED * len(measured)) else {}
+
+
+def _currents(
+    robot: Robot, windows: Windows, telling: list[int], measured: list[int], mending: Mending
+) -> Step | None:
+    """Motors' torques that follow the weights by a factor that no load can make: of their gains."""
+    joints = robot.description.joints
+    if any(joints[j].torque != "motor" for j in measured):
+        return None
+    factors = _weights_shown(robot, windows, telling)
+    common = float(np.median(list(factors.values()))) if factors else 1.0
+    if 1.0 / LARGE < common < LARGE:
+        return None
+    # A unit is the same for all joints, however wrong the loads of some of them are.
+    unit = factor_words(common, LARGE_FACTORS, UNIT_NEAR)
+    if unit is not None:
+        same = sum(abs(factor / unit[0] - 1.0) < NEAR for factor in factors.values())
+        if 2 * same > len(factors):
+            return None
+    changed = mending.scaled("torque", measured, 1.0 / common)
+    for j, factor in factors.items():
+        changed = changed.scaled("torque", [j], common / factor)
+    gains = ", ".join(f"{1.0 / f:.3g} ({joints[j].name})" for j, f in factors.items())
+    words = (
+        f"torques follow the weights, but are about {common:.2g} times what the model expects: "
+        f"motors' currents in amperes? gain: about {gains}"
+    )
+    return Step((words,), changed)
 
 
 def _positions(robot: Robot, seen: Seen, mending: Mending, measured: list[int]) -> Iterator[Step]:

@@ -28,6 +28,10 @@ TAKEN_OUT = 0.15  # below this fraction of the expected torque, gravity is not i
 UNEVEN = 0.2  # of its friction may a motor's joint have more in one sense, without a bias
 RUBBING = 0.05  # of the largest expected torque; less friction is left to `calibrate`
 SURE = 5.0  # standard errors
+BOTH_WAYS = 0.1  # of the windows must move in either sense
+LIGHT = 0.02  # of a reading's variation; a smaller expected torque cannot be told in it
+MOSTLY = 0.5  # of a reading's variation must be what seems to drive the joint
+DRIVES = 0.5  # Nm; a driver that takes off too much friction errs by less
 SAME = 0.995  # correlation of an expected torque with an acceleration that it is all made of
 CLEARER = 0.3  # another joint explains a torque column so much better
 
@@ -190,7 +194,7 @@ def fit_torque(windows: Windows, j: int, rotor: bool = False) -> TorqueFit | Non
     level = max(float(np.abs(np.median(expected))), TELLING)
     varied = float(np.std(expected)) > 0.1 * level
     columns = {"expected": expected, "one": np.ones(len(expected))} if varied else {"e": expected}
-    if varied and min((qd > MOVED).mean(), (qd < -MOVED).mean()) > 0.1:
+    if varied and min((qd > MOVED).mean(), (qd < -MOVED).mean()) > BOTH_WAYS:
         columns |= {"coulomb": np.tanh(qd / MOVED), "viscous": qd, "rate": rate}
         if rotor:
             columns["rotor"] = windows.acceleration[usable, j]
@@ -328,6 +332,34 @@ def _judge_delays(robot: Robot, fits: dict[int, TorqueFit], findings: Findings) 
         for joint in robot.description.joints:
             if joint.measured:
                 findings.mend("joints", joint.name, delay=round(joint.delay + late.value, 5))
+
+
+def driving(windows: Windows, j: int) -> float:
+    """How far a joint's torque works with its motion instead of against it [Nm]; 0 if not surely.
+
+    Friction works against the motion. What works with it, and is most of a motor's torque, has the
+    wrong sign: a light joint, whose load says nothing of the sign, has friction all the same.
+    """
+    qd, reading = windows.qd[:, j], windows.torque[:, j]
+    expected, acceleration = windows.expected_torque[:, j], windows.acceleration[:, j]
+    usable = np.isfinite(np.column_stack([qd, reading, expected, acceleration])).all(axis=1)
+    qd, reading, expected, acceleration = (
+        x[usable] for x in (qd, reading, expected, acceleration)
+    )
+    if not len(qd) or min((qd > MOVED).mean(), (qd < -MOVED).mean()) <= BOTH_WAYS:
+        return 0.0
+    columns = [np.tanh(qd / MOVED), qd, acceleration, np.ones(len(qd))]
+    size = float(np.std(reading))
+    if float(np.std(expected)) > LIGHT * size:
+        columns.append(expected)
+    line = robust_line(np.column_stack(columns), reading)
+    if line is None:
+        return 0.0
+    speed = float(np.quantile(np.abs(qd), 0.7))
+    coulomb, viscous = line.coefficients[:2].tolist()
+    error = float(np.hypot(line.errors[0], speed * line.errors[1]))
+    with_motion = -(coulomb + speed * viscous)
+    return with_motion if with_motion > max(SURE * error, MOSTLY * size, DRIVES) else 0.0
 
 
 def swapped_torques(windows: Windows, measured: list[int]) -> list[tuple[int, int]]:

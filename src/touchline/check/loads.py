@@ -31,6 +31,8 @@ OFFSET_SHARE = 0.01  # the same, as a part of the largest reading
 CENTRE = 0.1  # m, 1 sigma of a payload's centre about a hand's breadth before the flange
 EXPLAINED = 0.6  # of what is off; less is no explanation
 LEAST_MASS, LEAST_TILT = 0.15, np.radians(1.5)  # kg, rad: smaller ones are not told
+MOST_TILT = 0.7  # rad; how far a base may lean whose tilt follows from two angles alone
+SIZE_OFF = 0.15  # relative, of the length of gravity that a turned base would need
 LEAST_SCALE = 0.1  # of a link's inertia; models are that good at best
 RARE = 2.0 * np.log(100.0)  # of the cost: of a hundred errors of weights one is a link's, at most
 ALIKE = 3.0  # of the cost; explanations closer than that are both told
@@ -224,32 +226,75 @@ def _scaled(
 
 
 def _tilt(evidence: Evidence, robot: Robot, left: Array, sigma: Array) -> Explanation | None:
-    """The angles about the two level axes by which gravity would have to be turned."""
+    """The angle by which gravity would have to be turned."""
     g = robot.gravity
     size = float(np.linalg.norm(g))
     if size == 0.0:
         return None
-    down = g / size
-    level = np.linalg.svd(down[None])[2][1:]
-    A = np.stack([_turned(evidence, robot, np.cross(axis, g)) for axis in level], axis=-1)
-    values, errors, share, cost = _fit(A, left, sigma, evidence, np.zeros(2))
-    # Loads are linear in gravity, whose level part is the sine of the angle.
-    angle = float(np.arcsin(min(1.0, np.linalg.norm(values))))
-    error = float(np.linalg.norm(errors))
-    if angle < max(LEAST_TILT, SURE * error) or angle > 0.7:
+    new, error, share, cost = _leaning(evidence, robot, left, sigma)
+    angle = _between(new, g)
+    if angle > MOST_TILT:
+        turned = _mounted(evidence, robot, left, sigma)
+        if turned is None:
+            return None
+        new, error, share, cost = turned
+        angle = _between(new, g)
+    if angle < max(LEAST_TILT, SURE * error):
         return None
-    new = np.cos(angle) * g
-    for value, axis in zip(values, level, strict=True):
-        new = new + value * np.cross(axis, g)
     numbers = ", ".join(f"{x:.3f}" for x in new)
     words = (
         f"the base is tilted by {np.degrees(angle):.1f} +- {np.degrees(max(error, 2e-3)):.1f} "
         f"degrees ({100 * share:.0f} % of what is off): gravity: [{numbers}]"
     )
-    mechanism = replace(robot.mechanism, gravity=new)
     fix = {"gravity": [round(float(x), 4) for x in new]}
     short = f"the base is tilted by {np.degrees(angle):.1f} degrees"
-    return Explanation(words, short, share, cost, Robot(robot.description, mechanism), fix)
+    return Explanation(words, short, share, cost, _under(robot, new), fix)
+
+
+def _between(one: Array, other: Array) -> float:
+    """The angle between two directions [rad]."""
+    cosine = one @ other / (np.linalg.norm(one) * np.linalg.norm(other))
+    return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+
+
+def _under(robot: Robot, gravity: Array) -> Robot:
+    return Robot(robot.description, replace(robot.mechanism, gravity=gravity))
+
+
+def _leaning(
+    evidence: Evidence, robot: Robot, left: Array, sigma: Array
+) -> tuple[Array, float, float, float]:
+    """Gravity turned about the two level axes, its error [rad], share and cost."""
+    g = robot.gravity
+    level = np.linalg.svd(g[None])[2][1:]
+    A = np.stack([_turned(evidence, robot, np.cross(axis, g)) for axis in level], axis=-1)
+    values, errors, share, cost = _fit(A, left, sigma, evidence, np.zeros(2))
+    # Loads are linear in gravity, whose level part is the sine of the angle.
+    sine = min(1.0, float(np.linalg.norm(values)))
+    new = np.sqrt(1.0 - sine**2) * g
+    for value, axis in zip(values, level, strict=True):
+        new = new + value * np.cross(axis, g)
+    return new, float(np.linalg.norm(errors)), share, cost
+
+
+def _mounted(
+    evidence: Evidence, robot: Robot, left: Array, sigma: Array
+) -> tuple[Array, float, float, float] | None:
+    """Gravity of a base on a wall or a ceiling, its error [rad], share and cost.
+
+    Loads are linear in all of gravity, whose length is known. What this first fit leaves is a small
+    tilt, with what is off then.
+    """
+    size = float(np.linalg.norm(robot.gravity))
+    A = np.stack([_turned(evidence, robot, axis) for axis in np.eye(3)], axis=-1)
+    values, _, share, cost = _fit(A, left, sigma, evidence, np.zeros(3))
+    new = robot.gravity + values
+    length = float(np.linalg.norm(new))
+    if abs(length / size - 1.0) > SIZE_OFF:
+        return None
+    now = _under(robot, new * size / length)
+    new, error, _, _ = _leaning(evidence, now, *_off(evidence, now))
+    return new, error, share, cost
 
 
 def _gains(evidence: Evidence, robot: Robot) -> Explanation | None:

@@ -72,9 +72,10 @@ def _torques(robot: Robot, seen: Seen, findings: Findings, given: bool) -> None:
             f"the others {usual:.1f} times: {sigma[j]:.2g} Nm per sample"
         )
     if len(loud) > len(single):
+        least, most = f"{min(ratio[loud]):.1f}", f"{max(ratio[loud]):.1f}"
+        times = most if least == most else f"{least} to {most}"
         findings.find(
-            f"torques are {min(ratio[loud]):.1f} to {max(ratio[loud]):.1f} times as noisy as the "
-            f"figures in use: noise: {{tau: [{text}]}}"
+            f"torques are {times} times as noisy as the figures in use: noise: {{tau: [{text}]}}"
         )
 
 

@@ -114,7 +114,7 @@ def _mend_description(robot: Robot, mending: Mending, findings: Findings) -> Non
 
 
 def glance(robot: Robot, parts: list[Samples], felt: list[Mask], off: bool) -> list[str]:
-    """What a short look at a recording tells: units, order, signs, unmodelled weights, noise.
+    """What a short look at a recording tells: units, order, signs, weights, noise, dead signals.
 
     It may hold touches: what these look like (offsets, gains, delays) is not judged, and what the
     detector felt is left out. Where hardly anything else is left, weights are judged only if the
@@ -134,6 +134,8 @@ def glance(robot: Robot, parts: list[Samples], felt: list[Mask], off: bool) -> l
     whole = look(robot, parts, mending)
     if whole is None or not whole.stamps.credible:
         return found.findings
+    for line in whole.table.dead_lines():
+        found.find(line)
     check_noise(robot, whole, found)
     if seen is not None and is_off(robot, seen):
         explain_weights(robot, mending.apply(judged), found)

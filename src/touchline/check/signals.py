@@ -19,6 +19,7 @@ RUN = 5  # samples in a row with exactly one value: held, where noise would chan
 STUCK = 100  # samples in a row, and none so long elsewhere, before a live signal is called stuck
 CLIPPED = 0.01  # of the samples held at the largest or the least value
 ALIVE = 0.01  # of the other samples may be held; more is a coarse or a resampled signal
+NEAR_ZERO = 0.1  # rad or degrees; a joint that stays so near zero says nothing of its unit
 OUTSIDE = 0.01  # rad or m beyond the limits before it is said
 
 
@@ -137,6 +138,24 @@ class SignalTable:
         what = f"is always {self.low[i]:g}: dead, or not what the column should hold"
         return f"{_column(self.signals[i])} {what}"
 
+    def dead_lines(self) -> list[str]:
+        """Torques and wrenches that never change while a joint moves; alike ones in one line."""
+        moved = any(
+            s.kind == "q" and self.high[i] - self.low[i] > OUTSIDE
+            for i, s in enumerate(self.signals)
+        )
+        dead = self.dead() if moved else set()
+        columns: dict[tuple[str, float], list[str]] = {}
+        for i, s in enumerate(self.signals):
+            if s.kind in ("tau", "wrench") and (s.kind, s.name) in dead:
+                columns.setdefault((s.kind, float(self.low[i])), []).append(s.name)
+        return [
+            f"{'torque of ' if kind == 'tau' else ''}{', '.join(names)} "
+            f"{'is' if len(names) == 1 else 'are'} always {value:g}: dead, or not what the "
+            f"column{'s' * (len(names) > 1)} should hold"
+            for (kind, value), names in columns.items()
+        ]
+
     def dead_words(self, kind: str, name: str) -> str | None:
         """What is said of a signal that never changes; None of one that does."""
         if (kind, name) not in self.dead():
@@ -214,9 +233,16 @@ class SignalTable:
         return [p for p in self._positions(robot) if p[1] < p[3] - OUTSIDE or p[2] > p[4] + OUTSIDE]
 
     def looks_like_degrees(self, robot: Robot) -> bool:
-        """Are positions far outside, and all inside when taken for degrees?"""
+        """Are positions far outside, and all inside when taken for degrees?
+
+        A joint that may turn on and on leaves its limits alone: of degrees most joints would.
+        """
         joints = robot.mechanism.joints
         found = [p for p in self._positions(robot) if joints[p[0]].kind == "revolute"]
+        outside = {p[0] for p in self.outside_limits(robot)}
+        stand = [p for p in found if max(abs(p[1]), abs(p[2])) > NEAR_ZERO]
+        if 2 * sum(p[0] in outside for p in stand) < len(stand):
+            return False
         far = any(max(-low, high) > 4 * np.pi for _, low, high, _, _ in found)
         inside = all(
             np.deg2rad(low) >= lower - 0.1 and np.deg2rad(high) <= upper + 0.1

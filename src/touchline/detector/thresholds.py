@@ -93,6 +93,7 @@ def make_thresholds(robot: Robot, period: float = 1e-3) -> Thresholds:
     counts = np.bincount([row.segment for row in rows], minlength=len(robot.segment_names))
     share = detection.false_alarms / max(len(detection.method) * int((counts > 0).sum()), 1)
     if calibration is None:
+        rows = [_at_least_calibrated(robot, row, share) for row in rows]
         limits = {m: theoretical(m, counts, share, period, detection) for m in detection.method}
         return Thresholds(tuple(rows), sum_limits(counts, SIGMAS), limits, note=note)
     limits, rows_limit = {}, np.ones(len(counts))
@@ -114,7 +115,8 @@ def _calibration(robot: Robot, period: float) -> tuple[CalibrationDescription | 
         return None, "not calibrated: thresholds follow from the noise figures (see `calibrate`)"
     if not 1 / PERIOD_RATIO < given.period / period < PERIOD_RATIO:
         what = f"calibrated at {1 / given.period:g} Hz, not at {1 / period:g} Hz"
-        return None, f"{what}: thresholds follow from the noise figures"
+        lower = "no row's is below its calibrated one"
+        return None, f"{what}: thresholds follow from the noise figures, but {lower}"
     return given, None
 
 
@@ -154,6 +156,31 @@ def row_name(robot: Robot, row: RowThreshold) -> str:
     if row.component < 0:
         return robot.joint_names[row.joint]
     return f"{robot.segment_names[row.segment]}.{AXES[row.component]}"
+
+
+def _at_least_calibrated(robot: Robot, row: RowThreshold, share: float) -> RowThreshold:
+    """The row with no lower threshold than a calibration at another rate gives it.
+
+    Noise depends on the rate of samples, errors of the model do not, and where these prevail noise
+    alone would see contacts in them.
+    """
+    detection = robot.description.detection
+    calibration = detection.calibration
+    if calibration is None:
+        return row
+    known = calibration.rows.get(row_name(robot, row))
+    tail = calibration.tails.get(robot.segment_names[row.segment], {}).get("rows")
+    kind, key = _kind(robot, row)
+    if known is None or tail is None or _given(detection.contact, kind, key) is not None:
+        return row
+    contact = known.typical * threshold(tail, share)
+    if contact <= row.contact:
+        return row
+    collision = row.collision
+    if _given(detection.collision, kind, key) is None:
+        collision = max(COLLISION_RATIO * contact, _least_collision(robot, row))
+    limit = detection.baseline.limit * contact
+    return replace(row, contact=contact, collision=collision, baseline_limit=limit)
 
 
 def _calibrated_row(

@@ -14,6 +14,7 @@ from touchline.logs.log import open_log
 from touchline.logs.source import HEAD_ROWS
 from touchline.model.description import RobotDescription
 from touchline.model.robot import load_robot
+from touchline.numbers import counted
 
 # CPU time for an hour at 1 kHz, touched every ten seconds: `touchline bench logs`, rounded up [s].
 CPU = {"none": 40.0, "summary": 45.0, "full": 70.0}
@@ -29,6 +30,7 @@ class Forecast:
         cost: CPU time for a second of a recording [s].
         measured: number of recordings that `cost` is from; 0: from the benchmark.
         workers: number of processes.
+        failing: names of those that a run would try in vain.
     """
 
     plan: list[Recording]
@@ -36,6 +38,7 @@ class Forecast:
     cost: float
     measured: int
     workers: int
+    failing: frozenset[str] = frozenset()
 
     @property
     def todo(self) -> list[Recording]:
@@ -65,22 +68,23 @@ def forecast(plan: Sequence[Recording], out: Path, report: str, workers: int) ->
         workers: number of processes; 0: one per core.
     """
     robots: dict[str, RobotDescription | str] = {}  # or why it cannot be loaded
-    looked, durations = [], {}
+    looked, durations, failing = [], {}, set()
     for recording in plan:
         problem = recording.problem
-        if not problem:
-            robot = _robot(recording.robot, robots)
+        robot = "" if problem else _robot(recording.robot, robots)
+        if isinstance(robot, str):
+            problem = problem or robot
+        elif not recording.url:
             try:
-                if isinstance(robot, str):
-                    problem = robot
-                elif not recording.url:
-                    duration = _duration(recording, robot)
-                    if duration is not None:
-                        durations[recording.name] = duration
+                duration = _duration(recording, robot)
+                if duration is not None:
+                    durations[recording.name] = duration
             except InputError as error:
                 problem = error.problems[0]
             except OSError as error:
                 problem = f"{error.filename or recording.source}: {error.strerror or error}"
+            if problem:
+                failing.add(recording.name)
         looked.append(replace(recording, problem=problem))
     rows = Manifest(out).rows.values() if (out / MANIFEST).is_file() else ()
     done = [row for row in rows if row.get("duration") and row.get("cpu_seconds")]
@@ -88,7 +92,7 @@ def forecast(plan: Sequence[Recording], out: Path, report: str, workers: int) ->
     if done:
         cost = sum(row["cpu_seconds"] for row in done) / sum(row["duration"] for row in done)
     processes = min(workers or os.cpu_count() or 1, max(len(plan), 1))
-    return Forecast(looked, durations, cost, len(done), processes)
+    return Forecast(looked, durations, cost, len(done), processes, frozenset(failing))
 
 
 def _robot(name: str, robots: dict[str, RobotDescription | str]) -> RobotDescription | str:
@@ -128,6 +132,7 @@ def forecast_text(told: Forecast) -> str:
         if recording.problem:
             words, length = f"  ({briefly(recording.problem, recording.source)})", ""
         verb = "skip" if recording.problem else "analyze"
+        verb = "fail" if recording.name in told.failing else verb
         lines.append(
             f"{verb:8}{recording.size / 1e6:9.1f} MB {length:>8} h  {recording.name}{words}"
         )
@@ -135,13 +140,13 @@ def forecast_text(told: Forecast) -> str:
     known = sum(told.durations.get(r.name, 0.0) for r in told.todo)
     size = sum(r.size for r in told.todo) / 1e6
     lines.append(
-        f"{len(told.todo)} of {len(told.plan)} recordings, {lasting(known)}"
+        f"{len(told.todo)} of {counted(len(told.plan), 'recording')}, {lasting(known)}"
         + (f" and {unknown} of unknown length" if unknown else "")
         + f", {size:.1f} MB"
     )
-    source = f"as {told.measured} recordings before" if told.measured else "as of an arm at 1 kHz"
+    source = f"as {counted(told.measured, 'recording')} before" if told.measured else "as of an arm at 1 kHz"
     lines.append(
-        f"about {lasting(max(told.seconds, 1.0))} with {told.workers} processes "
+        f"about {lasting(max(told.seconds, 1.0))} with {counted(told.workers, 'process', 'es')} "
         f"({told.cost * HOUR:.0f} s of CPU an hour, {source}); nothing was done"
     )
     return "\n".join(lines)

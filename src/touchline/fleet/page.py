@@ -68,7 +68,7 @@ def _header(recordings: list[Row]) -> str:
     seconds = sum(row["duration"] for row in recordings)
     lost = len(recordings) - told["ok"]
     cards = [
-        (str(len(recordings)), f"recordings, {lost} of them not ok"),
+        (str(len(recordings)), f"recording{'s' * (len(recordings) != 1)}, {lost} of them not ok"),
         (lasting(seconds), f"{sum(row['samples'] for row in recordings)} samples"),
         (str(sum(row["events"] for row in recordings)), "contacts"),
         (str(sum(row["collisions"] for row in recordings)), "of them collisions"),

@@ -21,6 +21,7 @@ from touchline.fleet.pool import Pool
 from touchline.fleet.tables import table_rows, write_tables
 from touchline.fleet.work import Job, blank
 from touchline.folder import ResultsFolder
+from touchline.numbers import counted
 
 LOG = "log.jsonl"
 DONE = ("ok", "partial")
@@ -223,8 +224,8 @@ def outcome_text(outcome: Outcome, out: Path) -> str:
     if outcome.stopped:
         lines.append("stopped; the same command goes on")
     lines.append(
-        f"{len(outcome.rows)} recordings ({sums or 'none done'}), {lasted}, "
-        f"{events} events; "
-        f"{len(outcome.unchanged)} were unchanged; {out}/manifest.jsonl tells of each"
+        f"{counted(len(outcome.rows), 'recording')} ({sums or 'none done'}), {lasted}, "
+        f"{counted(events, 'event')}; "
+        f"{len(outcome.unchanged)} unchanged; {out}/manifest.jsonl tells of each"
     )
     return "\n".join(lines)

@@ -12,7 +12,7 @@ import numpy as np
 from touchline.errors import InputError
 from touchline.logs.bagfile import Bag
 from touchline.logs.cdr import JOINT_STATE, WRENCH_STAMPED
-from touchline.logs.log import BAGS, TABLES
+from touchline.logs.log import BAGS, TABLES, unknown_kind
 
 LOOKED_AT = 200  # rows or messages
 
@@ -55,7 +55,7 @@ def read_contents(path: Path) -> Contents:
         return Contents(columns=_parquet(path))
     if path.name.endswith(TABLES):
         return Contents(columns=_csv(path))
-    raise InputError(f"{path}: unknown kind of recording; allowed: {', '.join(TABLES + BAGS)}")
+    raise unknown_kind(path)
 
 
 def _parquet(path: Path) -> dict[str, np.ndarray]:

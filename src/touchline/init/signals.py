@@ -2,7 +2,7 @@
 """Which of a recording's columns or topics are a robot's signals."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -88,16 +88,27 @@ def _in_bag(contents: Contents, mechanism: Mechanism, joints: Sequence[str]) -> 
         for topic, found in contents.joint_states.items()
         if known[topic] == most >= min(LEAST_JOINTS, len(joints))
     }
-    has_torque, absent = False, ()
-    if states:
-        topic = max(states, key=lambda name: (states[name].effort, states[name].velocity))
-        absent = tuple(joint for joint in joints if joint not in states[topic].joints)
+    renamed = {} if states else _other_names(contents.joint_states, joints)
+    has_torque, absent, own_names = False, (), {}
+    if states or renamed:
+        found = states or {topic: contents.joint_states[topic] for topic in renamed}
+        topic = max(found, key=lambda name: (found[name].effort, found[name].velocity))
+        own_names = renamed.get(topic, {})
+        recorded = [own_names.get(joint, joint) for joint in joints]
+        absent = tuple(
+            joint
+            for joint, name in zip(joints, recorded, strict=True)
+            if name not in found[topic].joints
+        )
         topics["joint_states"] = topic
-        has_torque = states[topic].effort
-        filled = [n for n in ("velocity", "effort") if getattr(states[topic], n)]
+        has_torque = found[topic].effort
+        filled = [n for n in ("velocity", "effort") if getattr(found[topic], n)]
         statements.append(
             f"joints are in {topic}, with position{''.join(f', {n}' for n in filled)}"
         )
+        if own_names:
+            pairs = ", ".join(f"{name} for {joint}" for joint, name in own_names.items())
+            statements.append(f"joints have other names there, taken by {_how(own_names)}: {pairs}")
     else:
         names = {n for found in contents.joint_states.values() for n in found.joints}
         statements.append(
@@ -111,8 +122,40 @@ def _in_bag(contents: Contents, mechanism: Mechanism, joints: Sequence[str]) -> 
     if sensors:
         topics["wrench"] = {sensor.name: sensor.source for sensor in sensors}
     statements += [_told(sensor) for sensor in sensors]
-    log = {"topics": topics} if topics else {}
+    log: dict[str, Any] = {"topics": topics} if topics else {}
+    if own_names:
+        log["joint_names"] = own_names
     return Signals(log, tuple(sensors), has_torque, tuple(statements), absent)
+
+
+def _other_names(
+    states: dict[str, JointStates], joints: Sequence[str]
+) -> dict[str, dict[str, str]]:
+    """By topic the name of each joint there, where all have other names than in the model.
+
+    A prefix or suffix more is of a name space. Else as many joints are taken in their order.
+    """
+    found = {}
+    for topic, state in states.items():
+        around = [[name for name in state.joints if _spaced(name, joint)] for joint in joints]
+        if joints and all(len(names) == 1 for names in around):
+            found[topic] = {joint: names[0] for joint, names in zip(joints, around, strict=True)}
+    if found:
+        return found
+    return {
+        topic: dict(zip(joints, state.joints, strict=True))
+        for topic, state in states.items()
+        if len(state.joints) == len(joints) > 0
+    }
+
+
+def _spaced(name: str, joint: str) -> bool:
+    return name.endswith(joint) or name.startswith(joint) and not name[len(joint)].isdigit()
+
+
+def _how(names: dict[str, str]) -> str:
+    spaced = all(_spaced(name, joint) for joint, name in names.items())
+    return "what stands around them" if spaced else "their order, which may be another one"
 
 
 def _in_table(
@@ -187,11 +230,32 @@ def _time(columns: dict[str, np.ndarray], log: dict[str, Any], statements: list[
 def _pattern(
     columns: dict[str, np.ndarray], names: Sequence[str], joints: Sequence[str]
 ) -> tuple[str | None, str]:
-    """Return the pattern of columns that stand for all joints, by name or number, and its word."""
+    """Return the pattern of columns that stand for all joints, by name or number, and its word.
+
+    Of several the first in which something changes: a driver may fill what it does not measure
+    with zeros.
+    """
+    found = list(_patterns(columns, names, joints))
+    alive = (x for x in found if _changes(columns, x[0], joints))
+    return next(alive, found[0] if found else (None, ""))
+
+
+def _changes(columns: dict[str, np.ndarray], pattern: str, joints: Sequence[str]) -> bool:
+    for i, joint in enumerate(joints):
+        name = pattern.replace("{joint}", joint).replace("{i}", str(i)).replace("{i1}", str(i + 1))
+        values = columns[name][np.isfinite(columns[name])]
+        if len(values) and np.ptp(values) > 0.0:
+            return True
+    return False
+
+
+def _patterns(
+    columns: dict[str, np.ndarray], names: Sequence[str], joints: Sequence[str]
+) -> Iterator[tuple[str, str]]:
     for name in names:
         pattern = _by_name(columns, name, joints[0]) if joints else None
         if pattern is not None and all(pattern.replace("{joint}", j) in columns for j in joints):
-            return pattern, name
+            yield pattern, name
         for column in columns:
             match = re.fullmatch(r"(.*?)[01]\]?", column)
             if match is None or _word(match[1]) != name:
@@ -201,8 +265,7 @@ def _pattern(
                 numbered = [f"{match[1]}{i + first}{end}" for i in range(len(joints))]
                 beyond = f"{match[1]}{len(joints) + first}{end}"
                 if set(numbered) <= set(columns) and beyond not in columns:
-                    return match[1] + placeholder + end, name
-    return None, ""
+                    yield match[1] + placeholder + end, name
 
 
 def _of_some(

@@ -14,6 +14,7 @@ from touchline.label.lerobot import is_lerobot, label_lerobot
 from touchline.label.naming import Given
 from touchline.label.table import label_table
 from touchline.model.robot import Robot, load_robot
+from touchline.numbers import counted
 
 FAST = 1000.0  # samples per second, to which others are compared
 
@@ -89,8 +90,8 @@ def labelled_text(done: Labelled, robot: Robot) -> str:
     """What was added, and what the rate of the data set costs."""
     share = 100.0 * done.touched / done.samples if done.samples else 0.0
     lines = [
-        f"{done.episodes} episodes, {done.samples} samples at {done.rate:.4g} Hz "
-        f"({done.seconds / 3600:.2f} h): {done.touches} touches, {share:.1f} % of the samples"
+        f"{counted(done.episodes, 'episode')}, {done.samples} samples at {done.rate:.4g} Hz "
+        f"({done.seconds / 3600:.2f} h): {counted(done.touches, 'touch', 'es')}, {share:.1f} % of the samples"
     ]
     slow, fast = (_forces(robot, rate) for rate in (done.rate, FAST))
     if slow:

@@ -27,6 +27,7 @@ def label_table(path: Path, robot: Robot, given: Given) -> Labelled:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    _refuse_part(path)
     samples = read_log(path, robot.description)
     period = 1.0 / given.rate if given.rate else typical_period(samples.time)
     feeler = Feeler(robot, period, given.bandwidth)
@@ -53,3 +54,26 @@ def label_table(path: Path, robot: Robot, given: Given) -> Labelled:
     with replaced_file(path) as draft:
         pq.write_table(table, draft)
     return done
+
+
+def _refuse_part(path: Path) -> None:
+    """A file of a LeRobot data set has arrays in its cells, and its rate stands beside it."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        schema = pq.read_schema(path)
+    except (*damages(), OSError):
+        return  # told by the reader
+    arrays = [x.name for x in schema if pa.types.is_list(x.type) or _is_fixed(x.type)]
+    if any(name.startswith("observation.") for name in arrays):
+        raise InputError(
+            f"{path}: seems one file of a LeRobot data set ({', '.join(arrays[:3])} are arrays); "
+            "name the folder that holds meta/info.json"
+        )
+
+
+def _is_fixed(kind: object) -> bool:
+    import pyarrow as pa
+
+    return pa.types.is_fixed_size_list(kind)

@@ -127,7 +127,17 @@ def _open_source(path: Path, description: RobotDescription) -> Source:
         from touchline.logs.csvfile import CsvSource
 
         return CsvSource(path, description, naming)
-    raise InputError(
+    raise unknown_kind(path)
+
+
+def unknown_kind(path: Path) -> InputError:
+    """What is said of a file that is no recording of a kind that is read."""
+    if path.suffix == ".bag":
+        return InputError(
+            f"{path}: a bag of ROS 1 is not read; this makes a rosbag2 of it (package rosbags): "
+            f"rosbags-convert --src {path} --dst {path.with_suffix('')}"
+        )
+    return InputError(
         f"{path}: not a known kind of log; tables end in {', '.join(TABLES)}, recordings in "
         f"{', '.join(BAGS)} (a rosbag2 folder holds a metadata.yaml)"
     )

@@ -100,8 +100,15 @@ def example_models() -> dict[str, Path]:
             folder = file.parents[1].name.removesuffix("_description")
             models[stem if len(files) == 1 else f"{folder}/{stem}"] = file
     for name in list(models):
-        models.setdefault(name.removesuffix("_robot"), models[name])
+        short = name.removesuffix("_robot")
+        if short != name and not (short in models and _has_links(models[short])):
+            models[short] = models[name]
     return models
+
+
+def _has_links(model: Path) -> bool:
+    """Is there anything in a URDF? The package has one of which an expansion left only the head."""
+    return "<link" in model.read_text(encoding="utf-8", errors="replace")
 
 
 def _cached_model(name: str) -> Path | None:
