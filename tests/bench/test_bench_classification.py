@@ -19,7 +19,9 @@ def verdict(kind, said, zone="structure", clamped="free", said_clamped="free", d
 def rows(text, part):
     """The cells of one table, by what its rows are called."""
     lines = text.split("\n\n")[part].splitlines()[1:]
-    return {line.split("  ")[0]: line.split("  ", 1)[1].replace(" %", "%").split() for line in lines}
+    return {
+        line.split("  ")[0]: line.split("  ", 1)[1].replace(" %", "%").split() for line in lines
+    }
 
 
 def test_answers_are_counted_by_what_it_was():

@@ -54,7 +54,9 @@ def test_a_line_for_each_kind_of_touch(monkeypatch, capsys):
     cells = [[cell.strip() for cell in line if cell.strip()] for line in lines]
     assert len(cells) == len(seen) == 11
     assert [row[1] for row in cells] == ["0", "1", "2", "2", "3", "3", "4", "4", "1", "1", "2"]
-    assert {row[2] for row in cells[2:8]} == {"0.1 s apart", "together"} and cells[-1][2] == "clamped"
+    assert {row[2] for row in cells[2:8]} == {"0.1 s apart", "together"} and cells[-1][
+        2
+    ] == "clamped"
     assert ["2 N", "5 N"] == [row[2] for row in cells[8:10]]
     assert all("0.000 %" in row for row in cells)
     still, moving = seen[1], seen[8]
