@@ -216,10 +216,7 @@ inline void bind(nb::module_& m) {
             new (self) tl::Detector(observer.value, std::move(rows), std::move(settings));
           },
           "observer"_a, "rows"_a, "settings"_a, nb::keep_alive<1, 2>())
-      .def("baseline", &tl::Detector::baseline, "row"_a)
-      .def("limit", &tl::Detector::limit, "row"_a)
-      .def("noise", &tl::Detector::noise, "row"_a)
-      .def("offset", &tl::Detector::offset, "row"_a);
+      .def("baseline", &tl::Detector::baseline, "row"_a);
   m.def("row_variances", &row_variances, "observer"_a, "rows"_a, "noise"_a, "q"_a);
   m.def("detect", &detect);
   m.def("detect_run", &detect_run);

@@ -17,3 +17,26 @@ def data():
         pytest.skip(f"no recordings at {folder}: set TOUCHLINE_DATA")
     pytest.importorskip("pinocchio", reason="comes with example-robot-data, the arms' models")
     return folder
+
+
+class Here:
+    """Stands where a pool of processes would: the work is done in this one."""
+
+    def __init__(self, *_: object, **__: object) -> None:
+        """Begins no process."""
+
+    def __enter__(self) -> "Here":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Ends none."""
+
+    def map(self, function, *arguments):
+        """As of a pool."""
+        return map(function, *arguments)
+
+
+@pytest.fixture
+def here(monkeypatch):
+    """Makes a module do its work in this process."""
+    return lambda module: monkeypatch.setattr(module, "ProcessPoolExecutor", Here)

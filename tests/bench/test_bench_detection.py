@@ -9,12 +9,14 @@ import pytest
 import touchline as tl
 from touchline.bench.detection import classical as detection_classical
 from touchline.bench.detection import files as detection_files
+from touchline.bench.detection import run as detection
 from touchline.bench.detection.classical import FastClassical, less_baseline
 from touchline.bench.detection.drawing import draw
 from touchline.bench.detection.outcome import Outcome
 from touchline.bench.detection.pushes import AFTER, BEFORE, PushMaker, random_pushes
 from touchline.bench.detection.tables import alarm_table, delay_table
 from touchline.bench.detection.work import Setting, maker
+from touchline.cli import main
 from touchline.detector.calibration import Statistics, watching, with_methods
 from touchline.detector.detector import Detector
 from touchline.detector.tail import Tail
@@ -139,6 +141,67 @@ def test_the_classical_rows_see_a_push_from_its_onset_on():
     before, after = found[:, 0], found[:, -20:].min(axis=1)
     assert (before < 5.0).all()
     assert (after > 10.0).all()
+
+
+class Here:
+    """Stands where a pool of processes would: the work is done in this one."""
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        pass
+
+    def map(self, what, work, pieces):
+        return [work(*piece) for piece in pieces]
+
+
+@pytest.mark.parametrize(("layout", "methods"), [("joints", 5), ("classical", 2)])
+def test_a_minute_is_calibrated_another_counted_and_pushes_are_found(layout, methods):
+    o = detection.measure(Setting(layout, 1000.0, 1e-3), 1 / 60, 2, Here())
+    assert len(o.methods) == methods and o.tested.hours == o.hours == pytest.approx(1 / 60)
+    assert o.tested.blocks.shape[1:] == (3 if layout == "classical" else 1, methods)
+    best, last = o.methods[-2 if layout == "classical" else 0], detection.FORCES[-1]
+    assert {force: len(found) for force, found in o.pushes.items()} == dict.fromkeys(
+        detection.FORCES, 2
+    )
+    weak, hard = (o.pushes[force].max(axis=(0, 1)) for force in (detection.FORCES[0], last))
+    assert (hard > 2.0 * weak).all()
+    assert o.alarms(best, 1.0) <= o.alarms(best, 100.0)
+
+
+def outcome(setting):
+    tail = Tail(2.0, 60.0, 1.0, 0.0, 600, 10.0)
+    tested = Statistics(np.zeros((90, 3, 1)), np.arange(90) * 0.02, np.zeros(90, int), 1.0)
+    pushes = {f: np.full((4, 50, 1), f) for f in detection.FORCES}
+    tails = {n: {"glrt": tail} for n in ("base", "wrist", "handle")}
+    return Outcome(setting, ("glrt",), tails, tested, pushes, 10.0)
+
+
+def test_settings_are_printed_as_they_are_done_and_together(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("matplotlib")
+    monkeypatch.setattr(detection, "Pool", Here)
+    monkeypatch.setattr(detection, "measure", lambda setting, hours, trials, pool: outcome(setting))
+    words = ["--observers", "extended", "--rates", "1000", "--out", str(tmp_path)]
+    assert main(["bench", "detection", *words]) == 0
+    told = capsys.readouterr().out
+    assert told.count("observer") == 2 * 2 + 2 and "\ntogether\n" in told
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {"roc.csv", "tails.csv", "roc.svg", "delay.svg"} <= names
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--hours", "0.01"], "hours"),
+        (["--pushes", "0"], "pushes"),
+        (["--velocity-noise", "0.5"], "allowed: 0.001, 0.0002"),
+        (["--rates"], "is empty"),
+    ],
+)
+def test_impossible_plans_are_told_before_the_work(words, told, capsys):
+    assert main(["bench", "detection", *words]) == 2
+    assert told in capsys.readouterr().err
 
 
 def test_the_baseline_is_the_detectors(sara):

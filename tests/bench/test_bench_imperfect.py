@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from touchline.bench.imperfect.faults import FAULTS, PAYLOAD
-from touchline.bench.imperfect.trial import Trials
+from touchline.bench.imperfect.trial import Outcome, Trials
 from touchline.cli import main
 from touchline.trials.arms import load_arm
 
@@ -51,6 +51,18 @@ def test_the_payload_is_on_the_last_link_alone():
     (name,) = [n for n, mass in more.items() if mass > 0.0]
     body = loaded[name].inertia
     assert (np.linalg.eigvalsh(body.inertia) >= 0.0).all()
+
+
+def test_a_line_for_each_fault_and_motion(monkeypatch, capsys):
+    def play(self, fault, moving, seed):
+        return Outcome(before=moving, found=True, wrong=seed[-1] == 0, cleared=not moving, events=2)
+
+    monkeypatch.setattr(Trials, "play", play)
+    assert main(["bench", "imperfect", "--arms", "sara", "--runs", "2"]) == 0
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()[2:]]
+    assert len(lines) == 2 * len(FAULTS)
+    assert lines[0] == "sara nothing standing 0/2 2/2 1/2 2/2 2.0".split()
+    assert lines[1] == "sara nothing moving 2/2 2/2 1/2 0/2 2.0".split()
 
 
 def test_a_benchmark_without_runs_is_told(capsys):

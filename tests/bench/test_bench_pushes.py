@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from touchline.bench.pushes import run as pushes
 from touchline.bench.pushes.judge import Push, Tally, judge
 from touchline.bench.pushes.run import Part, play, run
 from touchline.cli import main
@@ -94,6 +95,30 @@ def test_what_is_wrong_is_so_of_the_arm_or_of_its_readings():
     assert np.abs(heavy.wrench - right.wrench).max() > 1.0
     assert np.array_equal(rubbing.wrench, right.wrench)
     assert np.nanmax(np.abs(rubbing.tau - right.tau)) == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize("processes", ["1", "2"])
+def test_lines_of_arms_are_summed(here, monkeypatch, capsys, processes):
+    here(pushes)
+    counted = []
+
+    def made_up(part):
+        counted.append((part.arm, part.wrong, part.seed))
+        return Tally(pushes=10, found=part.seed, idle=1.0, free=4.0)
+
+    monkeypatch.setattr(pushes, "run", made_up)
+    words = ["--arms", "sara", "ur5", "--wrong", "nothing", "bias 2 N", "--seeds", "2"]
+    assert main(["bench", "pushes", *words, "--first", "3", "--processes", processes]) == 0
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()[2:]]
+    assert [line[0] for line in lines] == ["sara", "sara", "ur5", "ur5", "all", "all"]
+    assert lines[0][2:4] == ["20", "7"] and lines[0][-2:] == ["25.0", "%"]
+    assert lines[-1][-13:-2] == "N 40 14 0 0 0 0 0 0 0 0".split()
+    assert counted == [
+        (arm, wrong, seed)
+        for arm in ("sara", "ur5")
+        for wrong in ("nothing", "bias 2 N")
+        for seed in (3, 4)
+    ]
 
 
 def test_a_benchmark_without_recordings_is_told(capsys):

@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The benchmark on real recordings: one event to one touch, and what is counted."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from touchline.bench.matching import match
+from touchline.bench.real import run as real
 from touchline.bench.real.judged import Touched, judge_free, judge_touched
 from touchline.bench.real.left_out import CHOICES, Tried, chosen, named
 from touchline.cli import main
@@ -105,6 +108,44 @@ def test_a_folder_without_recordings_is_told(tmp_path, capsys):
     assert "panda_touches" in capsys.readouterr().err
     assert main(["bench", "real"]) == 2
     assert "--data" in capsys.readouterr().err
+
+
+@pytest.fixture
+def made_up(tmp_path, monkeypatch):
+    """Two touched recordings and a free one; of the thin ones the second event is lost."""
+    read = {"a5": recording(spans((1, 1.5), (3, 3.5)), 5), "b4": recording(spans((2, 3)), 4)}
+    monkeypatch.setattr(real, "touched_files", lambda data: [tmp_path / name for name in read])
+    monkeypatch.setattr(real, "read_touched", lambda path, folder: read[path.name])
+    monkeypatch.setattr(real, "read_free", lambda data, folder: [recording(spans())])
+    monkeypatch.setattr(real, "at_rate", lambda found, rate: replace(found, period=1.0 / rate))
+
+    def events_of(found):
+        told = {5: [event(1.0, 1.5, link5=0.95), event(3.0, 3.5, link4=0.95)], 4: []}
+        told = told.get(found.link, [event(1.0, None)])
+        return told[:1] if found.period == 1.0 / 15.0 else told
+
+    monkeypatch.setattr(real, "events_of", events_of)
+    return tmp_path
+
+
+def test_touched_and_free_recordings_are_printed(made_up, capsys):
+    assert main(["bench", "real", "--data", str(made_up), "--rate", "15"]) == 0
+    told = capsys.readouterr().out
+    whole, thin = told.split("The same at 15 Hz")
+    assert "found 66.7 % (2 of 3); of these: right link 50.0 % (1 of 2)" in whole
+    assert "above 0.9 wrong 50.0 % (1 of 2)" in whole
+    assert "found 33.3 % (1 of 3)" in thin and "of those found before: 1 of 2" in thin
+    assert thin.splitlines()[-1].split()[-3:] == ["s", "1", "yes"]
+
+
+def test_leaving_one_out_prints_nothing_else(made_up, monkeypatch, capsys):
+    best = [Tried(Touched(touches=2, found=1), float(k == 3)) for k in range(len(CHOICES))]
+    monkeypatch.setattr(real, "try_all", lambda found: best)
+    assert main(["bench", "real", "--data", str(made_up), "--leave-one-out"]) == 0
+    told = capsys.readouterr().out
+    assert told.startswith("Numbers chosen on all other files") and "nothing touches" not in told
+    assert told.count(named(CHOICES[chosen([best, best], 0)])) == 2
+    assert "found 50.0 % (2 of 4)" in told
 
 
 def test_a_lower_rate_keeps_samples_of_even_instants():

@@ -6,9 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import yaml
 from free_motion import free_motion
 
 import touchline as tl
+from touchline.calibrate import run
+from touchline.calibrate.blame import Blame
 from touchline.calibrate.noise import NoiseMeter
 from touchline.calibrate.run import _check_tails, calibrate
 from touchline.cli.main import main
@@ -246,6 +249,46 @@ def test_what_is_left_is_learned_and_written_beside_the_description(robot, tmp_p
     assert np.std(left[1]) < 0.5 * np.std(left[0])
 
 
+def test_gains_of_motors_are_found_and_all_is_pictured(robot, tmp_path, capsys):
+    """Joint 3 has 0.8 of its gain and friction; both are written and drawn."""
+    source, log, out = tmp_path / "arm.yaml", tmp_path / "log.parquet", tmp_path / "new.yaml"
+    text = read_yaml(tl.model.sources.find_robot("sara").path)
+    joints = [j | {"torque": "motor"} if j["torque"] == "sensor" else j for j in text["joints"]]
+    source.write_text(yaml.safe_dump({**text, "model": "robot:sara", "joints": joints}))
+    s = free_motion(tl.load_robot(source), 24.0, 100.0, seed=1, noise=0.02)
+    s.tau[:, 2] = s.tau[:, 2] / 0.8 + 2.0 * np.tanh(s.qd[:, 2] / 0.05)
+    write_table(log, s, robot.description)
+    words = ["calibrate", str(log), "--robot", str(source), "--out", str(out), "--gains"]
+    assert main([*words, "--pictures", str(tmp_path / "pictures")]) == 0
+    told = capsys.readouterr().out
+    assert "joint3: gain 0.80" in told and "times the described one" in told
+    found = tl.load_robot(out).description.joints[2]
+    assert found.gain == pytest.approx(0.8, rel=0.02)
+    assert found.friction.coulomb == pytest.approx(2.0 * 0.8, rel=0.1)
+    residuals, friction = (
+        (tmp_path / "pictures" / f"{name}.svg").read_text() for name in ("residuals", "friction")
+    )
+    assert "axes_2" in residuals and "axes_1" in friction
+    assert "friction.svg" in told
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--gains"], "no joint with torque: motor"),
+        (["--pictures", "p", "--no-identify"], "leave --no-identify out"),
+        (["--gains", "--no-identify"], "--gains"),
+        (["--figure", "p.txt"], "--figure p.txt"),
+    ],
+)
+def test_options_that_ask_for_nothing_are_told(logs, tmp_path, monkeypatch, capsys, options, words):
+    monkeypatch.chdir(tmp_path)
+    arguments = [str(logs[0]), "--robot", "sara", "--out", "a.yaml", *options]
+    assert main(["calibrate", *arguments]) == 2
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "a.yaml").exists()
+
+
 def test_learning_needs_identification(tmp_path, capsys):
     log = tmp_path / "none.parquet"
     log.touch()
@@ -295,6 +338,39 @@ def test_a_touch_is_left_out_and_told(robot, maker, tmp_path, capsys):
     assert 7.8 < float(stretch[0]) < 8.1 and 8.4 < float(stretch[1]) < 9.0
     assert main([*arguments, "--method", "cusum", "--trust", "--no-identify"]) == 0
     assert "left out" not in capsys.readouterr().out
+
+
+def test_where_too_much_seems_touched_the_worst_row_is_named(robot, maker, tmp_path, monkeypatch):
+    """Nothing may be left out: what seems to be touched is listed, with the row that stands out."""
+    monkeypatch.setattr(run, "MOST_LEFT_OUT", 0.0)
+    monkeypatch.setattr(run, "LISTED", 1)
+    rng = generator(0)
+    s = maker.samples(random_trajectory(robot, rng), rng)
+    for begin in (5.0, 10.0, 15.0):
+        pushed = (s.time > begin) & (s.time < begin + 0.05)
+        s.wrench[pushed, 0, 1] -= 25.0
+    path = tmp_path / "touched.parquet"
+    write_table(path, s, robot.description)
+    with pytest.raises(InputError) as caught:
+        calibrate([path], "sara", tmp_path / "out.yaml", ("cusum",), identification=False)
+    first, *_, last = lines = str(caught.value).splitlines()
+    assert first.startswith(f"{path}: from ") and "touch segment base (" in first
+    assert re.search(r"base\.fy is 2\d(\.\d)? N off, usually ", first)
+    assert last.endswith("--trust takes them for its own doing")
+    assert len(lines) == 3 and lines[1] == "... and 2 more"
+
+
+@pytest.mark.parametrize(
+    ("speed", "words"),
+    [
+        (None, "joint3 is 8 Nm off, usually 1.2 Nm"),
+        ((-0.001, 0.001), "; the joint stands still"),
+        ((-0.2, 0.3), "; the joint reverses (friction?)"),
+        ((-0.25, -0.1), "; the joint moves at up to 0.25 rad/s"),
+    ],
+)
+def test_a_row_is_blamed_with_what_its_joint_does(speed, words):
+    assert str(Blame("joint3", "Nm", 8.0, 1.2, speed)).endswith(words)
 
 
 def test_a_burst_in_one_joint_is_left_out(robot, maker, tmp_path):

@@ -2,6 +2,7 @@
 """Whatever is wrong with an input: exit status 2 and one clear message, or a health bit."""
 
 import gzip
+import importlib
 import os
 import re
 import signal
@@ -21,6 +22,8 @@ from touchline.cli import main
 from touchline.folder import UNFINISHED
 from touchline.logs import write_table
 from touchline.logs.truth import read_truth
+
+main_module = importlib.import_module("touchline.cli.main")  # `touchline.cli.main` is its function
 
 
 @pytest.fixture(scope="module")
@@ -472,3 +475,68 @@ def test_a_file_of_another_kind_is_told_in_one_line(tmp_path, capsys):
     assert main(["check", "sara", str(path)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "columns are missing" in line and "columns present: a, b" in line
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "words"),
+    [
+        (KeyboardInterrupt(), 130, "stopped"),
+        (OSError(28, "No space left on device"), 1, "No space left on device"),
+        (FileNotFoundError(2, "No such file or directory", "x.yaml"), 2, "x.yaml: No such file"),
+        (ModuleNotFoundError("no", name="matplotlib"), 1, "touchline[report]"),
+    ],
+)
+def test_what_ends_a_command_is_one_line(monkeypatch, capsys, error, status, words):
+    def fails():
+        raise error
+
+    monkeypatch.setitem(main_module.COMMANDS, "check", fails)
+    assert main(["check"]) == status
+    assert words in capsys.readouterr().err
+
+
+def test_a_package_that_is_not_ours_to_name_is_a_traceback(monkeypatch):
+    def fails():
+        raise ModuleNotFoundError("no", name="touchline_of_mine")
+
+    monkeypatch.setitem(main_module.COMMANDS, "check", fails)
+    with pytest.raises(ModuleNotFoundError):
+        main(["check"])
+
+
+def test_a_reader_that_has_seen_enough_is_no_error(monkeypatch):
+    def fails():
+        raise BrokenPipeError
+
+    monkeypatch.setitem(main_module.COMMANDS, "check", fails)
+    monkeypatch.setattr(sys, "stdout", sys.stdout)  # it is given back after the test
+    assert main(["check"]) == 0
+    assert sys.stdout is None
+
+
+def test_benchmarks_run_one_after_the_other_and_options_belong_to_one(monkeypatch, capsys):
+    ran = []
+
+    def noted(name):
+        def run() -> int:
+            ran.append(name)
+            return int(name == "logs")
+
+        return run
+
+    for name in main_module.BENCHMARKS:
+        monkeypatch.setitem(main_module.BENCHMARKS, name, noted(name))
+    assert main(["bench", "observer", "logs"]) == 1 and ran == ["observer", "logs"]
+    assert main(["bench", "observer", "logs", "--rounds", "3"]) == 2
+    assert "options belong to one benchmark" in capsys.readouterr().err
+    assert main(["bench", "observe"]) == 2
+    assert "did you mean 'observer'" in capsys.readouterr().err
+    ran.clear()
+    assert main(["bench"]) == 1
+    assert "touchline bench real --data DIR" in capsys.readouterr().out
+    assert set(ran) >= set(main_module.BENCHMARKS) - {"real"}
+
+
+def test_the_version_is_that_of_the_package(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"touchline {tl.__version__}\n"

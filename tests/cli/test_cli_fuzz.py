@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import touchline as tl
+from touchline.cli import fuzz as fuzz_module
 from touchline.cli import main
-from touchline.cli.fuzz import Parser, damaged, fuzz, fuzz_apart, parsers, read_one
+from touchline.cli.fuzz import Failure, Parser, damaged, fuzz, fuzz_apart, parsers, read_one
 
 RUNS, SEED = 25, 1
 
@@ -92,3 +93,22 @@ def test_a_file_that_ends_its_process_is_found_and_the_rest_is_read(tmp_path):
     found, _, _ = fuzz_apart("ending", tmp_path, 12, SEED, ending)
     assert 1 <= len(found) <= 8 and found[0].data
     assert all("ended the process" in f.what and len(f.data) % 3 == 0 for f in found)
+
+
+def test_what_was_found_is_printed_and_kept(tmp_path, monkeypatch, capsys):
+    kinds = [Parser(name, "a.bin", (b"abc",), lambda path: path) for name in ("good", "bad one")]
+    monkeypatch.setattr(fuzz_module, "parsers", lambda folder: kinds)
+    failures = {"good": [], "bad one": [Failure("bad one", 7, "Traceback", b"xyz")]}
+    monkeypatch.setattr(
+        fuzz_module, "fuzz_apart", lambda name, folder, runs, seed: (failures[name], 0.25, 90.0)
+    )
+    assert main(["bench", "fuzz", "--runs", "9", "--keep", str(tmp_path / "kept")]) == 1
+    told = capsys.readouterr().out
+    assert "bad one 7:\nTraceback" in told
+    assert [line.split()[-6:] for line in told.splitlines()[-2:]] == [
+        ["9", "0", "250", "ms", "90", "MB"],
+        ["9", "1", "250", "ms", "90", "MB"],
+    ]
+    assert (tmp_path / "kept" / "bad_one_7").read_bytes() == b"xyz"
+    failures["bad one"] = []
+    assert main(["bench", "fuzz", "--runs", "9"]) == 0

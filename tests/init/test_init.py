@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bag_support import JOINTS, WRENCH, joint_state, wrench, write_bag
 
 import touchline as tl
 from touchline.cli import main
@@ -261,6 +262,104 @@ def test_real_recordings_are_read_with_the_description_that_init_writes(
     assert tl.Pipeline(robot).update(
         samples.time[0], samples.q[0], samples.qd[0], samples.tau[0], samples.wrench[0]
     )
+
+
+def bag_of(folder, names, *sensors, first=b"\x00\x01"):
+    """A bag of two instants whose first message of joint states is damaged."""
+    values = [0.1] * len(names)
+    messages = [("/joint_states", 1.0, JOINTS, first)]
+    for t in (1.01, 1.02):
+        state = joint_state(t, names, values, [float("nan")] * len(names), values)
+        messages.append(("/joint_states", t, JOINTS, state))
+        for topic, frame in sensors:
+            messages.append((topic, t, WRENCH, wrench(t, range(6), frame)))
+    return write_bag(folder / "bag", messages)
+
+
+def test_topics_of_a_bag(tmp_path, capsys):
+    model, out = chain(tmp_path), tmp_path / "robot.yaml"
+    names = [f"j{i + 1}" for i in range(5)]
+    sensors = ("/wrist/wrench", "l5"), ("/base/ft/wrench", ""), ("/ft/raw", ""), ("/ft/data", "")
+    bag = bag_of(tmp_path, names, *sensors)
+    assert main(["init", str(model), str(bag), "--out", str(out)]) == 0
+    told = capsys.readouterr().out
+    assert "joints are in /joint_states, with position, effort" in told
+    assert "sensor wrist (/wrist/wrench) carries l5: its messages are in the frame l5" in told
+    assert "sensor base (/base/ft/wrench) carries base: the link has its name" in told
+    assert "sensor ft (/ft/raw) carries l6: the model does not tell" in told
+    assert "sensor ft_4 (/ft/data)" in told
+    robot = tl.load_robot(out)
+    assert robot.sensor_names == ("wrist", "base", "ft", "ft_4")
+    assert robot.description.locked == {"j6": 0.0}
+    with open_log(bag, robot.description) as recording:
+        samples = next(recording.chunks(10))
+    assert samples.q[-1] == pytest.approx([0.1] * 5)
+    assert samples.wrench[-1, 0] == pytest.approx(range(6))
+
+
+def test_a_bag_of_another_robot_is_told(tmp_path, capsys):
+    model, out = chain(tmp_path), tmp_path / "robot.yaml"
+    bag = bag_of(tmp_path, ["wheel_left", "wheel_right"])
+    assert main(["init", str(model), str(bag), "--out", str(out)]) == 0
+    told = capsys.readouterr().out
+    assert "no topic of joint states has these joints; those recorded: wheel_left, wheel" in told
+    assert "`torque: none`: no joint torques were found in the recording" in told
+    assert {j.torque for j in tl.load_robot(out).description.joints} == {"none"}
+
+
+@pytest.mark.parametrize(
+    ("name", "link", "why"),
+    [
+        ("pedestal_base", "l1", "it is called a base sensor"),
+        ("wrist", "tool_ft_sensor", "the model has a link that is named like a force-torque"),
+    ],
+)
+def test_the_link_of_a_sensor_by_its_name(tmp_path, name, link, why):
+    joints = [("j1", "l1", "revolute"), ("j2", "l2", "revolute")]
+    joints += [("mount", "tool_ft_sensor", "fixed"), ("j3", "l3", "revolute")]
+    path = arm(tmp_path, *joints, name="x")
+    path.write_text(path.read_text().replace('"base"', '"world"'))
+    mechanism = load_mechanism(path)
+    extra = [f"{name}.{axis}" for axis in ("fx", "fy", "fz", "mx", "my", "mz")]
+    found = find_signals(table(["j1", "j2"], extra=extra), mechanism, ["j1", "j2"])
+    (sensor,) = found.sensors
+    assert (sensor.name, sensor.link) == (name, link) and why in sensor.why
+
+
+def test_what_a_table_lacks_is_told(tmp_path):
+    joints = [f"j{i + 1}" for i in range(6)]
+    mechanism = load_mechanism(chain(tmp_path))
+    found = find_signals(table(joints, time="row", q="", tau=""), mechanism, joints)
+    assert not found.has_torque
+    for words in ("recognized as the time", "recognized as q", "recognized as tau"):
+        assert any(words in line for line in found.statements)
+
+
+@pytest.mark.parametrize("rows", [0, 3])
+def test_tables_of_words_and_without_rows(tmp_path, capsys, rows):
+    """The columns' names tell the signals; cells that are no numbers tell nothing of the time."""
+    import pyarrow
+    import pyarrow.parquet
+
+    names = ["time", *(f"{signal}.j{i + 1}" for signal in ("q", "tau") for i in range(6))]
+    cells = pyarrow.array(["x"] * rows, pyarrow.string())
+    path, out = tmp_path / "log.parquet", tmp_path / "robot.yaml"
+    pyarrow.parquet.write_table(pyarrow.table({name: cells for name in names}), path)
+    assert main(["init", str(chain(tmp_path)), str(path), "--out", str(out)]) == 0
+    assert "velocities are not in the recording" in capsys.readouterr().out
+    assert {joint.torque for joint in tl.load_robot(out).description.joints} == {"sensor"}
+
+
+def test_places_and_models_that_do_not_fit_are_one_line(tmp_path, capsys):
+    model = chain(tmp_path)
+    (tmp_path / "file").write_text("")
+    for name, out, words in (
+        (model, tmp_path / "robot.txt", "must end in .yaml"),
+        (model, tmp_path / "file" / "robot.yaml", "cannot be written"),
+        ("sara", tmp_path / "robot.yaml", "is a description already"),
+    ):
+        assert main(["init", str(name), "--out", str(out)]) == 2
+        assert words in capsys.readouterr().err
 
 
 def test_a_file_that_is_there_is_kept(tmp_path, capsys):

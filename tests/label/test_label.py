@@ -16,7 +16,7 @@ import touchline as tl
 from touchline.cli import main
 from touchline.errors import InputError
 from touchline.label.channel import BEFORE
-from touchline.label.naming import Given
+from touchline.label.naming import Given, choose
 from touchline.label.run import label
 from touchline.logs import write_table
 
@@ -235,6 +235,41 @@ def test_plain_parquet(robot, episodes, tmp_path):
     assert links and links <= set(robot.mechanism.links)
     assert set(after["touch.level"].to_pylist()) <= {"none", "contact", "collision"}
     assert f"touch.tau_ext.{robot.joint_names[0]}" in after.column_names
+
+
+def test_a_folder_of_files_is_labelled_file_by_file(robot, episodes, tmp_path, capsys):
+    folder = tmp_path / "data"
+    for number, name in enumerate(("a", "b/c")):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        write_table(folder / f"{name}.parquet", episodes[number], robot.description)
+    (folder / "notes.txt").write_text("no data")
+    assert main(["label", str(folder), "--robot", "sara"]) == 0
+    assert "2 episodes, 1000 samples at 100 Hz" in capsys.readouterr().out
+    free, touched = (
+        column(pq.read_table(folder / f"{name}.parquet"), "contact", "touch.")
+        for name in ("a", "b/c")
+    )
+    assert touched[TOUCH][20:].all() and not free.any()
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("empty", "neither a LeRobot data set nor HDF5"), ("log.csv", "must be a LeRobot data set")],
+)
+def test_what_is_no_data_set_is_told(tmp_path, capsys, name, words):
+    path = tmp_path / name
+    path.write_text("x") if path.suffix else path.mkdir()
+    assert main(["label", str(path), "--robot", "sara"]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_arrays_without_positions_or_torques_are_told(robot, tmp_path):
+    with pytest.raises(InputError, match="no 7 joint positions found; name them by --q"):
+        choose(tmp_path, Given(), {"action": 3}, robot.description)
+    with pytest.raises(InputError, match="--tau torque: 6 numbers, but 7 are needed"):
+        choose(tmp_path, Given(q="q", tau="torque"), {"q": 7, "torque": 6}, robot.description)
+    with pytest.raises(InputError, match="without them nothing can be felt"):
+        choose(tmp_path, Given(q="q"), {"q": 7}, robot.description)
 
 
 def test_a_column_that_is_damaged_and_no_signal_is_told(robot, episodes, tmp_path, capsys):

@@ -4,9 +4,11 @@
 import numpy as np
 import pytest
 
-from touchline.live.telling import began_line, ended_line
+from touchline.live.telling import began_line, ended_line, touch_line
 from touchline.result.contact import Candidate
 from touchline.result.event import Event
+from touchline.touch.stroke import Stroke
+from touchline.touch.touch import TouchEvent
 
 PLACE = np.array([0.1, -0.2, 0.3])
 WHOLE = Event(
@@ -22,6 +24,7 @@ WHOLE = Event(
     position=PLACE,
     force_peak=20.04,
 )
+STROKE = Stroke(None, "link5", np.array([[0.0, 0.0, 0.0], [0.2, 0.03, 0.04]]))
 OTHER = (Candidate("link2", "link2", 0.6, PLACE), Candidate("link1", "link1", 0.4, PLACE))
 
 
@@ -53,3 +56,19 @@ def test_an_event_that_is_not_located_says_so(changes, told):
     event = WHOLE.replace(**changes)
     assert began_line(event, 10.0) == f"     2.500 s  contact 3 {told}"
     assert ended_line(event, 10.0) == f"     3.250 s  contact 3 over after 0.75 s: {told}"
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"kind": "press", "widget": "stop"}, "stop: press"),
+        ({"kind": "change", "widget": "speed", "value": 0.25}, "speed: change: 0.25"),
+        ({"kind": "toggle", "widget": "light", "value": True}, "light: toggle: True"),
+        ({"kind": "tap", "link": "link5"}, "link5: tap"),
+        ({"kind": "grab"}, "the arm: grab"),
+        ({"kind": "swipe", "link": "link5", "value": STROKE}, "link5: swipe of 5.0 cm"),
+    ],
+)
+def test_what_a_person_did_is_one_line(options, told):
+    event = TouchEvent(**{"widget": None, "time": 12.5} | options)
+    assert touch_line(event, 10.0) == f"     2.500 s  {told}"

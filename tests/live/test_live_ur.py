@@ -3,6 +3,7 @@
 
 import ctypes
 import socket
+import struct
 import subprocess
 import sys
 import threading
@@ -16,7 +17,10 @@ from live_support import assert_same, watch
 
 from touchline.cli.main import main
 from touchline.errors import InputError
+from touchline.live import rtde
+from touchline.live.adapters import from_ur_rtde
 from touchline.live.connection import Connection
+from touchline.live.source import LinkLost
 from touchline.live.sources import connect, make_source
 
 
@@ -117,6 +121,95 @@ def test_a_foreign_server_is_one_clear_line(data, words, samples, tmp_path, caps
     err = capsys.readouterr().err
     assert words in err and len(err.strip().splitlines()) == 1
     listener.close()
+
+
+def _scripted(*answers):
+    """A controller that accepts the protocol, and then answers each request as is written."""
+    listener = socket.create_server(("127.0.0.1", 0))
+
+    def serve():
+        client = listener.accept()[0]
+        with client:
+            for answer in (rtde.package(rtde.Command.PROTOCOL_VERSION, b"\x01"), *answers):
+                if not client.recv(1000):
+                    return
+                client.sendall(answer)
+            time.sleep(0.2)
+
+    threading.Thread(target=serve, daemon=True).start()
+    return listener, rtde.Rtde("127.0.0.1", listener.getsockname()[1])
+
+
+def _fields(kinds):
+    return rtde.package(rtde.Command.OUTPUTS, b"\x01" + kinds.encode())
+
+
+@pytest.mark.parametrize(
+    ("kinds", "words"),
+    [
+        ("DOUBLE", "gives 1 types for 2 fields"),
+        ("NOT_FOUND,NOT_FOUND", "has none of the fields timestamp, actual_q"),
+        ("DOUBLE,STRING", "fields of unknown type STRING"),
+    ],
+)
+def test_fields_that_cannot_be_read_are_told(kinds, words):
+    listener, link = _scripted(_fields(kinds))
+    with listener, link, pytest.raises(InputError, match=words):
+        link.outputs(["timestamp", "actual_q"], 500.0)
+
+
+def test_words_of_a_controller_are_kept_and_other_packages_left_out():
+    said = rtde.package(rtde.Command.TEXT, b"\x05hello" + b"rest")
+    start, other = rtde.package(rtde.Command.START, b"\x01"), rtde.Command.DATA
+    data = rtde.package(other, struct.pack(">Bd", 1, 0.5))
+    listener, link = _scripted(_fields("DOUBLE"), said + start + said + data)
+    with listener, link:
+        recipe, missing = link.outputs(["timestamp"], 500.0)
+        assert (recipe.size, recipe.offset("timestamp"), recipe.offset(None)) == (9, 1, -1)
+        link.start()
+        (payload,) = link.receive(1.0)
+        assert link.messages == ["hello", "hello"] and missing == []
+        assert recipe.read(payload) == {"timestamp": (0.5,)}
+        assert recipe.read(payload[:-1]) is None and recipe.read(b"\x02" + payload[1:]) is None
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        (rtde.package(rtde.Command.START, b"\x00"), "does not start to send"),
+        (rtde.package(rtde.Command.START, b"\x01") + b"HTTP/1.1", "sends no RTDE any more"),
+        (rtde.package(rtde.Command.START, b"\x01"), "has closed the connection"),
+    ],
+)
+def test_a_link_that_is_lost_is_told(answer, words):
+    listener, link = _scripted(answer)
+
+    def follow():
+        link.start()
+        while True:
+            link.receive(0.1)
+
+    with listener, link, pytest.raises(LinkLost, match=words):
+        follow()
+
+
+class Receiver:
+    """As much of `RTDEReceiveInterface` as is read."""
+
+    def __getattr__(self, name):
+        at = ["getActualQ", "getActualQd", "getActualCurrent", "getFtRawWrench"]
+        at += ["getActualTCPForce", "getTimestamp"]
+        number = at.index(name)
+        return lambda: 2.5 if name == "getTimestamp" else [float(number)] * 6
+
+
+def test_a_state_of_the_public_client_is_a_sample(arm):
+    sample = from_ur_rtde(arm, Receiver(), arrival=7.0)
+    assert (sample.time, sample.arrival) == (2.5, 7.0)
+    np.testing.assert_array_equal(sample.q, np.zeros(6))
+    np.testing.assert_array_equal(sample.qd, np.ones(6))
+    np.testing.assert_array_equal(sample.tau, np.full(6, 2.0))
+    np.testing.assert_array_equal(sample.wrench, np.full((1, 6), 3.0))
 
 
 def test_nobody_there_an_old_protocol_a_wrong_robot(arm, samples, sara, tmp_path, capsys):

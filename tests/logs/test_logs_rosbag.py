@@ -2,6 +2,7 @@
 """rosbag2 recordings: topics, clocks, rates, decoding and damage."""
 
 import shutil
+import sqlite3
 import tracemalloc
 
 import numpy as np
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 from logs_support import assert_same, describe
 
 from touchline.errors import InputError
-from touchline.logs import open_log, read_log
+from touchline.logs import bagfile, open_log, read_log
 from touchline.logs.cdr import JOINT_STATE, WRENCH_STAMPED, Decoder
 from touchline.logs.messages import Messages
 from touchline.model.description import JointDescription, SensorDescription
@@ -357,6 +358,63 @@ def test_files_that_are_no_recordings(tmp_path, kind):
     folder = write_bag(tmp_path / "bag", [], kind, silent=[("/js", JOINTS)])
     with pytest.raises(InputError, match="no messages"):
         open_log(folder, describe())
+
+
+@pytest.mark.parametrize("packed", ["FILE", "MESSAGE"])
+def test_packed_bags_say_the_same(tmp_path, packed, monkeypatch):
+    monkeypatch.setattr(bagfile, "_BATCH", 100)
+    robot, messages = describe(), recording()
+    plain = read_log(write_bag(tmp_path / "plain", messages), robot)
+    folder = write_bag(tmp_path / "bag", messages, packed=packed)
+    with open_log(folder, robot) as log:
+        assert log.topics == {"/joint_states": JOINTS, "/ft/wrench": WRENCH}
+        assert log.duration == pytest.approx(4.0, abs=0.1)
+        (samples,) = log.chunks()
+        assert log.progress == 1.0 and log.warnings == []
+    assert_same(samples, plain)
+
+
+def test_a_packed_bag_that_is_damaged_is_read_as_far_as_it_goes(tmp_path):
+    """Of messages that are packed one by one, those before the damage are used."""
+    messages = recording()
+    folder = write_bag(tmp_path / "bag", messages, packed="MESSAGE")
+    file = storage_file(folder, "db3")
+    with sqlite3.connect(file) as table:
+        table.execute("UPDATE messages SET data = x'00' WHERE id = 600")
+    table.close()
+    with open_log(folder, describe()) as log:
+        (part,) = log.chunks()
+        assert "damaged after 599 messages" in log.warnings[0]
+    whole = read_log(write_bag(tmp_path / "plain", messages), describe())
+    assert 300 < len(part.time) < 400
+    np.testing.assert_array_equal(part.q, whole.q[: len(part.time)])
+
+
+def test_a_packed_file_that_is_none_is_told(tmp_path):
+    folder = write_bag(tmp_path / "bag", recording(1.0), packed="FILE")
+    (file,) = folder.glob("*.zstd")
+    file.write_bytes(b"something else")
+    with pytest.raises(InputError, match="not a readable recording, or damaged"):
+        open_log(folder, describe())
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[", "reading the folder's files alone"),
+        ("rosbag2_bagfile_information: 3", "reading the folder's files alone"),
+        (None, "not every file that metadata.yaml names is there"),
+    ],
+)
+def test_metadata_that_cannot_be_trusted_is_told(tmp_path, text, words):
+    folder = write_bag(tmp_path / "bag", recording(1.0))
+    whole = read_log(folder, describe())
+    path = folder / "metadata.yaml"
+    path.write_text(path.read_text().replace("bag.db3", "b.db3") if text is None else text)
+    with open_log(folder, describe()) as log:
+        (samples,) = log.chunks()
+        assert words in log.warnings[0]
+    assert_same(samples, whole)
 
 
 def test_folder_without_recording(tmp_path):

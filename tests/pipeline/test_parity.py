@@ -121,3 +121,21 @@ def test_a_joint_and_a_sensor_right_behind_it_differ_by_a_fault_and_no_contact()
     assert [f.channel for f in told][:1] == ["tau.shoulder_pan_joint"]
     assert told[0].fault == Fault.DISAGREES
     assert events == []
+
+
+def test_during_a_touch_a_joint_and_the_sensor_behind_it_are_in_doubt_together():
+    """The touch hides which of the two is wrong, so both are named; what measures else is not."""
+    pytest.importorskip("pinocchio", reason="comes with example-robot-data, the arms' models")
+    robot = robot_named("ur5")
+    profile = Profile(0.4, 0.7, 0.02, 0.02)
+    push = ScriptedContact(
+        "forearm_link", np.array([0.0, 0.0, 0.2]), np.array([9.0, -20.0, 12.0]), profile
+    )
+    settings = Run(seed=3, noise=SensorNoise(), physics=2000.0)
+    samples = scripted(robot, [push], 1.2, 0.5, settings).samples
+    wrong = drifting(robot, samples, "tau.shoulder_pan_joint")
+    _, told, _ = heard(tl.Pipeline(robot), wrong)
+    assert {f.channel for f in told if f.fault == Fault.SUSPECT} == {
+        "tau.shoulder_pan_joint",
+        "base.mz",
+    }

@@ -1,12 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures 5 and 6 and the applications: small versions of what the command runs."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
 from touchline.figure import new_figure
 from touchline.model.robot import load_robot
-from touchline.reproduce import applications, fig5, fig6, overlapping
+from touchline.reproduce import (
+    applications,
+    applications_drawing,
+    fig5,
+    fig5_drawing,
+    fig6,
+    fig6_drawing,
+    overlapping,
+)
 from touchline.reproduce.arm_view import ArmView
 from touchline.reproduce.replay import Replay
 from touchline.reproduce.wrench_routes import Routes
@@ -21,6 +31,25 @@ def robot():
 @pytest.fixture(scope="module")
 def pushes():
     return overlapping.pushed(0)
+
+
+@pytest.fixture(scope="module")
+def screw(robot):
+    return applications.screw(robot, 0)
+
+
+@pytest.fixture(scope="module")
+def case(robot):
+    """The cases of figure 6, each simulated once."""
+    make = fig6.case
+    return cache(lambda name: make(name, robot, 0))
+
+
+def drawn(experiment, name):
+    """The figure of an experiment all of whose checks hold."""
+    assert [check.name for check in experiment.checks if not check.holds] == []
+    assert list(experiment.drawings) == [name]
+    return experiment.drawings[name].figure
 
 
 def test_pushes_overlap_and_are_found_and_located(pushes):
@@ -52,9 +81,8 @@ def test_a_ball_is_drawn_back_at_once_and_out_of_the_way():
     assert ball.travel(ball.release + 10.0) == -overlapping.CLEAR
 
 
-def test_the_tool_stays_right_while_somebody_leans_on_the_elbow(robot):
-    part = applications.screw(robot, 0)
-    table = applications._rows(part)
+def test_the_tool_stays_right_while_somebody_leans_on_the_elbow(screw):
+    part, table = screw, applications._rows(screw)
     force = applications._value(table, "screw", "wrist")
     moment = applications._value(table, "screw", "wrist", "moment_error_max")
     assert 0 < force < 0.5 and 0 < moment < 0.05
@@ -64,12 +92,61 @@ def test_the_tool_stays_right_while_somebody_leans_on_the_elbow(robot):
 
 
 @pytest.mark.parametrize("name", ["link 0", "stretched arm", "three at once"])
-def test_a_case_is_located_by_the_sensors_and_not_by_joint_torques_alone(robot, name):
-    case = fig6.case(name, robot, 0)
-    ours = [v for v in case.verdicts if v.method == "ours"]
+def test_a_case_is_located_by_the_sensors_and_not_by_joint_torques_alone(case, name):
+    verdicts = case(name).verdicts
+    ours = [v for v in verdicts if v.method == "ours"]
     assert len(ours) == (3 if name == "three at once" else 1)
     assert all(v.right and v.found == v.link for v in ours)
-    assert not any(v.right for v in case.verdicts if v.method == "eq5")
+    assert not any(v.right for v in verdicts if v.method == "eq5")
+
+
+def test_figure_5_is_told_and_drawn(pushes, monkeypatch):
+    monkeypatch.setattr(fig5, "pushed", lambda seed: pushes)
+    ticks = []
+    experiment = fig5.run(0, ticks.append, fig5_drawing.drawings)
+    figure = drawn(experiment, "fig5")
+    pictures, curves = (part.axes for part in figure.subfigs)
+    assert len(pictures) == 6 and len(curves) == 6 and len(ticks) == fig5.STEPS
+    assert len(curves[0].get_lines()) >= 4 and curves[0].get_ylabel() == "N"
+    rows = experiment.tables["table"].rows
+    assert [row["segment"] for row in rows] == list(fig5.SEGMENTS)
+    assert all(row["false_detections"] == 0 and row["located"] > 0.9 for row in rows)
+    series = experiment.series["series"]
+    assert len({len(column) for column in series.values()}) == 1
+    first, second = experiment.tables["recoil"].rows
+    assert first["other_force_max"] > 10.0 and second["other_force_max"] == 0.0
+
+
+def test_figure_6_is_told_and_drawn(case, monkeypatch):
+    monkeypatch.setattr(fig6, "PUSHES", 1)
+    monkeypatch.setattr(fig6, "case", lambda name, robot, seed: case(name))
+    ticks = []
+    experiment = fig6.run(0, ticks.append, fig6_drawing.drawings)
+    figure = drawn(experiment, "fig6")
+    above, below = (part.axes for part in figure.subfigs)
+    assert [axes.get_title() for axes in above] == list(fig6.CASES)
+    assert len(below[0].patches) == 3 * len(fig6.LINKS) and len(ticks) == fig6.STEPS
+    rows = experiment.tables["table"].rows
+    assert all(row["pushes"] == 1 for row in rows)
+    assert fig6.total(rows, "ours") > fig6.total(rows, "eq5", fig6.LINKS[:6])
+
+
+def test_the_applications_are_told_and_drawn(robot, screw, monkeypatch):
+    def made(robot, seed):
+        return screw
+
+    made.__name__ = "screw"
+    monkeypatch.setattr(applications, "screw", made)
+    ticks = []
+    experiment = applications.run(0, ticks.append, applications_drawing.drawings)
+    figure = drawn(experiment, "applications")
+    assert len(figure.axes) == 2 * 4 and ticks == ["screw", "teaching"]
+    assert [axes.get_title(loc="left") for axes in figure.axes[::4]] == [
+        "(a) Screwing",
+        "(b) Teaching",
+    ]
+    assert len(figure.axes[1].get_lines()) == 3 and len(figure.axes[3].get_lines()) == 2
+    assert {row["application"] for row in experiment.tables["table"].rows} == set(ticks)
 
 
 def test_random_pushes_are_judged_by_link(robot, monkeypatch):

@@ -164,36 +164,6 @@ class Robot:
         index = {node.sensor: i for i, node in enumerate(self.nodes)}
         return self.poses(q)[[index[name] for name in self.sensor_names]]
 
-    def joint_depth(self, joint: int) -> int:
-        """How many nodes lie between the world and a joint: larger is more distal."""
-        node = next(i for i, n in enumerate(self.nodes) if n.joint == self.joint_names[joint])
-        return len(self._path(node))
-
-    def torques_of_wrench(self, segment: str, q: Array, wrench: Array) -> list[tuple[int, float]]:
-        """What a segment's wrench does to the joints inboard of it.
-
-        Args:
-            segment: that begins at a six-axis sensor.
-            q: joint positions (n,) [rad or m].
-            wrench: (6,) [N, Nm], world axes, about the world origin.
-
-        Returns:
-            (joint, torque [Nm]) for the observed joints inboard, from the base outwards.
-        """
-        poses = self.poses(q)
-        start = next(i for i, node in enumerate(self.nodes) if node.sensor == segment)
-        torques = []
-        for i in self._path(start):
-            node = self.nodes[i]
-            if node.coordinate < 0:
-                continue
-            axis, origin = poses[i][:3, 2], poses[i][:3, 3]
-            load = wrench[3:] - np.cross(origin, wrench[:3])
-            if node.kind == "prismatic":
-                load = wrench[:3]
-            torques.append((node.coordinate, float(node.multiplier * (axis @ load))))
-        return torques
-
     def _path(self, node: int) -> list[int]:
         """The nodes from the world out to `node`, itself included."""
         path = []

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Controllers of the simulated robot. They know the plant's own dynamics, but no contact."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -104,32 +104,6 @@ def sinusoids(
     def at(time: float) -> Setpoint:
         s, co = np.sin(w * time + p), np.cos(w * time + p)
         return Setpoint(c + a * s, a * w * co, -a * w**2 * s)
-
-    return at
-
-
-def waypoints(points: Sequence[ArrayLike], times: Sequence[float]) -> Trajectory:
-    """Passes `points` (m, n) at `times` (m,) [s], at rest at each, by polynomials of degree five.
-
-    Before the first and after the last time it stands still.
-
-    Raises:
-        ValueError: the times do not increase, or are not one per point.
-    """
-    q, t = np.asarray(points, float), np.asarray(times, float)
-    if q.ndim != 2 or len(q) != len(t) or np.any(np.diff(t) <= 0):
-        raise ValueError("waypoints need one increasing time per point")
-
-    def at(time: float) -> Setpoint:
-        i = int(np.clip(np.searchsorted(t, time) - 1, 0, max(len(t) - 2, 0)))
-        if len(t) == 1:
-            return Setpoint(q[0], np.zeros_like(q[0]), np.zeros_like(q[0]))
-        span, way = t[i + 1] - t[i], q[i + 1] - q[i]
-        x = min(max((time - t[i]) / span, 0.0), 1.0)
-        s = x**3 * (10 - 15 * x + 6 * x**2)
-        ds = 30 * x**2 * (1 - x) ** 2 / span
-        dds = 60 * x * (1 - x) * (1 - 2 * x) / span**2
-        return Setpoint(q[i] + s * way, ds * way, dds * way)
 
     return at
 

@@ -12,7 +12,6 @@ from touchline.arrays import Array
 from touchline.bench.detection.pushes import AFTER, BEFORE, PushMaker, random_pushes
 from touchline.detector import calibration as cal
 from touchline.detector.detector import Detector
-from touchline.detector.tail import Tail
 from touchline.model.description import RowCalibration
 from touchline.model.robot import Robot, load_robot
 from touchline.observer.observer import Observer
@@ -47,14 +46,6 @@ class Setting:
     layout: str
     rate: float
     velocity: float
-
-
-@dataclass(frozen=True)
-class Calibrated:
-    """What came of contact-free motion: row figures, tails by segment and method, blocks."""
-
-    rows: dict[str, RowCalibration]
-    tails: dict[str, dict[str, Tail]]
 
 
 @lru_cache(maxsize=4)

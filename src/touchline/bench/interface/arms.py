@@ -58,10 +58,12 @@ class Arm:
         return touch, events
 
 
-@cache
 def arm(number: int, tier: int = 1) -> Arm:
     """An arm with so much noise (`trials.arms.TIERS`); numbers repeat after `COUNT`."""
-    if number >= COUNT:
-        return arm(number % COUNT, tier)
+    return _arm(number % COUNT, tier)
+
+
+@cache
+def _arm(number: int, tier: int) -> Arm:
     robot, real = wrong_model("panda", tier, ERROR, number, identified=True)
     return Arm(robot, real, Skin(robot))

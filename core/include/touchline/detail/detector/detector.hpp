@@ -136,11 +136,6 @@ class Detector {
   std::size_t first_row(int segment) const { return rows_.first(segment); }
   const Activity& activity() const { return motion_.activity(); }
   double baseline(int row) const { return offsets_.baseline(row); }
-  // What a row's load must exceed now, one sigma of its noise as seen, and what stood there when
-  // observation began or rests there since a contact [N or Nm].
-  double limit(int row) const { return rows_.limit(row); }
-  double noise(int row) const { return meters_.sigma(row); }
-  double offset(int row) const { return offsets_.anchor(row); }
   // How far the arm has shown that it is not as told, per row; does anything stand there now that
   // exceeds a threshold; is the noise of any row clearly larger than told?
   Standing standing(int row) const {

@@ -53,13 +53,6 @@ constexpr Turn kTurns[] = {
     {Tracking::ending, Tracking::quiet, "the detector feels nothing"},
 };
 
-constexpr bool may_follow(Tracking from, Tracking to) {
-  for (const Turn& turn : kTurns) {
-    if (turn.from == from && turn.to == to) return true;
-  }
-  return false;
-}
-
 constexpr const char* name_of(Tracking state) {
   constexpr const char* kNames[kTrackings] = {"quiet",   "suspected", "pair",    "single",
                                               "several", "newcomer",  "sliding", "ending"};

@@ -2,7 +2,7 @@
 """Writes rosbag2 recordings for tests."""
 
 import numpy as np
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
@@ -40,9 +40,15 @@ def raw(message, kind):
     return bytes(STORE.serialize_cdr(message, kind))
 
 
-def write_bag(folder, messages, kind="db3", silent=()):
-    """Write (topic, received [s], type, message); `silent` topics are announced, never written."""
-    with Writer(folder, version=9, storage_plugin=STORAGE[kind]) as writer:
+def write_bag(folder, messages, kind="db3", silent=(), packed=None):
+    """Write (topic, received [s], type, message); `silent` topics are announced, never written.
+
+    `packed` compresses each "FILE" or "MESSAGE".
+    """
+    writer = Writer(folder, version=9, storage_plugin=STORAGE[kind])
+    if packed is not None:
+        writer.set_compression(CompressionMode[packed], CompressionFormat.ZSTD)
+    with writer:
         connections = {}
         for topic, of_type in silent:
             writer.add_connection(topic, of_type, typestore=STORE)
