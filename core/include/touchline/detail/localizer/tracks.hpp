@@ -116,9 +116,13 @@ class Tracks {
       report(known.count > 0 ? known.known[0].serial : s.touched.first, single_.clear());
       return;
     }
+    own_ = share_.take(time);
+    spent_ = 0;
     if (!measurement_.can_be_followed() || settings_.first_entry) {
-      const Ask ask{Ask::kSole, again(s), true};
+      const int units = own_ / (s.touched.searched ? 1 : kFirst);
+      const Ask ask{Ask::kSole, again(s), true, units};
       report(s.touched.first, single_.locate(g, 0.0, measurement_, ask));
+      share_.spend(single_.units());
       return;
     }
     now_.lag =
@@ -127,8 +131,6 @@ class Tracks {
       pasts_[g].follow(measurement_.load(), bandwidth, time, measurement_.posture());
     if (!s.unexplained_now() || s.known.contacts.count > 1)
       s.known.contacts.age(bandwidth, time, settings_);
-    own_ = share_.take(time);
-    spent_ = 0;
     go_on(s, read);
     share_.spend(spent_);
   }
