@@ -13,6 +13,7 @@
 #include <limits>
 #include <vector>
 
+#include "touchline/detail/localizer/held_sample.hpp"
 #include "touchline/detail/localizer/joint_estimate.hpp"
 #include "touchline/detail/place/measurement.hpp"
 
@@ -76,19 +77,18 @@ class JointFit {
 
   // Takes a measurement, to be explained by an estimate and what may have changed since.
   void begin(const Measurement& measurement, const JointEstimate& estimate) {
-    const int n = n_ = estimate.size();
     fill(measurement, estimate);
-    std::fill(A_, A_ + n * n, 0.0);
-    std::fill(b_, b_ + n, 0.0);
-    square_ = 0.0;
-    for (int r = 0; r < measurement.size(); ++r) {
-      const double* d = rows_.data() + r * (n + 1);
-      for (int i = 0; i < n; ++i) {
-        b_[i] += d[i] * d[n];
-        for (int j = 0; j <= i; ++j) A_[i * n + j] += d[i] * d[j];
-      }
-      square_ += d[n] * d[n];
-    }
+    sum_up(measurement.size(), estimate.size());
+  }
+
+  // The same of a sample that has been kept.
+  void begin(const HeldSample& sample, const JointEstimate& estimate) {
+    const int n = estimate.size(), width = n + 1;
+    double* d = rows_.data();
+    for (int c = 0; c < estimate.count; ++c) sample.columns(estimate.known[c], d + kEach * c, width);
+    sample.values(d + n, width);
+    leave_unexplained(estimate, sample.size());
+    sum_up(sample.size(), n);
   }
 
   // The same of one contact, whose body was at the mean place `then` when it felt the wrench that `q`
@@ -243,14 +243,36 @@ class JointFit {
     double* d = rows_.data();
     for (int c = 0; c < estimate.count; ++c) columns(m, estimate.known[c], d + kEach * c, width);
     m.values(d + n, width);
-    for (int r = 0; r < m.size(); ++r) {
-      double* row = d + r * width;
+    leave_unexplained(estimate, m.size());
+    for (int i = 0; i < width; ++i) m.whiten(d + i, width);
+  }
+
+  // Takes what the forces explain out of the values, in the last column of so many rows.
+  void leave_unexplained(const JointEstimate& estimate, int rows) {
+    const int n = estimate.size();
+    for (int r = 0; r < rows; ++r) {
+      double* row = rows_.data() + r * (n + 1);
       for (int c = 0; c < estimate.count; ++c) {
         const Vec3& f = estimate.known[c].force;
         row[n] -= row[kEach * c] * f.x + row[kEach * c + 1] * f.y + row[kEach * c + 2] * f.z;
       }
     }
-    for (int i = 0; i < width; ++i) m.whiten(d + i, width);
+  }
+
+  // The normal equations of so many rows for `n` unknowns.
+  void sum_up(int rows, int n) {
+    n_ = n;
+    std::fill(A_, A_ + n * n, 0.0);
+    std::fill(b_, b_ + n, 0.0);
+    square_ = 0.0;
+    for (int r = 0; r < rows; ++r) {
+      const double* d = rows_.data() + r * (n + 1);
+      for (int i = 0; i < n; ++i) {
+        b_[i] += d[i] * d[n];
+        for (int j = 0; j <= i; ++j) A_[i * n + j] += d[i] * d[j];
+      }
+      square_ += d[n] * d[n];
+    }
   }
 
   // What a sample with the covariance P after it has corrected the forces by.

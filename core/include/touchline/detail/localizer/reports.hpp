@@ -44,6 +44,12 @@ class Reports {
   }
   Answer& answer(int i) { return reports_[i].answer; }
   void doubt_last() { reports_[count_ - 1].answer.status = Status::ambiguous; }
+  // The place of the last one is still searched for.
+  void search_last() {
+    Answer& answer = reports_[count_ - 1].answer;
+    answer.searching = true;
+    if (answer.status == Status::located) answer.status = Status::ambiguous;
+  }
   void doubt_last_if_wide(const LocalizerSettings& settings) {
     doubt_if_wide(reports_[count_ - 1].answer, settings);
   }

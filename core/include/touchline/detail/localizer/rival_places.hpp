@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "touchline/detail/localizer/held_sample.hpp"
 #include "touchline/detail/localizer/joint_fit.hpp"
 #include "touchline/detail/localizer/segment_contacts.hpp"
 #include "touchline/detail/place/hypothesis.hpp"
@@ -21,12 +22,25 @@ namespace touchline {
 
 class RivalPlaces {
  public:
-  RivalPlaces(const LinkSurfaces& surfaces, const LocalizerSettings& settings)
-      : surfaces_(surfaces), settings_(settings), fitter_(settings), rivals_(kMost), starts_(kRoom) {}
+  // `rows`: at most so many are measured.
+  RivalPlaces(const LinkSurfaces& surfaces, const LocalizerSettings& settings, std::size_t rows)
+      : surfaces_(surfaces),
+        settings_(settings),
+        fitter_(settings),
+        sample_(rows),
+        rivals_(kMost),
+        starts_(kRoom) {}
 
   bool any() const { return count_ > 0 || waiting_ > 0; }
+  // Has the curve yet to be followed to its ends? Until then nothing is told.
+  bool searching() const { return any() && lead_ < 0; }
 
-  void drop() { count_ = waiting_ = 0; }
+  void drop() {
+    count_ = waiting_ = 0;
+    meeting_ = false;
+    lead_ = -1;
+    taken_ = kMost;
+  }
 
   // A newcomer is admitted to contacts that were known as `before`, of which `change` may have changed.
   void begin(const JointEstimate& before, const Change& change, const KnownContact& added,
@@ -41,7 +55,6 @@ class RivalPlaces {
     prior_time_ = time;
     added_ = added;
     own_ = before.count;
-    lead_ = -1;
     for (int i = 0; i < answer.count; ++i) {
       const Candidate& k = answer.candidates[i];
       const int node = surfaces_[k.surface].node;
@@ -52,28 +65,36 @@ class RivalPlaces {
 
   // A sample that the known contacts have taken. In every 1 / K all rivals take one, the same, so that
   // what none explains speaks against none. The most probable one is what is known. `told`: what is
-  // said of the newcomer. Returns how many were followed.
+  // said of the newcomer. With about so many units of work (`PlaceTuning::search_work`): one sample is
+  // worked on for as long as that takes. Returns how many it took.
   int follow(Known& known, const SegmentSample& now, const Measurement& measurement,
-             JointFit& fit, const Change& change, KnownContact& told) {
+             JointFit& fit, const Change& change, int units, KnownContact& told) {
     if (!still(known)) drop();
     if (!any()) return 0;
-    prior_.creep(now.time - prior_time_, now.bandwidth, settings_, settings_.unrest_lasts);
-    prior_time_ = now.time;
-    int done = 0;
-    if (waiting_ > 0) {
-      for (; waiting_ > 0 && count_ < kMost; ++done) meet(next(), now, measurement, fit);
-      waiting_ = 0;
-      turn_ = now.time + now.brief();
-    } else if (now.time >= turn_ - 1e-6) {
-      turn_ = now.time + now.brief();
-      for (int i = 0; i < count_; ++i) take(rivals_[i], known, now, fit, measurement, change);
-      done += count_;
+    if (waiting_ > 0 && !meeting_) {
+      prior_.creep(now.time - prior_time_, now.bandwidth, settings_, settings_.unrest_lasts);
+      keep_history(known.contacts, prior_);
+      added_.lag = known.contacts.known[own_].lag;
+      hold(known, now, measurement, change);
+      for (int i = 0; i < waiting_; ++i) sample_.add(starts_[i].node, added_.lag);
+      meeting_ = true;
+    } else if (!working() && now.time >= turn_ - 1e-6) {
+      for (int i = 0; i < count_; ++i) keep_history(known.contacts, rivals_[i].contacts);
+      hold(known, now, measurement, change);
+      for (int i = 0; i < count_; ++i) sample_.add(own(rivals_[i]).node, own(rivals_[i]).lag);
+      taken_ = 0;
     }
-    if (count_ == 0) return done;
-    if (lead_ < 0) lead(known, most_probable());
-    const int best = most_probable();
-    if (weight(best) > weight(lead_) + kClearly) lead(known, best);
-    prune();
+    int done = 0;
+    const bool worked = working();
+    while (meeting_ && done < units) {
+      meet(next(), fit);
+      done += kMeet;
+      meeting_ = waiting_ > 0 && count_ < kMost;
+      if (!meeting_) waiting_ = 0;
+    }
+    for (; taken_ < count_ && done < units; done += kTake) take(rivals_[taken_++], fit);
+    if (count_ == 0 || meeting_) return done;
+    if (worked && !working()) conclude(known);
     told = known.contacts.known[own_];
     tell(told);
     left_ = known.contacts.known[own_].point;
@@ -101,6 +122,8 @@ class RivalPlaces {
   static constexpr double kOneSide = 0.5;  // cosine of normals, 60 degrees: the same side of a link
   static constexpr double kOne = 1e-3;     // [m] rivals that are nearer are one: a third of a sigma
   static constexpr int kTurns = 2;         // Newton steps: the second corrects some tenths of a mm
+  // Units of work: to meet a place, and for a rival to take a sample.
+  static constexpr int kMeet = 200, kTake = 80;
 
   struct Start {
     int surface, node;
@@ -114,7 +137,33 @@ class RivalPlaces {
   struct Rival {
     JointEstimate contacts;
     double evidence = 0.0, crept = 0.0, updated = 0.0;
+    double weight = 0.0;  // by the last sample that all have taken
   };
+
+  // Is there work left on the sample that is kept?
+  bool working() const { return meeting_ || taken_ < count_; }
+
+  // Keeps a sample, for all rivals.
+  void hold(const Known& known, const SegmentSample& now, const Measurement& measurement,
+            const Change& change) {
+    at_ = now;
+    change_ = change;
+    turn_ = now.time + now.brief();
+    sample_.take(measurement);
+    for (int c = 0; c < own_; ++c) {
+      const KnownContact& k = known.contacts.known[c];
+      sample_.add(k.node, k.lag);
+    }
+  }
+
+  // All have taken the sample.
+  void conclude(Known& known) {
+    for (int i = 0; i < count_; ++i) rivals_[i].weight = weigh(rivals_[i]);
+    if (lead_ < 0) lead(known, most_probable());
+    const int best = most_probable();
+    if (rivals_[best].weight > rivals_[lead_].weight + kClearly) lead(known, best);
+    prune();
+  }
 
   void wait(const Start& start) {
     if (waiting_ < kRoom) starts_[waiting_++] = start;
@@ -140,15 +189,15 @@ class RivalPlaces {
   const KnownContact& own(const Rival& r) const { return r.contacts.known[own_]; }
 
   // A place that is met is improved across the curve, and the curve followed on from it.
-  void meet(Start start, const SegmentSample& now, const Measurement& measurement, JointFit& fit) {
+  void meet(Start start, JointFit& fit) {
     const bool first = start.way == 0.0;
-    if (first) start.axis = axis_at(start, measurement, fit);
+    if (first) start.axis = axis_at(start, fit);
     Rival& r = rivals_[count_];
     const Vec3 begun = start.point;
     for (int turn = 0; turn < kTurns; ++turn) {
       set(start, r.contacts);
       narrow(start, r.contacts);
-      fit.begin(measurement, r.contacts);
+      fit.begin(sample_, r.contacts);
       if (turn == kTurns - 1) r.evidence = fit.log_evidence(r.contacts, Change::none(), 1.0);
       fit.accept(r.contacts, Change::none(), 1.0);
       const SurfacePoint p = surfaces_[start.surface].mesh.nearest_to_point(
@@ -162,8 +211,8 @@ class RivalPlaces {
           here <= cone(start.surface, start.node, start.normal, start.force))
         start.normal = p.normal;
     }
-    r.crept = now.time;
-    r.updated = now.time + now.brief();
+    r.crept = at_.time;
+    r.updated = at_.time + at_.brief();
     if (!first && norm(start.point - begun) > 2.0 * kApart) return;
     const double outside = cone(start.surface, start.node, start.normal, start.force);
     if (!std::isfinite(r.evidence) || !std::isfinite(outside)) return;
@@ -175,7 +224,7 @@ class RivalPlaces {
     if (count_ > 0 && w < best_ - kWorth) return;
     best_ = count_ > 0 ? std::max(best_, w) : w;
     ++count_;
-    const Vec3 axis = axis_at(start, measurement, fit);
+    const Vec3 axis = axis_at(start, fit);
     const double sign = dot(axis, start.axis) < 0.0 ? -1.0 : 1.0;
     for (const double way : {-1.0, 1.0}) {
       if (!first && way != start.way) continue;
@@ -217,9 +266,9 @@ class RivalPlaces {
   }
 
   // Along which a place changes while the sample is explained: the longest axis of its covariance.
-  Vec3 axis_at(const Start& start, const Measurement& measurement, JointFit& fit) {
+  Vec3 axis_at(const Start& start, JointFit& fit) {
     set(start, scratch_);
-    fit.begin(measurement, scratch_);
+    fit.begin(sample_, scratch_);
     fit.judge(scratch_);
     const int n = scratch_.size(), at = n - 2;
     const double a = scratch_.covariance[at * n + at], b = scratch_.covariance[at * n + at + 1],
@@ -230,21 +279,19 @@ class RivalPlaces {
     return std::cos(angle) * s + std::sin(angle) * t;
   }
 
-  void take(Rival& r, const Known& known, const SegmentSample& now, JointFit& fit,
-            const Measurement& measurement, const Change& change) {
-    const double passed = std::clamp(now.time - r.updated, 0.0, now.brief());
-    keep_history(known.contacts, r.contacts);
-    r.contacts.creep(std::max(0.0, now.time - r.crept), now.bandwidth, settings_,
+  void take(Rival& r, JointFit& fit) {
+    const double passed = std::clamp(at_.time - r.updated, 0.0, at_.brief());
+    r.contacts.creep(std::max(0.0, at_.time - r.crept), at_.bandwidth, settings_,
                      settings_.unrest_lasts);
-    r.crept = now.time;
-    if (passed > 0.0) r.updated = now.time;
-    const double independence = 0.5 * now.bandwidth * passed;
+    r.crept = at_.time;
+    if (passed > 0.0) r.updated = at_.time;
+    const double independence = 0.5 * at_.bandwidth * passed;
     // That restless forces change little is no evidence: how little is not known well enough.
-    Change free = change;
+    Change free = change_;
     for (int c = 0; c < r.contacts.count; ++c) {
       if (r.contacts.known[c].unrest.rate() > 0.0) free.force(c, settings_.force_scale);
     }
-    fit.begin(measurement, r.contacts);
+    fit.begin(sample_, r.contacts);
     r.evidence += fit.log_evidence(r.contacts, free, independence);
     fit.accept(r.contacts, free, independence);
   }
@@ -268,9 +315,8 @@ class RivalPlaces {
   }
   double cone(const KnownContact& k) const { return cone(k.surface, k.node, k.normal, k.force); }
 
-  double weight(int i) const {
-    const double outside = std::min(cone(own(rivals_[i])), 2.0 * kNegligible);
-    return rivals_[i].evidence - 0.5 * outside;
+  double weigh(const Rival& r) const {
+    return r.evidence - 0.5 * std::min(cone(own(r)), 2.0 * kNegligible);
   }
 
   int most_probable() const {
@@ -300,10 +346,10 @@ class RivalPlaces {
   // Leaves out what is improbable; those that have come to one place are one.
   void prune() {
     best_ = -std::numeric_limits<double>::infinity();
-    for (int i = 0; i < count_; ++i) best_ = std::max(best_, weight(i));
+    for (int i = 0; i < count_; ++i) best_ = std::max(best_, rivals_[i].weight);
     for (int i = count_ - 1; i >= 0; --i) {
       if (i == lead_) continue;
-      if (weight(i) < best_ - kNegligible) {
+      if (rivals_[i].weight < best_ - kNegligible) {
         remove(i);
         continue;
       }
@@ -314,6 +360,7 @@ class RivalPlaces {
         if (other.surface != k.surface || norm(other.point - k.point) > kOne) continue;
         double &a = rivals_[j].evidence, b = rivals_[i].evidence;
         a = std::max(a, b) + std::log1p(std::exp(-std::fabs(a - b)));
+        rivals_[j].weight = weigh(rivals_[j]);
         remove(i);
         break;
       }
@@ -323,7 +370,7 @@ class RivalPlaces {
   // What all together say of the newcomer: one place of those on one side of the link, and the others.
   void tell(KnownContact& told) const {
     double probability[kMost], sum = 0.0;
-    for (int i = 0; i < count_; ++i) sum += probability[i] = std::exp(weight(i) - best_);
+    for (int i = 0; i < count_; ++i) sum += probability[i] = std::exp(rivals_[i].weight - best_);
     for (int i = 0; i < count_; ++i) probability[i] /= sum;
     const KnownContact& best = own(rivals_[lead_]);
     bool mine[kMost];
@@ -394,6 +441,13 @@ class RivalPlaces {
   const LocalizerSettings& settings_;
   ForceFitter fitter_;
   JointEstimate prior_, scratch_;  // what was known before; room
+  // The sample that is worked on, what may have changed in it, and how many have taken it. Is the curve
+  // still followed?
+  HeldSample sample_;
+  SegmentSample at_;
+  Change change_;
+  int taken_ = kMost;
+  bool meeting_ = false;
   double turn_ = 0.0, prior_time_ = 0.0, best_ = 0.0;
   KnownContact added_;
   int own_ = 0, lead_ = -1;  // which contact, and which leads

@@ -38,7 +38,7 @@ class Tracks {
         reports_(single.surfaces()),
         pasts_(segments, Past(measurement.posture().nodes().size(), settings.past_worn)),
         looked_(segments),
-        rivals_(segments, RivalPlaces(single.surfaces(), settings)),
+        rivals_(segments, RivalPlaces(single.surfaces(), settings, rows)),
         share_(settings.search_work),
         arrivals_(single, measurement, settings, fit_, known_, reports_, lone_, rivals_, period),
         merging_(single.surfaces(), settings, fit_, known_, reports_),
@@ -116,9 +116,13 @@ class Tracks {
       report(known.count > 0 ? known.known[0].serial : s.touched.first, single_.clear());
       return;
     }
+    own_ = share_.take(time);
+    spent_ = 0;
     if (!measurement_.can_be_followed() || settings_.first_entry) {
-      const Ask ask{Ask::kSole, again(s), true};
+      const int units = own_ / (s.touched.searched ? 1 : kFirst);
+      const Ask ask{Ask::kSole, again(s), true, units};
       report(s.touched.first, single_.locate(g, 0.0, measurement_, ask));
+      share_.spend(single_.units());
       return;
     }
     now_.lag =
@@ -127,8 +131,6 @@ class Tracks {
       pasts_[g].follow(measurement_.load(), bandwidth, time, measurement_.posture());
     if (!s.unexplained_now() || s.known.contacts.count > 1)
       s.known.contacts.age(bandwidth, time, settings_);
-    own_ = share_.take(time);
-    spent_ = 0;
     go_on(s, read);
     share_.spend(spent_);
   }
@@ -157,11 +159,16 @@ class Tracks {
     return alone;
   }
 
+  // Units of work that are left beside what the known contacts take.
+  int beside(const SegmentContacts& s) const {
+    const int left = own_ - spent_ - kKnown - kEachKnown * (s.known.contacts.count - 1);
+    return std::max(left, own_ / kLeast);
+  }
+
   template <class Read>
   void arrive(SegmentContacts& s, Read&& read) {
-    const int beside = own_ - spent_ - kKnown - kEachKnown * (s.known.contacts.count - 1);
     const bool first = s.unexplained.since == now_.time;
-    const int most = first ? own_ / kLeast : std::max(beside, own_ / kLeast);
+    const int most = first ? own_ / kLeast : beside(s);
     spent_ += most - arrivals_.follow(s, now_, most, read);
     suspect_ = arrivals_.suspect();
   }
@@ -304,12 +311,11 @@ class Tracks {
     merging_.follow(s, now_);
     KnownContact newcomer;
     RivalPlaces& rivals = rivals_[now_.segment];
-    const bool contested = rivals.any();
-    if (contested)
-      spent_ += kEachKnown *
-                rivals.follow(s.known, now_, measurement_, fit_, known_.change(), newcomer);
+    if (rivals.any())
+      spent_ += rivals.follow(s.known, now_, measurement_, fit_, known_.change(), beside(s), newcomer);
     for (const KnownContact* k = known.known; k != known.known + known.count; ++k)
       report_one_of_several(k->serial == newcomer.serial ? newcomer : *k);
+    if (rivals.searching()) reports_.search_last();  // the newcomer was added last
     release(s);
     s.enter_known();
   }

@@ -69,7 +69,7 @@ class Explanations {
   template <class MeanOf>
   void find(int g, MeanOf&& mean, const Doubt& doubt, Measurement& measurement, const Ask& ask) {
     count_ = used_ = units_ = 0;
-    all_ = left_ = measurement.has_wrench() ? ask.units : Ask::kAll;
+    all_ = left_ = ask.units;
     complete_ = true;
     course_ = &courses_[g * Ask::kCourses + ask.course];
     best_ = std::numeric_limits<double>::infinity();
@@ -134,6 +134,7 @@ class Explanations {
   static constexpr int kMost = 192, kStarts = 3, kPassed = 4;
   static constexpr int kSome = 150;   // units of work on a point beside the line: some ten trials
   static constexpr int kNearest = 2;  // units of work: a box beside a line takes as long as so many others
+  static constexpr int kTried = 3;    // units of work: a point that is tried, without looking for it
   static constexpr double kRounding = 1e-9;  // a part of costs and weights, far above what they err by
 
   // Can any point explain, by the bounds that each body sets: the misfit of the best wrench at all,
@@ -155,6 +156,8 @@ class Explanations {
     int surface = -1;
     Vec3 point{}, normal{};
     bool waits = false;  // has it yet to be improved?
+    bool spread = false;  // was it found among points that are spread over the body?
+    bool fresh = false;   // has a search ended there in this sample?
     bool moved = false;  // has it been, in this sample, and where to?
     Vec3 next_point{}, next_normal{};
   };
@@ -167,6 +170,13 @@ class Explanations {
     Start best[kPassed];
   };
 
+  // The same of the points spread over a body: which of a surface's is next, and how many of its best few
+  // have been improved.
+  struct SpreadLook {
+    int body = -1, surface = 0, sample = 0, count = 0, improved = 0;
+    Start best[kStarts];
+  };
+
   // What is left of earlier searches for one purpose.
   struct Course {
     Course(std::size_t bodies, std::size_t surfaces) : due(bodies, 0), missed(surfaces) {
@@ -176,7 +186,7 @@ class Explanations {
     void forget() {
       starts.clear();
       std::fill(due.begin(), due.end(), 0);
-      look.body = -1;
+      look.body = spread.body = -1;
       for (Start& start : missed) start.surface = -1;
       complete = false;
     }
@@ -198,22 +208,29 @@ class Explanations {
     std::vector<Start> starts;
     std::vector<char> due;      // per body: has it yet to be searched?
     Look look;
+    SpreadLook spread;
     std::vector<Start> missed;  // per surface that a line misses: the best point; surface -1: not known
     bool complete = false;      // has all been looked at once, that may explain?
   };
 
   // What must be searched for costs more, so it comes last and only where it may matter. What had to
-  // wait in the last sample comes first. Joint torques alone leave so much open that a part of a search
-  // is no use.
+  // wait in the last sample comes first.
   void search(const Ask& ask, bool has_wrench) {
     const bool was_cut = course_->cut();
     waited_ = course_->waits();
+    has_wrench_ = has_wrench;
     const bool anew = !ask.again && !was_cut;
-    for (Start& s : course_->starts) s.moved = false;
+    for (Start& s : course_->starts) s.moved = s.fresh = false;
+    looking_ = anew || was_cut;
+    if (has_wrench) {
+      course_->spread.body = -1;
+    } else {
+      left_ -= kTried * static_cast<int>(course_->starts.size());
+    }
     for (int i = 0; i < used_; ++i) turns_[i] = turn_of(views_[i]);
     for (const Turn turn : {Turn::begun, Turn::due, Turn::waits, Turn::last}) {
       for (int i = 0; i < used_; ++i) {
-        if (turns_[i] == turn) search(views_[i], anew || turn < Turn::waits, has_wrench);
+        if (turns_[i] == turn) search(views_[i], anew || turn < Turn::waits);
       }
     }
     units_ = all_ - left_;
@@ -227,7 +244,7 @@ class Explanations {
   enum class Turn : char { begun, due, waits, last };
 
   Turn turn_of(const View& view) const {
-    if (course_->look.body == view.body) return Turn::begun;
+    if (course_->look.body == view.body || course_->spread.body == view.body) return Turn::begun;
     if (course_->due[view.body]) return Turn::due;
     const auto waits = [&](const Start& s) { return s.waits && surfaces_[s.surface].node == view.node; };
     const auto& all = course_->starts;
@@ -235,27 +252,32 @@ class Explanations {
   }
 
   // `anew`: or does what has been found before serve?
-  void search(View& view, bool anew, bool has_wrench) {
+  void search(View& view, bool anew) {
     char& due = course_->due[view.body];
     due = 0;
     if (!(view.floor < best_ + settings_.relevant)) {
-      if (anew) drop_starts(view);
+      if (anew) drop([&](const Start& s) { return surfaces_[s.surface].node == view.node; });
       give_up(view);
       return;
     }
     if (view.line) {
-      beside(view, anew);
+      beside(view, anew && course_->spread.body != view.body);
     } else if (anew) {
       drop_starts(view);
     }
-    if (!has_wrench) search_spread(view, anew);
+    if (!has_wrench_) search_spread(view, anew);
   }
 
+  // Those of a body that belong to a line.
   void drop_starts(const View& view) {
+    drop([&](const Start& s) {
+      return surfaces_[s.surface].node == view.node && !(s.spread && !has_wrench_);
+    });
+  }
+  template <class Which>
+  void drop(Which&& which) {
     auto& all = course_->starts;
-    all.erase(std::remove_if(all.begin(), all.end(),
-                             [&](const Start& s) { return surfaces_[s.surface].node == view.node; }),
-              all.end());
+    all.erase(std::remove_if(all.begin(), all.end(), which), all.end());
   }
 
   // All entries of the line into the body.
@@ -289,11 +311,11 @@ class Explanations {
     if (later) course_->due[view.body] = 1;
     if (anew && !later) drop_starts(view);
     const bool passed = searched ? pass(view)
-                                 : near && revisit(view, settings_.fine, settings_.faces_apart);
+                                 : near && revisit(view, settings_.fine, settings_.faces_apart, false);
     for (int i = 0; searched && i < found; ++i) {  // what is entered now may be missed next
       if (candidates_[i].view == own) remember(view, candidates_[i], false);
     }
-    if (!view.met && !passed) miss(view);
+    if (!view.met && !passed && (has_wrench_ || anew)) miss(view);
     if (view.steep || left_ <= 0) return;
     for (int i = 0; i < found && count_ < kMost; ++i) {
       if (candidates_[i].view != own) continue;
@@ -315,6 +337,7 @@ class Explanations {
   // Nothing of a body is waited for that cannot explain by now.
   void give_up(const View& view) {
     if (course_->look.body == view.body) course_->look.body = -1;
+    if (course_->spread.body == view.body) course_->spread.body = -1;
     for (Start& s : course_->starts) s.waits = s.waits && surfaces_[s.surface].node != view.node;
   }
 
@@ -402,12 +425,12 @@ class Explanations {
   }
 
   // Starts from where the last search has ended, within `around` [m]. Returns whether it has found
-  // anything on this body.
-  bool revisit(View& view, double finest, double around) {
+  // anything on this body. Points that are `spread` are not improved as long as others are looked for.
+  bool revisit(View& view, double finest, double around, bool spread) {
     bool any = false;
     for (Start& start : course_->starts) {
-      if (surfaces_[start.surface].node != view.node) continue;
-      const bool wanted = start.waits || !waited_;
+      if (surfaces_[start.surface].node != view.node || start.spread != spread) continue;
+      const bool wanted = !start.fresh && (start.waits || !(waited_ || (spread && looking_)));
       if (wanted) start.waits = false;
       if (count_ == kMost) continue;
       any = true;
@@ -428,12 +451,13 @@ class Explanations {
     return any;
   }
 
-  // `waits`: has it yet to be improved?
-  void remember(const View& view, const Candidate& k, bool waits) {
-    if (course_->starts.size() == kMost || !(k.fit.cost() < best_ + settings_.relevant)) return;
+  // `waits`: has it yet to be improved? Returns whether it is worth it.
+  bool remember(const View& view, const Candidate& k, bool waits) {
+    if (course_->starts.size() == kMost || !(k.fit.cost() < best_ + settings_.relevant)) return false;
     Start start = start_of(view, k);
     start.waits = waits;
     course_->starts.push_back(start);
+    return true;
   }
 
   Start start_of(const View& view, const Candidate& k) const {
@@ -524,32 +548,73 @@ class Explanations {
     k.fit = fitter_.fit(view.q, view.earlier(k.point), k.normal, surfaces_[surface].graspable, limit);
   }
 
-  // Without a line: the best of the points spread over each link, each improved.
+  // Without a wrench: the best of the points spread over each link, each improved. Until all of a surface
+  // have been, those that were found before stand.
   void search_spread(View& view, bool anew) {
-    if (!anew) {
-      revisit(view, settings_.coarse, 4.0 * settings_.coarse);
-      return;
+    const bool looked = anew && course_->look.body != view.body && look_over(view);
+    if (anew && !looked) course_->due[view.body] = 1;
+    revisit(view, settings_.coarse, 4.0 * settings_.coarse, true);
+  }
+
+  // Returns whether all surfaces of a body have been looked over; if not, the next sample goes on.
+  bool look_over(View& view) {
+    SpreadLook& look = course_->spread;
+    if (look.body < 0) look = SpreadLook{}, look.body = view.body;
+    if (look.body != view.body) return false;
+    const int surfaces = static_cast<int>(view.surfaces->size());
+    while (look.surface < surfaces && count_ < kMost) {
+      if (!look_over(view, (*view.surfaces)[look.surface], look)) return false;
+      const int next = look.surface + 1;
+      look = SpreadLook{};
+      look.body = view.body;
+      look.surface = next;
     }
-    for (int s : *view.surfaces) {
-      Candidate starts[kStarts];
-      int found = 0;
-      for (const SurfaceSample& sample : surfaces_.samples(s)) {
-        if (count_ == kMost) return;
-        const double few = settings_.rough_few;
-        const double limit = std::max(
-            best_ + settings_.rough, found < kStarts ? few : worst(starts, found)->fit.cost());
-        place(view, s, surfaces_.to_world(sample.point, view.node),
-              surfaces_.turn_to_world(sample.normal, view.node), limit);
-        found = insert(starts, kStarts, found, candidates_[count_], settings_.start_spacing);
-      }
-      for (int i = 0; i < found && count_ < kMost; ++i) {
-        Candidate& k = candidates_[count_] = starts[i];
-        if (!refinement_.descend(view, k, left_) && k.fit.cost() < best_ + settings_.rough)
-          refinement_.settle(view, k, settings_.coarse, 0.8 * settings_.start_spacing, left_);
-        remember(view, k, false);
-        if (!known(0, settings_.same_point)) keep();
-      }
+    look.body = -1;
+    return true;
+  }
+
+  bool look_over(View& view, int surface, SpreadLook& look) {
+    const std::vector<SurfaceSample>& samples = surfaces_.samples(surface);
+    const int all = static_cast<int>(samples.size());
+    Candidate starts[kStarts];
+    int found = 0;
+    for (; found < look.count; ++found) starts[found] = placed(view, look.best[found]);
+    for (; look.sample < all && left_ > 0; ++look.sample, left_ -= kTried) {
+      const SurfaceSample& sample = samples[look.sample];
+      const double few = settings_.rough_few;
+      const double limit = std::max(
+          best_ + settings_.rough, found < kStarts ? few : worst(starts, found)->fit.cost());
+      place(view, surface, surfaces_.to_world(sample.point, view.node),
+            surfaces_.turn_to_world(sample.normal, view.node), limit);
+      found = insert(starts, kStarts, found, candidates_[count_], settings_.start_spacing);
     }
+    for (; look.sample == all && look.improved < found && left_ > 0; ++look.improved)
+      improve_rough(view, starts[look.improved]);
+    const bool done = look.sample == all && look.improved == found;
+    if (done) drop([&](const Start& s) { return s.surface == surface && s.spread; });
+    look.count = found;
+    for (int i = 0; i < found; ++i) {
+      look.best[i] = start_of(view, starts[i]);
+      if (!done || !remember(view, starts[i], false)) continue;
+      course_->starts.back().spread = course_->starts.back().fresh = true;
+    }
+    return done;
+  }
+
+  // A point that is as rough as those of a surface are far apart: some work there is for it.
+  void improve_rough(const View& view, Candidate& k) {
+    const int more = std::max(0, kSome - left_);
+    left_ += more;
+    if (!refinement_.descend(view, k, left_) && k.fit.cost() < best_ + settings_.rough)
+      refinement_.settle(view, k, settings_.coarse, 0.8 * settings_.start_spacing, left_);
+    left_ -= more;
+  }
+
+  // A start, as it explains now.
+  Candidate placed(const View& view, const Start& start) {
+    place(view, start.surface, surfaces_.to_world(start.point, view.node),
+          surfaces_.turn_to_world(start.normal, view.node));
+    return candidates_[count_];
   }
 
   const Posture& posture_;
@@ -566,6 +631,7 @@ class Explanations {
   Course* course_ = nullptr;
   int all_ = 0, left_ = 0, units_ = 0;
   bool waited_ = false, complete_ = true;
+  bool looking_ = false, has_wrench_ = false;  // is anything looked for anew; is a wrench measured?
   std::vector<Turn> turns_;
   // Of the body at hand: the faces that the line passes.
   Candidate passed_[kPassed];
