@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from touchline.arrays import Array
-from touchline.simulation.plant import Plant
+from touchline.simulation.plant import Plant, steady_share
 
 
 @dataclass(frozen=True)
@@ -55,16 +55,22 @@ class JointImpedance:
         trajectory: setpoint by time [s].
         stiffness: (n,) [Nm/rad].
         damping: (n,) [Nm s/rad].
+        rate: at which torques are asked for [Hz]; each is held until the next. Where a stretched
+            arm has too little inertia for dampers that are held, spring and damper are softer.
+            None: with each step of the physics, as they are.
     """
 
     trajectory: Trajectory
     stiffness: Array
     damping: Array
+    rate: float | None = None
 
     def torque(self, plant: Plant) -> Array:
         """Motor torques (n,) [Nm or N]."""
         goal = self.trajectory(plant.time)
         spring = self.stiffness * (goal.q - plant.q) + self.damping * (goal.qd - plant.qd)
+        if self.rate is not None:
+            spring *= steady_share(plant.inertia(), self.damping, self.rate)
         forward = plant.inertia_times(goal.qdd) + plant.bias_torque() + plant.friction_torque()
         return forward + spring
 

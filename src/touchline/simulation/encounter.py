@@ -220,7 +220,7 @@ class EncounterScene:
         rng = np.random.default_rng([settings.seed, 6, seed])
         sensors = LiveSensors(plant, count, settings.rate, settings.noise, rng)
         pipeline = Pipeline(self.robot, period=1.0 / settings.rate, skin=self.skin)
-        own: Controller = impedance(self.setup, trajectory)
+        own: Controller = impedance(self.setup, trajectory, settings.control)
         contacts: list[Contacts] = [self.obstacle]
         if hand is not None:
             own = led(self.setup, encounter.q)

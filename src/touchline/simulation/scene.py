@@ -102,11 +102,14 @@ def describe(robot: Robot, settings: Run) -> dict[str, Any]:
     }
 
 
-def impedance(setup: Setup, trajectory: Trajectory) -> Tracking:
-    """Joint impedance with the robot's gains, or computed torque where none are known."""
+def impedance(setup: Setup, trajectory: Trajectory, rate: float | None = None) -> Tracking:
+    """Joint impedance with the robot's gains, or computed torque where none are known.
+
+    `rate`: as of `JointImpedance`.
+    """
     if setup.stiffness is None or setup.damping is None:
         return ComputedTorque(trajectory)
-    return JointImpedance(trajectory, setup.stiffness, setup.damping)
+    return JointImpedance(trajectory, setup.stiffness, setup.damping, rate)
 
 
 def wandering(

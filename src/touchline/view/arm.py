@@ -92,7 +92,7 @@ class LiveArm:
         self._plant = Plant(robot, PHYSICS)
         self._plant.reset(self._setup.home)
         self._plant.evaluate()
-        self._controller = ReactingImpedance(robot, self._impedance(1.0), self._trajectory, RATE)
+        self._controller = ReactingImpedance(robot, self._impedance(1.0), self._trajectory)
         self._simulation = Simulation(
             self._plant, self._controller, [self.hands], Rates(RATE, RATE)
         )
@@ -103,7 +103,7 @@ class LiveArm:
 
     def _impedance(self, share: float) -> JointImpedance:
         stiffness, damping = self._gains
-        return JointImpedance(self._trajectory, share * stiffness, np.sqrt(share) * damping)
+        return JointImpedance(self._trajectory, share * stiffness, np.sqrt(share) * damping, RATE)
 
     @property
     def time(self) -> float:

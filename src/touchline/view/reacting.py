@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The arm's controller on the live page: its own impedance, until a reaction takes over."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from touchline.arrays import Array
@@ -12,7 +10,7 @@ from touchline.reaction.reactor import Reactor
 from touchline.reaction.state import State
 from touchline.result.contact import Contact
 from touchline.simulation.control import JointImpedance
-from touchline.simulation.plant import Plant, steady_share
+from touchline.simulation.plant import Plant
 from touchline.view.motion import Switched
 
 CALM = 1.0  # s without contact, after which what a collision called for ends
@@ -25,7 +23,6 @@ class ReactingImpedance:
         robot: for the reactions' own dynamics.
         impedance: about `trajectory`.
         trajectory: to which the arm eases back after a reaction.
-        rate: at which torques are asked for [Hz]; each is held until the next.
 
     Attributes:
         reaction: to every contact, of `contact.reaction.REACTIONS`.
@@ -33,13 +30,11 @@ class ReactingImpedance:
         tau_ext: (n,) external joint torques that are felt now [Nm]; None: not yet.
     """
 
-    def __init__(
-        self, robot: Robot, impedance: JointImpedance, trajectory: Switched, rate: float
-    ) -> None:
+    def __init__(self, robot: Robot, impedance: JointImpedance, trajectory: Switched) -> None:
         self.impedance, self.reaction = impedance, "ignore"
         self.contacts: list[Contact] = []
         self.tau_ext: Array | None = None
-        self._robot, self._trajectory, self._rate = robot, trajectory, rate
+        self._robot, self._trajectory = robot, trajectory
         self._reactor: Reactor | None = None
         self._reacts_by = "ignore"
         self._touched = -np.inf
@@ -53,7 +48,7 @@ class ReactingImpedance:
         """Motor torques (n,) [Nm] for the plant's present state."""
         before = self.active
         self._choose(plant.time)
-        own = self._own(plant)
+        own = self.impedance.torque(plant)
         torque = own
         if self._reactor is not None:
             friction = plant.friction_torque()  # a state's torques are those behind the drives
@@ -62,15 +57,8 @@ class ReactingImpedance:
             torque = self._reactor.update(self.contacts, state).torque + friction
         if before and not self.active:
             self._trajectory.resume(plant.q, plant.time)
-            torque = self._own(plant)
+            torque = self.impedance.torque(plant)
         return torque
-
-    def _own(self, plant: Plant) -> Array:
-        """Impedance, softer where the stretched arm has too little inertia for held dampers."""
-        wanted = self.impedance
-        share = steady_share(plant.inertia(), wanted.damping, self._rate)
-        stiffness, damping = share * wanted.stiffness, share * wanted.damping
-        return replace(wanted, stiffness=stiffness, damping=damping).torque(plant)
 
     def _choose(self, time: float) -> None:
         """Takes on the reaction that is set, and ends one that lasts beyond its contact."""
