@@ -75,7 +75,7 @@ def test_a_newcomer_is_in_its_region_all_the_time():
 
 @pytest.mark.parametrize(("run", "seed"), [(95, 5), (69, 7)])
 def test_an_event_is_no_surer_of_its_place_than_any_sample(run, seed):
-    """Samples that are ambiguous all along are wrong alike: they do not add up to a place."""
+    """Followed contacts: each sample speaks of all before it, so that they do not add up."""
     robot, _, skin = told_and_real(CELL, run)
     scene = make_scene(CELL, run, seed)
     pipeline, s = make_pipeline(robot, skin), scene.signals
