@@ -41,6 +41,7 @@ def test_a_place_that_creeps_is_no_surer_than_right(run):
     [
         pytest.param(95, 5, id="behind the link, where one more curve explains"),
         pytest.param(29, 6, id="along a curve on a round link"),
+        pytest.param(32, 6, id="behind an edge, where no force on it is in the cone"),
         pytest.param(69, 0, id="three centimetres along the link"),
     ],
 )
@@ -74,7 +75,7 @@ def test_a_newcomer_is_in_its_region_all_the_time():
 
 @pytest.mark.parametrize(("run", "seed"), [(95, 5), (69, 7)])
 def test_an_event_is_no_surer_of_its_place_than_any_sample(run, seed):
-    """Samples that are ambiguous all along are wrong alike: their evidence does not add up to a place."""
+    """Followed contacts: each sample speaks of all before it, so that they do not add up."""
     robot, _, skin = told_and_real(CELL, run)
     scene = make_scene(CELL, run, seed)
     pipeline, s = make_pipeline(robot, skin), scene.signals

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A third hand beside two that are held, on an arm that turns: it is found, and no channel's error."""
+"""A third hand beside two that are held, on an arm that turns: it is no channel's error."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ NEAR = 5e-3  # m
 
 
 def last_places(arm, run, seed):
-    """Distances [m] of each touch from the nearest contact at the last sample, and their statuses."""
+    """Each touch's distance [m] from the nearest contact at the last sample; the statuses."""
     cell = Cell(arm, 3, 1, "apart", 1.0)
     robot, _, skin = told_and_real(cell, run)
     scene = make_scene(cell, run, seed)

@@ -52,6 +52,9 @@ class EventPlace {
     return true;
   }
 
+  // The sample is of one of several contacts, which are followed: each sample speaks of all before it.
+  void follow() { followed_ = true; }
+
   // Explanations of a sample that no single force explains count only as long as there is no other.
   bool open(int status, bool explained) {
     ++statuses_[status];
@@ -140,6 +143,9 @@ class EventPlace {
   const Place& place(int i) const { return places_[i]; }
   // At which the most probable place was found there last [s].
   double time() const { return count_ > 0 && places_[0].slot >= 0 ? places_[0].time : time_; }
+  // May the most probable place be sure? Of a contact that is followed only if a sample was sure of it:
+  // what they say in common does not add up.
+  bool may_be_sure() const { return !followed_ || places_[0].sure; }
   bool mostly_unexplained() const { return 2 * unexplained_ > samples_; }
   int frequent(int a, int b) const { return statuses_[a] >= statuses_[b] ? a : b; }
 
@@ -208,6 +214,7 @@ class EventPlace {
   int count_ = 0, samples_ = 0, explained_ = 0, unexplained_ = 0;
   int statuses_[5] = {};
   double peak_ = 0.0, time_ = 0.0, independence_ = 1.0, missed_ = 0.0;
+  bool followed_ = false;
   double variance_ = 0.0, lasting_ = 0.0;  // sums over the explained samples
 };
 

@@ -182,8 +182,7 @@ class Localizer {
         here += b.share;
     }
     const bool sharp = event.variance() < settings_.spread_limit() * settings_.spread_limit();
-    // What no sample has been sure of is not sure.
-    const bool sure = event.place(0).sure && here >= settings_.certain && sharp && !m.undetermined;
+    const bool sure = event.may_be_sure() && here >= settings_.certain && sharp && !m.undetermined;
     return sure ? Status::located : Status::ambiguous;
   }
 
@@ -224,6 +223,7 @@ class Localizer {
       m.revision = links_.revision();
     }
     if (!m.event.begin_sample(strength, time, 0.5 * period_ * bandwidth(g), settings_)) return;
+    if (reports().count() > 1) m.event.follow();
     keep(m, EventPlace::kPlaces, q);
     const bool explained =
         answer.status == Status::located || answer.status == Status::ambiguous;

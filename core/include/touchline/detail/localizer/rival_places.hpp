@@ -117,6 +117,9 @@ class RivalPlaces {
   static constexpr double kSigma = 3e-3, kApart = 2.0 * kSigma;
   static constexpr double kFirst = std::numeric_limits<double>::infinity();
   static constexpr double kWorth = 8.0;  // nats below the best: 1 in 3000, no curve is followed there
+  // Places in a row whose forces are outside of the cone, over which a curve is followed: 3.6 cm, a round
+  // edge of a link. Half: the face behind it is missed. Double: time.
+  static constexpr int kOutside = 6;
   static constexpr double kNegligible = 10.0;  // nats below the best: 5e-5, that counts as nothing
   static constexpr double kClearly = 0.7;  // nats: twice as probable is another one that leads
   static constexpr double kOneSide = 0.5;  // cosine of normals, 60 degrees: the same side of a link
@@ -132,6 +135,7 @@ class RivalPlaces {
     Vec3 axis;           // along the curve, in the frame of the node; none of a first one
     double way;          // -1, 1: which way the curve is followed, 0: both
     double worth;        // nats: of the one that it is beside; a first one comes first
+    int outside = 0;     // places just before it on the curve that are outside of the cone
   };
 
   struct Rival {
@@ -221,9 +225,13 @@ class RivalPlaces {
       if (k.surface == start.surface && norm(k.point - start.point) < 0.5 * kApart) return;
     }
     const double w = r.evidence - 0.5 * outside;
-    if (count_ > 0 && w < best_ - kWorth) return;
-    best_ = count_ > 0 ? std::max(best_, w) : w;
-    ++count_;
+    const bool worth = count_ == 0 || w >= best_ - kWorth;
+    if (worth) {
+      best_ = count_ > 0 ? std::max(best_, w) : w;
+      ++count_;
+    } else if (first || start.outside == kOutside || r.evidence < best_ - kWorth) {
+      return;
+    }
     const Vec3 axis = axis_at(start, fit);
     const double sign = dot(axis, start.axis) < 0.0 ? -1.0 : 1.0;
     for (const double way : {-1.0, 1.0}) {
@@ -233,7 +241,8 @@ class RivalPlaces {
       if (p.face < 0 || norm(p.point - start.point) < 0.5 * kApart) continue;
       const Vec3 along = sign * axis - dot(sign * axis, p.normal) * p.normal;
       wait({start.surface, start.node, p.point, p.normal, start.force,
-            (1.0 / std::max(norm(along), 1e-9)) * along, way, w});
+            (1.0 / std::max(norm(along), 1e-9)) * along, way, worth ? w : r.evidence - kWorth,
+            worth ? 0 : start.outside + 1});
     }
   }
 
