@@ -132,7 +132,7 @@ def test_lerobot(lerobot, robot, capsys):
     before, files = read(lerobot), {p: p.read_bytes() for p in lerobot.rglob("*") if p.is_file()}
     assert main(["label", str(lerobot), "--robot", "sara"]) == 0
     out = capsys.readouterr().out
-    assert "3 episodes, 1500 samples at 100 Hz" in out and "1 touches" in out
+    assert "3 episodes, 1500 samples at 100 Hz" in out and "1 touch," in out
     assert "95 % of the pushes are felt from" in out
     after = read(lerobot)
     assert after.select(before.column_names).equals(before)

@@ -343,9 +343,7 @@ def driving(windows: Windows, j: int) -> float:
     qd, reading = windows.qd[:, j], windows.torque[:, j]
     expected, acceleration = windows.expected_torque[:, j], windows.acceleration[:, j]
     usable = np.isfinite(np.column_stack([qd, reading, expected, acceleration])).all(axis=1)
-    qd, reading, expected, acceleration = (
-        x[usable] for x in (qd, reading, expected, acceleration)
-    )
+    qd, reading, expected, acceleration = (x[usable] for x in (qd, reading, expected, acceleration))
     if not len(qd) or min((qd > MOVED).mean(), (qd < -MOVED).mean()) <= BOTH_WAYS:
         return 0.0
     columns = [np.tanh(qd / MOVED), qd, acceleration, np.ones(len(qd))]

@@ -144,7 +144,8 @@ def forecast_text(told: Forecast) -> str:
         + (f" and {unknown} of unknown length" if unknown else "")
         + f", {size:.1f} MB"
     )
-    source = f"as {counted(told.measured, 'recording')} before" if told.measured else "as of an arm at 1 kHz"
+    before = f"as {counted(told.measured, 'recording')} before"
+    source = before if told.measured else "as of an arm at 1 kHz"
     lines.append(
         f"about {lasting(max(told.seconds, 1.0))} with {counted(told.workers, 'process', 'es')} "
         f"({told.cost * HOUR:.0f} s of CPU an hour, {source}); nothing was done"

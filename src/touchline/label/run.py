@@ -91,7 +91,8 @@ def labelled_text(done: Labelled, robot: Robot) -> str:
     share = 100.0 * done.touched / done.samples if done.samples else 0.0
     lines = [
         f"{counted(done.episodes, 'episode')}, {done.samples} samples at {done.rate:.4g} Hz "
-        f"({done.seconds / 3600:.2f} h): {counted(done.touches, 'touch', 'es')}, {share:.1f} % of the samples"
+        f"({done.seconds / 3600:.2f} h): {counted(done.touches, 'touch', 'es')}, "
+        f"{share:.1f} % of the samples"
     ]
     slow, fast = (_forces(robot, rate) for rate in (done.rate, FAST))
     if slow:
