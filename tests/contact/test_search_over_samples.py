@@ -10,7 +10,9 @@ from touchline.trials.cell import Cell
 from touchline.trials.scene import arm_and_skin, make_scene
 
 NEWCOMER, WEAK = Cell("sara", 3, 1), Cell("sara", 1, 1, speed=0.5, force=2.0)
-RUNS = {NEWCOMER: 3, WEAK: 5}  # what came last is explained by many places at first, then by one
+TREMBLING, TORQUES = Cell("sara", 2, 1, hands="trembling"), Cell("panda-torques", 1, 1)
+# What came last is explained by many places at first, then by one.
+RUNS = {NEWCOMER: 3, WEAK: 5, TREMBLING: 0, TORQUES: 4}
 FEW, AS_IT_IS, ALL = 300, 1000, 1_000_000_000  # units of work in a sample
 
 
@@ -34,8 +36,10 @@ def by_link(contacts: list[Contact]) -> list[Contact]:
     return sorted(contacts, key=lambda contact: str(contact.link))
 
 
-@pytest.fixture(scope="module", params=[NEWCOMER, WEAK], ids=["newcomer", "weak"])
+@pytest.fixture(scope="module", params=RUNS, ids=["newcomer", "weak", "trembling", "torques"])
 def cell(request) -> Cell:
+    if request.param.arm == "panda-torques":
+        pytest.importorskip("pinocchio", reason="comes with example-robot-data, the arm's model")
     return request.param
 
 

@@ -32,6 +32,9 @@ IDLE = 1.0  # s of a run without contact
 WEAK = (2.0, 5.0)  # N: what many places of several links explain, and
 SPEED = 0.5  # rad/s of every joint meanwhile
 KINDS = ("contact", "collision")  # of two hands that clamp a link, in turn
+LINES = 10 + len(WEAK)  # of an arm
+ALONE = {"panda": "panda-torques"}  # the same arm without a six-axis sensor
+ALONE_LINES = 3  # of that one
 HEAD: Row = (
     "arm", "contacts", "begin", "force", "motion",
     "updates", "median", "p99", "p99.9", "p99.99", "max", f"over {BUDGET:g} us", "first update",
@@ -90,6 +93,8 @@ def update_times(make: Callable[[], Pipeline], signals: Signals, repeats: int = 
 def lines(arms: tuple[str, ...], updates: int, seed: int = 0) -> Iterator[Line]:
     """Every arm with 0 to 4 contacts, apart or at the same instant; weak ones and clamps in motion.
 
+    Two hands that tremble, too; and after the Panda the same arm with its joint torques alone.
+
     Args:
         arms: names of arms of the localization benchmark.
         updates: of each line, at least.
@@ -111,6 +116,11 @@ def lines(arms: tuple[str, ...], updates: int, seed: int = 0) -> Iterator[Line]:
         for force in WEAK:
             yield _line(Cell(arm, 1, TIER, speed=SPEED, force=force), updates, seed)
         yield _clamped(arm, updates, seed)
+        yield _line(Cell(arm, 2, TIER, hands="trembling"), updates, seed)
+        if arm in ALONE:
+            for contacts in (1, 2):
+                yield _line(Cell(ALONE[arm], contacts, TIER), updates, seed)
+            yield _clamped(ALONE[arm], updates, seed)
 
 
 def _line(cell: Cell, updates: int, seed: int) -> Line:
@@ -168,9 +178,8 @@ def main(updates: int, arms: tuple[str, ...], seed: int = 0) -> None:
     from tqdm import tqdm
 
     rows: list[Row] = [HEAD]
-    done = tqdm(
-        lines(arms, updates, seed), total=(9 + len(WEAK)) * len(arms), desc="deadline", disable=None
-    )
+    total = sum(LINES + (ALONE_LINES if arm in ALONE else 0) for arm in arms)
+    done = tqdm(lines(arms, updates, seed), total=total, desc="deadline", disable=None)
     rows += [line.row() for line in done]
     print(aligned(rows, text_columns=(0, 2, 4)))
     print(

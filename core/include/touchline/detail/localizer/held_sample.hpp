@@ -4,6 +4,8 @@
 // Theory: docs/theory.md, section 6.4.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <vector>
 
 #include "touchline/detail/localizer/joint_estimate.hpp"

@@ -105,11 +105,20 @@ struct SegmentContacts {
   Known known;
   Unexplained unexplained;
 
-  // Something touches the segment anew; `first`: the number of that contact.
+  // Something touches the segment anew; `first`: the number of that contact. What belongs to later states
+  // begins with them; where there are no contacts nothing else of an estimate is read.
   void begin(int first, double time) {
-    const TrackingState before = state;
-    *this = SegmentContacts{};
-    state = before;
+    touched = Touched{};
+    suspected = Suspected{};
+    together.second.reset();
+    together.contacts.count = 0;
+    together.separable = together.taken = together.walking = together.walked = false;
+    known.contacts.count = 0;
+    known.updated = known.crept = 0.0;
+    known.now.time = known.before.time = 0.0;
+    known.met.reset();
+    forget_references();
+    unexplained.newcomer.reset();
     touched.first = first;
     touched.age.restart(time);
     state.enter(Tracking::suspected);

@@ -91,8 +91,8 @@ class Tracks {
   static constexpr double kLook = 0.005;  // [s] between second looks: a suspect lasts four of them
   // What known contacts explain takes so many units of a sample's work, and each but the first so many
   // more. Such a part is left at least for what arrives beside them. Where a pair is looked for one
-  // contact has such a part, and in the first sample of a touch, when no cache has the meshes yet.
-  static constexpr int kKnown = 500, kEachKnown = 80, kLeast = 6, kBesidePair = 3, kFirst = 4;
+  // contact has such a part.
+  static constexpr int kKnown = 500, kEachKnown = 80, kLeast = 6, kBesidePair = 3;
 
   void report(int serial, const Answer& answer) { reports_.add(serial, answer); }
   void report(const KnownContact& k) { reports_.add(k); }
@@ -116,11 +116,10 @@ class Tracks {
       report(known.count > 0 ? known.known[0].serial : s.touched.first, single_.clear());
       return;
     }
-    own_ = share_.take(time);
+    own_ = share_.take(time, !s.touched.searched);
     spent_ = 0;
     if (!measurement_.can_be_followed() || settings_.first_entry) {
-      const int units = own_ / (s.touched.searched ? 1 : kFirst);
-      const Ask ask{Ask::kSole, again(s), true, units};
+      const Ask ask{Ask::kSole, again(s), true, own_};
       report(s.touched.first, single_.locate(g, 0.0, measurement_, ask));
       share_.spend(single_.units());
       return;
@@ -176,7 +175,7 @@ class Tracks {
   // The segment's contact, if it has only one.
   const Answer& locate(SegmentContacts& s) {
     const Past& past = pasts_[now_.segment];
-    const int units = own_ / (s.state.is(Tracking::pair) ? kBesidePair : s.touched.searched ? 1 : kFirst);
+    const int units = own_ / (s.state.is(Tracking::pair) ? kBesidePair : 1);
     const Ask ask{Ask::kSole, again(s), false, units};
     const Answer& a = past.known() ? single_.locate(now_.segment, past, measurement_, ask)
                                    : single_.locate(now_.segment, now_.lag, measurement_, ask);
