@@ -48,6 +48,13 @@ tl::Mat3 mat3(const std::vector<double>& m) {
 
 using Observer = guard::Shared<tl::Observer>;
 
+void step(Observer& o, double time, nb::handle q, nb::handle qd, nb::handle tau,
+          nb::handle wrench) {
+  const tl::Sample in = samples::one(o.value.row_layout(), time, q, qd, tau, wrench);
+  const guard::Turn turn(o.turn);
+  o.value.step(in);
+}
+
 nb::object update(Observer& o, double time, nb::handle q, nb::handle qd, nb::handle tau,
                   nb::handle wrench) {
   const tl::Sample in = samples::one(o.value.row_layout(), time, q, qd, tau, wrench);
@@ -245,6 +252,8 @@ void bind(nanobind::module_& m) {
              new (self) Observer(tl::Tree(std::move(nodes), vec3(gravity)), std::move(joints),
                                      std::move(sensors), method, discretization);
            })
+      .def("step", &step, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a,
+           nb::sig("def step(self, time: float, " TOUCHLINE_SIGNALS ") -> None"))
       .def("update", &update, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a,
            nb::sig("def update(self, time: float, " TOUCHLINE_SIGNALS ") -> " TOUCHLINE_ARRAY))
       .def("run", &run, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a,
