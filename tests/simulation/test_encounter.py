@@ -15,7 +15,15 @@ from touchline.simulation.obstacle import TOUCHES, Body
 from touchline.simulation.scene import Run, impedance, make_plant
 from touchline.simulation.simulator import Rates, run
 from touchline.trials.guiding import guide, handle_point
-from touchline.trials.reacting import Case, measure, pressing, reactor
+from touchline.trials.reacting import (
+    Case,
+    arm_scene,
+    encounter_of,
+    measure,
+    outcome_of,
+    pressing,
+    reactor,
+)
 
 SECONDS = 0.5
 
@@ -43,6 +51,24 @@ def test_reactions_relieve_a_clamping(scene):
         assert trials[name].effort <= 1.0 + 1e-9
     assert trials["retract"].quiet < 0.3
     assert trials["retract"].impulse < 0.5 * trials["ignore"].impulse
+
+
+def test_a_stretched_arm_does_not_tremble_before_it_is_struck():
+    case = Case("free", "link5", 0.5, 0)
+    outcome = outcome_of(case, encounter_of(case), "retract")
+    before = np.flatnonzero(pressing(outcome))[0]
+    tremble = np.abs(np.diff(outcome.readings.qd[:before], 2, axis=0))
+    assert tremble.max() < 0.1  # rad/s; 18 with dampers that overshoot from sample to sample
+    assert measure(outcome, case, "retract", arm_scene().robot).reacted < 0.02
+
+
+def test_a_blow_of_one_sample_that_one_axis_feels_most_is_answered():
+    """318 N for a millisecond on link 2: the base's y alone was taken for a spike, then as stuck."""
+    case = Case("free", "link2", 1.0, 0)
+    outcome = outcome_of(case, encounter_of(case), "retract")
+    first = np.flatnonzero(pressing(outcome))[0]
+    assert pressing(outcome)[first] > 5.0 * pressing(outcome)[first + 1]
+    assert measure(outcome, case, "retract", arm_scene().robot).reacted < 0.02
 
 
 @pytest.mark.parametrize(("link", "seed"), [("link3", 5), ("link5", 2)])

@@ -387,6 +387,15 @@ class ChannelGates {
   bool borne_out(std::size_t c, double dt) const {
     if (c < at_.qd()) return false;
     if (c < at_.tau()) return speed_borne_out(c - at_.qd(), dt);
+    if (felt_elsewhere(c)) return true;
+    const std::size_t first = at_.wrench();
+    if (c < first || witnessed(c)) return false;
+    const std::size_t sensor = (c - first) / 6;
+    return one_force(sensor, c) || shares_blow(sensor, c);
+  }
+
+  // Does any channel move with it that is no axis of its own sensor?
+  bool felt_elsewhere(std::size_t c) const {
     const std::size_t first = at_.wrench(), sensor = c < first ? 0 : (c - first) / 6;
     const bool sudden = news(c) > kSudden * ratio_[c];
     for (std::size_t other = at_.qd(); other < at_.count(); ++other) {
@@ -396,7 +405,16 @@ class ChannelGates {
                                 : ratio_[other] > tuning_.equal * ratio_[c];
       if (bears) return true;
     }
-    return c >= first && !witnessed(c) && one_force(sensor, c);
+    return false;
+  }
+
+  // Does another axis of its sensor jump that others bear out? A blow moves this one far more than them,
+  // and no axis fails in the very sample of a blow.
+  bool shares_blow(std::size_t sensor, std::size_t c) const {
+    for (std::size_t i = at_.wrench() + 6 * sensor, end = i + 6; i < end; ++i) {
+      if (i != c && ratio_[i] > 1.0 && moves(i) && felt_elsewhere(i)) return true;
+    }
+    return false;
   }
 
   // How much more a channel steps than in the sample before. What others have done for some samples does
