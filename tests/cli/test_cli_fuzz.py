@@ -2,6 +2,8 @@
 """Damaged files of each kind are read or refused in words; the runner finds what is neither."""
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -76,6 +78,33 @@ def test_a_parquet_file_that_ends_pyarrow_is_refused_in_one_line(tmp_path, capsy
     status = main(["analyze", str(log), "--robot", str(robot), "--out", str(tmp_path / "out")])
     lines = capsys.readouterr().err.strip().splitlines()
     assert status == 2 and len(lines) == 1 and "log.parquet: damaged" in lines[0]
+
+
+DAMAGED_PAGE = Path(__file__).parent / "corpus" / "page_of_two_gigabytes.parquet"
+
+
+def test_no_room_is_made_for_what_a_damaged_page_claims_to_hold(tmp_path):
+    (parquet,) = (parser for parser in parsers(tmp_path) if parser.name == "Parquet")
+    data = DAMAGED_PAGE.read_bytes()
+    assert read_one(parquet, tmp_path / parquet.file, data)[0] == ""
+    words = [sys.executable, "-c", READ, str(tmp_path / parquet.file), str(tmp_path / "whole.yaml")]
+    run = subprocess.run(words, capture_output=True, text=True, check=True)
+    taken, said = run.stdout.split(maxsplit=1)
+    assert "Page was smaller" in said and float(taken) < 300.0  # MB; 2,050 with room for the page
+
+
+READ = """
+import resource, sys
+import touchline as tl
+from touchline.logs.log import read_log
+peak = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+robot = tl.load_robot(sys.argv[2])
+before = peak()
+try:
+    read_log(sys.argv[1], robot)
+except tl.InputError as error:
+    print(peak() - before, error)
+"""
 
 
 def ending(folder):

@@ -63,7 +63,7 @@ def test_a_stretched_arm_does_not_tremble_before_it_is_struck():
 
 
 def test_a_blow_of_one_sample_that_one_axis_feels_most_is_answered():
-    """318 N for a millisecond on link 2: the base's y alone was taken for a spike, then as stuck."""
+    """318 N for a millisecond on link 2: the base's y was taken for a spike, then for stuck."""
     case = Case("free", "link2", 1.0, 0)
     outcome = outcome_of(case, encounter_of(case), "retract")
     first = np.flatnonzero(pressing(outcome))[0]

@@ -25,6 +25,7 @@ from touchline.bench.tables import Row, aligned
 from touchline.errors import InputError
 
 LONGEST = 30.0  # s that a file may take
+MOST = 300.0  # MB that a file may take beyond three times its size
 STARTS = 60.0  # s that a process may take to begin
 SPAWN = multiprocessing.get_context("spawn")  # what has been imported here counts for nothing there
 EXTREMES = (
@@ -401,11 +402,20 @@ def fuzz(
             others[rng.integers(0, len(others))],
             rng,
         )
+        before = _peak()
         failure, seconds = read_one(parser, path, data)
         longest = max(longest, seconds)
+        taken = _peak() - before
+        if not failure and taken > MOST + 3e-6 * len(data):
+            failure = f"took {taken:.0f} MB"
         if failure:
             found.append(Failure(parser.name, number, failure, data))
     return found, longest
+
+
+def _peak() -> float:
+    """The most memory that this process has had so far [MB]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def read_one(parser: Parser, path: Path, data: bytes) -> tuple[str, float]:
@@ -497,8 +507,7 @@ def _work(
         found, seconds = fuzz(parser, folder, range(number, number + 1), seed, others)
         failures += found
         longest = max(longest, seconds)
-    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    told.send((failures, longest, most))
+    told.send((failures, longest, _peak()))
 
 
 def main(runs: int, seed: int, keep: Path | None) -> int:

@@ -19,6 +19,8 @@ from touchline.model.description import RobotDescription
 
 METADATA_KEY = b"touchline"
 _BATCH_ROWS = 1 << 14
+_WHOLE = 64 << 20  # bytes; an hour of 1 kHz in one row group is larger
+_STREAM = 1 << 20  # bytes
 
 
 class ParquetSource:
@@ -35,9 +37,13 @@ class ParquetSource:
 
         self.path = path
         try:
-            # Without pre-buffering a huge row group is read page by page.
+            metadata = pq.read_metadata(path)
             self._file = pq.ParquetFile(
-                path, pre_buffer=False, buffer_size=1 << 20, page_checksum_verification=True
+                path,
+                metadata=metadata,
+                pre_buffer=False,
+                buffer_size=_stream(metadata),
+                page_checksum_verification=True,
             )
             self.columns = tuple(self._file.schema_arrow.names)
         except damages() as error:
@@ -167,6 +173,17 @@ def read_first_rows(file: Any, column: str) -> None:
     """
     for group in range(file.metadata.num_row_groups):
         next(file.iter_batches(1, [group], [column]), None)
+
+
+def _stream(metadata: Any) -> int:
+    """Bytes that are read at a time; 0: a column of a row group at once.
+
+    A huge row group is read page by page. Room is made for as much as a page claims to hold, which
+    in a damaged file may be anything: so small row groups are read whole.
+    """
+    # Not by column: pyarrow ends the process at some damaged columns of a footer.
+    sizes = [metadata.row_group(g).total_byte_size for g in range(metadata.num_row_groups)]
+    return 0 if max(sizes, default=0) < _WHOLE else _STREAM
 
 
 def damages() -> tuple[type[Exception], ...]:
