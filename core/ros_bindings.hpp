@@ -198,9 +198,10 @@ class TopicReader {
       }
       const std::lock_guard<std::mutex> turn(turn_);
       bool more = false;
+      const double looked = tl::monotonic_seconds();
       // Joint states first: the wrenches that belong to them have come by then.
       for (std::size_t t = 0; t < topics_.size(); ++t) more = all_of(t) || more;
-      while (merge_.ready(tl::monotonic_seconds())) hand_next();
+      while (merge_.ready(looked)) hand_next();
       if (more) ring(false);
     }
   }

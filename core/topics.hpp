@@ -135,17 +135,14 @@ class TopicMerge {
     sensor.coming[sensor.end++ % kAhead] = found;
   }
 
-  // Is there a joint state whose wrenches have come, or that has waited for them long enough?
-  bool ready(double now) const { return begin_ != end_ && now >= due(); }
+  // Is there a joint state whose wrenches have come, or that had waited for them long enough at `looked`,
+  // before all topics were looked at last [s]? What has come since is not given up unseen.
+  bool ready(double looked) const { return begin_ != end_ && (!awaits() || looked >= due()); }
   // When the oldest joint state has waited long enough [s]; infinite where there is none.
   double due() const {
     if (begin_ == end_) return kInf;
-    const State& state = waiting_[begin_ % kStates];
-    if (full()) return state.arrival;
-    for (const Sensor& sensor : sensors_)
-      if (sensor.awaited > 0 && sensor.newest() < sensor.wanted(state.time))
-        return state.arrival + std::min(kHold, 0.5 * step_.seconds());
-    return state.arrival;
+    const double arrival = waiting_[begin_ % kStates].arrival;
+    return awaits() ? arrival + std::min(kHold, 0.5 * step_.seconds()) : arrival;
   }
 
   // The time of the oldest joint state [s].
@@ -189,6 +186,14 @@ class TopicMerge {
     double time = -kInf;
     std::array<double, 6> values{kNan, kNan, kNan, kNan, kNan, kNan};
   };
+  // Does the oldest joint state wait for a wrench, and is there room for others meanwhile?
+  bool awaits() const {
+    const double time = waiting_[begin_ % kStates].time;
+    return !full() && std::any_of(sensors_.begin(), sensors_.end(), [time](const Sensor& sensor) {
+      return sensor.awaited > 0 && sensor.newest() < sensor.wanted(time);
+    });
+  }
+
   struct Sensor {
     Wrench current;                 // of the last joint state
     std::vector<Wrench> coming = std::vector<Wrench>(kAhead);  // newer ones

@@ -52,9 +52,9 @@ def test_a_line_for_each_kind_of_touch(monkeypatch, capsys):
     assert main(["bench", "deadline", "--updates", "1", "--robots", "sara"]) == 0
     lines = [line.split("  ") for line in capsys.readouterr().out.splitlines() if "sara" in line]
     cells = [[cell.strip() for cell in line if cell.strip()] for line in lines]
-    assert len(cells) == len(seen) == 11
-    assert [row[1] for row in cells] == ["0", "1", "2", "2", "3", "3", "4", "4", "1", "1", "2"]
-    assert {row[2] for row in cells[2:8]} == {"0.1 s apart", "together"} and cells[-1][
+    assert len(cells) == len(seen) == 12
+    assert [row[1] for row in cells] == ["0", "1", "2", "2", "3", "3", "4", "4", "1", "1", "2", "2"]
+    assert {row[2] for row in cells[2:8]} == {"0.1 s apart", "together"} and cells[-2][
         2
     ] == "clamped"
     assert ["2 N", "5 N"] == [row[2] for row in cells[8:10]]
