@@ -6,8 +6,6 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-MAGIC = b"TLROBOT\n"  # with which exported robots begin, as robot_file.hpp says
-
 
 def export(
     robot: Annotated[Positional[str], arg(metavar="ROBOT")],
@@ -30,14 +28,11 @@ def export(
         period: Time between samples [s], for thresholds and weights that follow from the noise.
         bandwidth: Bandwidth of the observer [rad/s]. Default: as described.
     """
-    from touchline.errors import InputError
     from touchline.folder import check_file
     from touchline.model.robot import load_robot
     from touchline.numbers import check_positive
     from touchline.pipeline.pipeline import Pipeline
 
-    if out.is_file() and not out.read_bytes().startswith(MAGIC):
-        raise InputError(f"--out {out}: exists and is no exported robot; name another file")
     check_positive(period=period, **({} if bandwidth is None else {"bandwidth": bandwidth}))
     pipeline = Pipeline(load_robot(robot), bandwidth=bandwidth, period=period)
     for lost in pipeline.skin.lost:

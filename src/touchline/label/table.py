@@ -63,17 +63,12 @@ def _refuse_part(path: Path) -> None:
 
     try:
         schema = pq.read_schema(path)
-    except (*damages(), OSError):
+    except damages():
         return  # told by the reader
-    arrays = [x.name for x in schema if pa.types.is_list(x.type) or _is_fixed(x.type)]
+    kinds = pa.types.is_list, pa.types.is_fixed_size_list
+    arrays = [x.name for x in schema if any(is_kind(x.type) for is_kind in kinds)]
     if any(name.startswith("observation.") for name in arrays):
         raise InputError(
             f"{path}: seems one file of a LeRobot data set ({', '.join(arrays[:3])} are arrays); "
             "name the folder that holds meta/info.json"
         )
-
-
-def _is_fixed(kind: object) -> bool:
-    import pyarrow as pa
-
-    return pa.types.is_fixed_size_list(kind)

@@ -9,12 +9,15 @@ from touchline.classifier.zones import Zones
 from touchline.detector.detector import native_rows, native_settings
 from touchline.detector.residual_noise import native_noise
 from touchline.detector.thresholds import Thresholds
+from touchline.errors import InputError
 from touchline.localizer.localizer import native_surfaces
 from touchline.localizer.skin import Skin
 from touchline.model.description import PushDescription
 from touchline.model.kernel import joint_row, native_node, sensor_row
 from touchline.model.robot import Robot
 from touchline.native import core
+
+MAGIC = 8  # bytes with which exported robots begin, as robot_file.hpp says
 
 
 def native_robot(
@@ -63,10 +66,16 @@ def write_robot(path: Path, robot: core.Robot) -> None:
     """Write the file that `touchline::read_robot` reads, in one step.
 
     Raises:
+        InputError: another kind of file is there, such as the robot's description.
         OSError: it cannot be written.
     """
+    content = robot.to_bytes()
+    if path.is_file():
+        with path.open("rb") as file:
+            if file.read(MAGIC) != content[:MAGIC]:
+                raise InputError(f"{path}: exists and is no exported robot; name another file")
     draft = path.with_name(f".{path.name}.part")
-    draft.write_bytes(robot.to_bytes())
+    draft.write_bytes(content)
     draft.replace(path)
 
 

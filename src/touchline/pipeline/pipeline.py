@@ -232,6 +232,7 @@ class Pipeline:
         Method, rule and friction are no part of a robot: in C++ they stand in a `Tuning`.
 
         Raises:
+            InputError: another kind of file is there.
             OSError: the file cannot be written.
         """
         write_robot(Path(path), self._native())

@@ -220,7 +220,8 @@ class EncounterScene:
         rng = np.random.default_rng([settings.seed, 6, seed])
         sensors = LiveSensors(plant, count, settings.rate, settings.noise, rng)
         pipeline = Pipeline(self.robot, period=1.0 / settings.rate, skin=self.skin)
-        own: Controller = impedance(self.setup, trajectory, settings.control)
+        rates = Rates(settings.rate, settings.control or settings.rate)
+        own: Controller = impedance(self.setup, trajectory, rates.control)
         contacts: list[Contacts] = [self.obstacle]
         if hand is not None:
             own = led(self.setup, encounter.q)
@@ -228,7 +229,6 @@ class EncounterScene:
             motion = HandMotion.draw(rng, seconds)
             contacts.append(GuidingHand(*hand, motion, times, rng))
         controller = ReactingController(self.robot, own, pipeline, reactor, sensors)
-        rates = Rates(settings.rate, settings.control or settings.rate)
         readings, truth = run(plant, controller, contacts, seconds, rates, controller.sampled)
         torque = np.array([step.command.torque for step in controller.steps])
         return Outcome(encounter, readings, truth, controller.steps, torque)

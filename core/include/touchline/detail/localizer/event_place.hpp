@@ -141,8 +141,10 @@ class EventPlace {
 
   int count() const { return count_; }
   const Place& place(int i) const { return places_[i]; }
-  // At which the most probable place was found there last [s].
-  double time() const { return count_ > 0 && places_[0].slot >= 0 ? places_[0].time : time_; }
+  // Of the most probable place; -1: no sample has named it.
+  int slot() const { return count_ > 0 ? places_[0].slot : -1; }
+  // At which it was found there last [s].
+  double time() const { return slot() >= 0 ? places_[0].time : time_; }
   // May the most probable place be sure? Of a contact that is followed only if a sample was sure of it:
   // what they say in common does not add up.
   bool may_be_sure() const { return !followed_ || places_[0].sure; }

@@ -167,8 +167,8 @@ class Localizer {
 
   // Joint positions at the time of its most probable place.
   const double* positions(const Memory& m) const {
-    const bool named = m.event.count() > 0 && m.event.place(0).slot >= 0;
-    return m.q.data() + (named ? m.event.place(0).slot : EventPlace::kPlaces) * joints();
+    const int slot = m.event.slot();
+    return m.q.data() + (slot >= 0 ? slot : EventPlace::kPlaces) * joints();
   }
 
   Status status(const Memory& m) const {
