@@ -12,6 +12,7 @@ from free_motion import free_motion
 
 import touchline as tl
 from touchline.check.joints import swapped_torques
+from touchline.check.model import outboard_mass
 from touchline.check.run import check
 from touchline.check.windows import WindowMaker
 from touchline.cli.main import main
@@ -208,6 +209,23 @@ def test_a_heavy_load_on_a_light_flange_is_no_unit(tmp_path, robot, recording):
     findings = findings_of(tmp_path, robot, loaded)
     of_sensors = [line for line in findings if line.startswith("sensor")]
     assert of_sensors and not any("kgf" in line for line in of_sensors), findings
+
+
+@pytest.mark.parametrize("measured", ["joints", "a sensor before it", "itself alone"])
+def test_a_load_at_the_centre_of_a_light_flange_is_a_unit_to_itself_alone(
+    tmp_path, robot, recording, measured
+):
+    """Moments tell it from a unit no more; what is before the sensor feels the load, or does not."""
+    com = robot.mechanism.links["tool"].inertia.com.tolist()
+    mass = 8.8 * outboard_mass(robot, "wrist")
+    path = described_with(tmp_path, robot, f"{{link: tool, mass: {mass}, com: {com}}}")
+    loaded = free_motion(tl.load_robot(path), rate=100.0)
+    if measured != "joints":
+        loaded.tau[:] = np.nan
+    if measured == "itself alone":
+        loaded.wrench[:, [s for s in range(3) if s != WRIST]] = np.nan
+    findings = [x for x in findings_of(tmp_path, robot, loaded) if x.startswith("sensor wrist")]
+    assert any("kgf" in line for line in findings) == (measured == "itself alone"), findings
 
 
 def test_where_no_torque_is_measured_none_are_swapped(robot, recording):

@@ -27,8 +27,8 @@ SECONDS = 60.0
 RATE = 100.0  # samples a second
 HARMONICS, CYCLES = 5, 3  # of the series, and how often it runs
 MARGIN = 0.1  # of a joint's range that stays free at either end
-SPEED = 1.0  # rad/s at most, and half of the joint's limit
 SPEED_SHARE, EFFORT_SHARE = 0.5, 0.6  # of the limits
+SPEED, TIP_SPEED = 1.0, 1.0  # a joint: rad/s at most, or faster where it moves no point faster: m/s
 SPREAD = 2.0  # rad; of a joint that could turn for ever
 CLEARANCE = 0.03  # m between the surfaces of bodies that are no neighbours
 POINTS = 120  # on each body, for clearances
@@ -160,11 +160,12 @@ class _Space:
         room = np.minimum((0.5 - MARGIN) * (high - low), SPREAD)
         self.low, self.high = middle - room, middle + room
         velocity = np.array([joint.velocity for joint in joints])
-        self.speed = np.minimum(SPEED, SPEED_SHARE * np.where(velocity > 0, velocity, np.inf))
         effort = np.array([joint.effort for joint in joints])
         self.effort = EFFORT_SHARE * np.where(effort > 0, effort, np.inf)
         self._points = self._sampled(rng)
         self._pairs = self._far_pairs()
+        fast = np.maximum(SPEED, TIP_SPEED / self._reaches())
+        self.speed = np.minimum(fast, SPEED_SHARE * np.where(velocity > 0, velocity, np.inf))
 
     def allows(self, q: Array, qd: Array, qdd: Array) -> bool:
         """Does a motion keep the limits of position, speed, torque and clearance?"""
@@ -214,6 +215,21 @@ class _Space:
             if self.clear(middle):
                 keep.append(pair)
         return keep
+
+    def _reaches(self) -> Array:
+        """(n,) how far from each joint's origin a body that it moves can be at most [m]."""
+        home = self.robot.poses(0.5 * (self.low + self.high))
+        reaches = np.full(len(self.low), 1e-3)
+        for i, points in self._points.items():
+            reach, at = float(np.linalg.norm(points, axis=1).max()), i
+            while at >= 0:
+                node = self.robot.nodes[at]
+                if node.coordinate >= 0:
+                    reaches[node.coordinate] = max(reaches[node.coordinate], reach)
+                if node.parent >= 0:
+                    reach += float(np.linalg.norm(home[at][:3, 3] - home[node.parent][:3, 3]))
+                at = node.parent
+        return reaches
 
     def _between(self, a: int, b: int) -> int:
         count = 0

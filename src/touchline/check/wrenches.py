@@ -15,6 +15,7 @@ from touchline.check.model import outboard_mass
 from touchline.check.windows import Windows
 from touchline.model.description import SensorDescription
 from touchline.model.robot import Robot
+from touchline.observer.dynamics import Loads, contact_loads, to_world
 
 LEAST_WEIGHT = 0.5  # N; a lighter load says nothing
 MASS_OFF, MASS_OFF_KG = 0.05, 0.05
@@ -22,6 +23,8 @@ CLEARER = 0.4  # another explanation must leave so much less
 # Moments that change by so many times what a unit of the forces lets expect, and by so much [Nm],
 # are those of a load that is mounted farther out than the model's.
 FARTHER, FARTHER_NM = 5.0, 0.1
+BORNE = 0.5  # of what a sensor reads too much: more of it felt before it is a load and no unit
+BORNE_LEAST = 0.5  # Nm or N, root sum of squares; less of it before the sensor tells nothing
 AXIS_NAMES = "xyz"
 
 
@@ -32,6 +35,7 @@ class Explanation:
     Attributes:
         kind: "described", "polarity", "frame", "axes" or "compensated".
         words: what would have to be changed.
+        R_log_sensor: (W, 3, 3) leads from the sensor's axes to the log's, with its sign.
         forces, moments: (W, 3) expected, in the log's axes and with its sign.
         columns: (3, 3) what leads from the logged axes to the described ones, where that is all.
         change: of the sensor's keys in `robot.yaml`, that says so.
@@ -39,6 +43,7 @@ class Explanation:
 
     kind: str
     words: str
+    R_log_sensor: Array
     forces: Array
     moments: Array
     columns: Array | None = None
@@ -102,8 +107,8 @@ class _SensorCheck:
         axes = ("fx", "fy", "fz", "mx", "my", "mz")
         self.has = np.array([axis in self.sensor.axes for axis in axes])
         poses = [robot.poses(q) for q in windows.q]
-        node = next(i for i, n in enumerate(robot.nodes) if n.sensor == self.sensor.name)
-        self.R_world_sensor = np.array([T[node][:3, :3] for T in poses])
+        self.node = next(i for i, n in enumerate(robot.nodes) if n.sensor == self.sensor.name)
+        self.R_world_sensor = np.array([T[self.node][:3, :3] for T in poses])
         self.poses = poses
         self.reading = windows.wrench[:, k]
 
@@ -198,9 +203,13 @@ class _SensorCheck:
         w = self.windows
         return (w.expected_wrench if compensated == "none" else w.weightless_wrench)[:, self.k]
 
-    def _turned(self, expected: Array, R_log_sensor: Array, sign: float) -> tuple[Array, Array]:
-        force = sign * np.einsum("wij,wj->wi", R_log_sensor, expected[:, :3])
-        return force, sign * np.einsum("wij,wj->wi", R_log_sensor, expected[:, 3:])
+    def _turned(
+        self, expected: Array, R_log_sensor: Array, sign: float
+    ) -> tuple[Array, Array, Array]:
+        """How the log has the sensor's axes (W, 3, 3), and forces and moments (W, 3) in them."""
+        M = sign * R_log_sensor
+        force, moment = (np.einsum("wij,wj->wi", M, x) for x in (expected[:, :3], expected[:, 3:]))
+        return M, force, moment
 
     def _to_log(self, frame: str) -> Array:
         """(W, 3, 3): from the sensor's axes to those of the log."""
@@ -251,23 +260,70 @@ class _SensorCheck:
             return 1.0, []
         found = factor_words(fit.factor, factors)
         start = f"sensor {self.sensor.name}: {what} are {fit.factor:.3g} times those expected"
-        if found is not None and not (what == "forces" and self._carries_more(moments, fit.factor)):
+        if what == "forces" and fit.factor > 1.0 and self._carries_more(best, fit):
+            return 1.0, [f"{start}, as by a load that the model lacks"]
+        if found is not None:
             return found[0] * float(np.sign(fit.factor)), [f"{start}: in {found[1]}"]
         if abs(fit.factor) < 0.2:
             return 1.0, [f"{start}: the weight seems taken out already; compensated: gravity"]
         return 1.0, [f"{start}: check the unit, and what is mounted on it"]
 
-    def _carries_more(self, moments: Array, factor: float) -> bool:
-        """Do moments change by far more than those expected (W, 3) [Nm] do in another unit?"""
+    def _carries_more(self, best: Explanation, force: Fit) -> bool:
+        """Is what a sensor reads too much a load that the model lacks, rather than a unit?
+
+        What is before the sensor, joints and further sensors, feels a load, too. Without these
+        its moments tell it where they change by far more than those expected do in another unit.
+        """
+        borne = self._borne_before(best, force)
+        if borne is not None:
+            return borne > BORNE
         has = self.has[3:]
         read = self.reading[:, 3:][:, has]
-        known = np.isfinite(read).all(axis=1) & np.isfinite(moments[:, has]).all(axis=1)
+        known = np.isfinite(read).all(axis=1) & np.isfinite(best.moments[:, has]).all(axis=1)
         if not has.any() or not known.any():
             return False
         size, expected = (
-            float(np.sqrt(x[known].var(axis=0).sum())) for x in (read, moments[:, has])
+            float(np.sqrt(x[known].var(axis=0).sum())) for x in (read, best.moments[:, has])
         )
-        return size > max(FARTHER_NM, FARTHER * max(1.0, abs(factor)) * expected)
+        return size > max(FARTHER_NM, FARTHER * max(1.0, abs(force.factor)) * expected)
+
+    def _borne_before(self, best: Explanation, force: Fit) -> float | None:
+        """Which part of what the sensor reads too much is felt before it; None: nothing tells it.
+
+        A bias may be in every reading, so only what changes with the posture counts.
+        """
+        links = self.robot.nodes[self.node].links
+        if not links or not self.has.all():
+            return None
+        w = self.windows
+        offset = np.concatenate([force.offset, np.zeros(3)])
+        over = (self.reading - offset).reshape(-1, 2, 3)
+        over = np.einsum("wji,wpj->wpi", best.R_log_sensor, over).reshape(-1, 6)
+        over -= w.expected_wrench[:, self.k]
+        T = np.array([poses[self.node] for poses in self.poses])
+        weight = to_world(over, T[:, :3, :3], T[:, :3, 3])
+        loads = contact_loads(self.robot, w.q, links[0], weight)
+        sense = float(np.sign(np.nansum(loads.wrench[:, self.k] * over)))
+        power = borne = 0.0
+        for foretold, left in self._rows_before(loads):
+            use = np.isfinite(left) & np.isfinite(foretold)
+            if use.any():
+                x, y = sense * (foretold[use] - foretold[use].mean()), left[use] - left[use].mean()
+                power += float(np.mean(x * x))
+                borne += float(np.mean(x * y))
+        return borne / power if power > BORNE_LEAST**2 else None
+
+    def _rows_before(self, loads: Loads) -> Iterator[tuple[Array, Array]]:
+        """Of each row that carries the sensor: what loads put on it, and what it has too much."""
+        w, description = self.windows, self.robot.description
+        for j, joint in enumerate(description.joints):
+            if joint.measured and joint.compensated == "none":
+                yield loads.torque[:, j], w.torque[:, j] - w.expected_torque[:, j]
+        for k, sensor in enumerate(description.sensors):
+            if k != self.k and (sensor.frame, sensor.compensated) == ("sensor", "none"):
+                sign = 1.0 if sensor.polarity == "outboard" else -1.0
+                left = sign * w.wrench[:, k] - w.expected_wrench[:, k]
+                yield from zip(loads.wrench[:, k].T, left.T, strict=True)
 
     def _judge_delay(self) -> None:
         """Of a log in the sensor's own axes: these turn with the arm, and others do not."""
