@@ -215,7 +215,7 @@ def test_a_heavy_load_on_a_light_flange_is_no_unit(tmp_path, robot, recording):
 def test_a_load_at_the_centre_of_a_light_flange_is_a_unit_to_itself_alone(
     tmp_path, robot, recording, measured
 ):
-    """Moments tell it from a unit no more; what is before the sensor feels the load, or does not."""
+    """Moments tell it from a unit no more; what is before the sensor feels a load, but no unit."""
     com = robot.mechanism.links["tool"].inertia.com.tolist()
     mass = 8.8 * outboard_mass(robot, "wrist")
     path = described_with(tmp_path, robot, f"{{link: tool, mass: {mass}, com: {com}}}")

@@ -203,7 +203,7 @@ def calibrate(
                 recordings = Recordings(model, logs)
                 evidence = gather(model, recordings.all("equations"))
             for _ in range(TURNS):
-                off = find_frames(evidence)
+                off = find_frames(evidence, frames)
                 if not off:
                     break
                 frames = joined(frames, off)

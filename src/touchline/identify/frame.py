@@ -22,6 +22,9 @@ from touchline.model.transforms import rotation_about, rotation_rpy, rpy_of
 
 SURE = 5.0  # standard errors
 LEAST = {"turn": np.radians(0.1), "shift": 5e-4}  # rad, m; smaller ones are left alone
+# Of a row's largest reading, as a converter of 12 bits has it: a shift shows in some mNm beside
+# hundreds of Nm.
+RESOLVED = 2.5e-4
 DIGITS = 6  # of a written figure: 1e-6 rad or m
 
 
@@ -42,19 +45,34 @@ class FrameError:
     shift_error: Array
 
 
-def find_frames(evidence: Evidence) -> list[FrameError]:
-    """Frames that are off as far as the data are sure of it."""
+def find_frames(evidence: Evidence, before: Sequence[FrameError] = ()) -> list[FrameError]:
+    """Frames that are off as far as the data are sure of it.
+
+    Args:
+        evidence: read with the frames found so far.
+        before: these. What was told of them once is refined, however little is left of it.
+    """
     sensors = _judged(evidence)
     if not sensors:
         return []
-    chooser = Chooser(evidence, np.ones(len(evidence), dtype=bool))
+    refined = {
+        (kind, evidence.joints + 6 * s)
+        for s in sensors
+        for frame in before
+        for kind, error in (("turn", frame.turn_error), ("shift", frame.shift_error))
+        if frame.name == evidence.robot.sensor_names[s] and error.any()
+    }
+    chooser = Chooser(evidence, np.ones(len(evidence), dtype=bool), RESOLVED)
     every = frame_columns(evidence)
     turns = tuple(c for c in every if c.kind == "turn")
-    if not _sure_columns(chooser.fit_beside(every)):
+    if not refined and not _sure_columns(chooser.fit_beside(every)):
         return []
-    found = chooser.choose_beside([(), turns, every])
+    known = tuple(c for c in every if (c.kind, c.row) in refined)
+    options = [known, tuple(c for c in every if c in known or c in turns), every]
+    found = chooser.choose_beside(list(dict.fromkeys(options)))
     while True:
         sure = _sure_columns(found)
+        sure += [c for c in known if c not in sure]
         shifted = {c.row for c in sure if c.kind == "shift"}
         # What is left of a turn would be taken for a shift: it is free beside one, however small.
         kept = [c for c in _frame_columns(found) if c in sure or c.row in shifted]
