@@ -98,7 +98,7 @@ class Arrivals {
       if (!contested || against >= 0) suspect_ = suspect_beside_free_forces(s, against, read);
     }
     if (suspect_.any()) {  // what has come is no contact, as far as is felt
-      for (int c = 0; c < s.known.contacts.count; ++c) reports_.add(before.contacts.known[c]);
+      for (int c = 0; c < s.known.contacts.count; ++c) add_known(before.contacts.known[c]);
       s.unexplained.placed.reset();
       return;
     }
@@ -130,13 +130,25 @@ class Arrivals {
     const double since = u.slide.seen ? std::max(u.since, *u.slide.seen) : u.since;
     const bool lasting = now_.time - since >= settings_.suspected * now_.brief();
     for (int c = 0; c < s.known.contacts.count; ++c) {
-      reports_.add(s.known.before.contacts.known[c]);
+      add_known(s.known.before.contacts.known[c]);
       if (lasting && !placed(a)) reports_.doubt_last();
     }
     if (!placed(a) && !lasting) return;
     if (a.count == 0) a.status = Status::not_separable;  // no force is left, but it does not fit
-    doubt_if_wide(a, settings_);
+    add_newcomer(s, a);
+  }
+
+  // Its place is wider than it seems where it is not known well how restless the known ones are.
+  void add_newcomer(SegmentContacts& s, const Answer& a) {
     reports_.add(number(s), a);
+    const JointEstimate& known = s.known.before.contacts;
+    reports_.doubt_last_if_wide(settings_, known.unrest_doubt(now_.bandwidth, settings_));
+  }
+
+  // One whose rivals have yet to decide is not sure in the meantime.
+  void add_known(const KnownContact& k) {
+    reports_.add(k);
+    if (rivals_[now_.segment].undecided(k.serial)) reports_.doubt_last();
   }
 
   // Under which number it is reported.
@@ -148,7 +160,7 @@ class Arrivals {
   // Do the known contacts explain all again?
   bool subsided(SegmentContacts& s) {
     fit_.weigh(s.known.before.contacts, measurement_);
-    if (!known_.explain(s.known.before.contacts)) {
+    if (!known_.explain(s.known.before.contacts) || known_.moved()) {
       if (s.state.is(Tracking::ending)) s.state.enter(Tracking::newcomer);
       return false;
     }
@@ -173,7 +185,7 @@ class Arrivals {
     for (int c = 0; c < before.count; ++c) {
       const KnownContact& k = before.known[c];
       if (!takes_back(k, a, single_.surfaces(), settings_)) continue;
-      for (int i = 0; i < before.count; ++i) reports_.add(before.known[i]);
+      for (int i = 0; i < before.count; ++i) add_known(before.known[i]);
       reports_.change_force(c, k.force + a.force);
       s.unexplained.placed.reset();  // what was suspected ends when all is explained
       return true;
@@ -203,7 +215,7 @@ class Arrivals {
     JointEstimate& known = s.known.contacts;
     known = s.known.before.contacts;
     fit_.accept(known, known_.change(), 0.0);
-    for (int c = 0; c < known.count; ++c) reports_.add(known.known[c]);
+    for (int c = 0; c < known.count; ++c) add_known(known.known[c]);
     if (now_.time - s.unexplained.calm >= now_.brief()) end(s);
   }
 
@@ -280,9 +292,8 @@ class Arrivals {
     JointEstimate& all = s.known.contacts;
     all = s.known.before.contacts;
     const int old = all.count;
-    for (int c = 0; c < old; ++c) reports_.add(all.known[c]);
-    reports_.add(newcomer, a);
-    reports_.doubt_last_if_wide(settings_);
+    for (int c = 0; c < old; ++c) add_known(all.known[c]);
+    add_newcomer(s, a);
     read();
     Change change;
     if (freed_) change = Change::of_forces(old, settings_.force_scale);

@@ -136,6 +136,13 @@ struct JointEstimate {
     }
   }
 
+  // How many times as large the unrest of any may be.
+  double unrest_doubt(double bandwidth, const LocalizerTuning& t) const {
+    double most = 1.0;
+    for (int c = 0; c < count; ++c) most = std::max(most, known[c].unrest.doubt(bandwidth, t));
+    return most;
+  }
+
   // Standard deviation of a force in its worst direction at most [N].
   double force_sigma(int c) const {
     const int n = size();

@@ -34,6 +34,12 @@ struct Change {
     for (int c = 0; c < count; ++c) change.force(c, sigma);
     return change;
   }
+  static Change of_place(int c, double sigma) {
+    Change change;
+    for (int i = 3; i < JointEstimate::kEach; ++i)
+      change.added[JointEstimate::kEach * c + i] = sigma * sigma;
+    return change;
+  }
   bool any() const {
     return std::any_of(added, added + JointEstimate::kSize, [](double v) { return v > 0.0; });
   }

@@ -43,6 +43,11 @@ class Unrest {
  public:
   // What the variance of each axis of the force grows by [N2/s].
   double rate() const { return rate_; }
+  // How many times as large it may be, by what has been seen so far: a wave goes one way for several
+  // looks. Of a steady hand nothing is doubted.
+  double doubt(double bandwidth, const LocalizerTuning& t) const {
+    return rate_ > 0.0 ? calm(seen_ * bandwidth / t.unrest_lasts) : 1.0;
+  }
   // A hand of which nothing has been seen may be like another one.
   void expect(double rate) { rate_ = rate; }
 
@@ -279,10 +284,10 @@ inline bool agrees(const KnownContact& known, const Answer& a, const LinkSurface
 }
 
 // One of several is located where its region holds nine tenths of the probability within the radius of
-// a place. A long region then holds 0.90 there, a round one 0.93.
-inline void doubt_if_wide(Answer& a, const LocalizerSettings& t) {
+// a place. A long region then holds 0.90 there, a round one 0.93. Its variance may be `doubt` times as large.
+inline void doubt_if_wide(Answer& a, const LocalizerSettings& t, double doubt = 1.0) {
   constexpr double kNinety = 1.645;  // sigmas of a normal variable that hold nine tenths
-  if (a.status == Status::located && !(kNinety * a.spread < t.place_radius))
+  if (a.status == Status::located && !(kNinety * std::sqrt(doubt) * a.spread < t.place_radius))
     a.status = Status::ambiguous;
 }
 

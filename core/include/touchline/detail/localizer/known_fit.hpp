@@ -19,6 +19,7 @@ class KnownFit {
   // Do they explain the measurement with their forces held, or with one of them changed?
   bool explain(const JointEstimate& estimate) {
     change_ = Change::none();
+    moved_ = false;
     fit_.begin(measurement_, estimate);
     const double held = fit_.cost(estimate, change_);
     if (held < limit(0, settings_.gate_held)) return true;
@@ -31,8 +32,17 @@ class KnownFit {
         change_ = one;
       }
     }
-    return least < limit(3, settings_.gate_arrival) || held < limit(0, settings_.gate_arrival);
+    if (least >= limit(3, settings_.gate_arrival) && held >= limit(0, settings_.gate_arrival))
+      return false;
+    least = std::min(least, held - chi2_limit(2, settings_.gate_held));
+    for (int c = 0; c < estimate.count && !moved_; ++c)
+      moved_ = fit_.cost(estimate, Change::of_place(c, settings_.place_radius)) < least;
+    return true;
   }
+
+  // Would one that has moved along its body explain more than one whose force has changed? So a slide
+  // begins. Forces that followed it would hide it, and be wrong after it.
+  bool moved() const { return moved_; }
 
   // Do they, one of them anywhere and with any force, as well as if nothing had changed?
   bool explain_calmly(const JointEstimate& estimate) {
@@ -71,6 +81,7 @@ class KnownFit {
   JointFit& fit_;
   const LocalizerSettings& settings_;
   Change change_;
+  bool moved_ = false;
 };
 
 }  // namespace touchline

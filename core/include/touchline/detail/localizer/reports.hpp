@@ -50,8 +50,8 @@ class Reports {
     answer.searching = true;
     if (answer.status == Status::located) answer.status = Status::ambiguous;
   }
-  void doubt_last_if_wide(const LocalizerSettings& settings) {
-    doubt_if_wide(reports_[count_ - 1].answer, settings);
+  void doubt_last_if_wide(const LocalizerSettings& settings, double doubt = 1.0) {
+    doubt_if_wide(reports_[count_ - 1].answer, settings, doubt);
   }
   void change_force(int i, const Vec3& force) {
     reports_[i].answer.force = reports_[i].answer.candidates[0].fit.force = force;

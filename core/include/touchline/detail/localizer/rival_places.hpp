@@ -32,6 +32,8 @@ class RivalPlaces {
         starts_(kRoom) {}
 
   bool any() const { return count_ > 0 || waiting_ > 0; }
+  // Have the samples yet to decide where the contact of this number is?
+  bool undecided(int serial) const { return any() && added_.serial == serial; }
   // Has the curve yet to be followed to its ends? Until then nothing is told.
   bool searching() const { return any() && lead_ < 0; }
 

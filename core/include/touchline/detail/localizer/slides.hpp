@@ -113,9 +113,11 @@ class Slides {
     return norm(answer_.candidates[0].point - single_.surfaces().to_world(k.point, k.node));
   }
 
+  // Does all that is felt say that it is where it was found? A changed force would explain the first
+  // millimetres of its going on.
   bool stays(const Slide& slide) {
     fit_.weigh(slide.rested, measurement_);
-    return known_.explain(slide.rested);
+    return known_.explain(slide.rested) && !known_.moved();
   }
 
   // Contact c is where it was found now.

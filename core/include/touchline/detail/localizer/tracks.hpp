@@ -297,6 +297,9 @@ class Tracks {
     s.refer(now_.time, (risen ? settings_.lasting : settings_.refit) * now_.brief());
   }
 
+  // Learns nothing of a sample, and notes nothing: a contact may have begun to slide.
+  void pass(SegmentContacts& s) const { s.known.updated = std::max(s.known.updated, now_.time); }
+
   // --- several are known ---
   template <class Read>
   void several(SegmentContacts& s, Read&& read) {
@@ -309,7 +312,7 @@ class Tracks {
       arrive(s, read);
       return;
     }
-    accept(s);
+    known_.moved() ? pass(s) : accept(s);
     merging_.follow(s, now_);
     KnownContact newcomer;
     RivalPlaces& rivals = rivals_[now_.segment];
