@@ -58,7 +58,7 @@ class SegmentLevels {
   // Is what is felt of a segment most likely the arm's own doing: an error of its model in motion?
   bool is_own_doing(std::size_t g) const {
     const Segment& s = segments_[g];
-    return is_off(g) && motion_.moves() && (s.origin != Origin::push || s.lasted > tuning_.hand);
+    return is_off(g) && motion_.moves() && (s.origin != Origin::push || is_learned(g));
   }
 
   // Has the arm shown that it is not as told, and does it move, or has it since the event began?
@@ -103,6 +103,7 @@ class SegmentLevels {
     if (!is_felt(g)) {
       s.top = s.top_wrench = s.rest = s.back = s.below = s.lasted = s.clear = 0.0;
       s.in_motion = motion_.moves();
+      if (is_off(g) && motion_.moves()) s.shown += dt;
       return;
     }
     follow(g, dt);
@@ -136,6 +137,7 @@ class SegmentLevels {
     Holding contact, collision;
     Origin origin = Origin::start;
     bool in_motion = false;  // did the present event begin while the arm moved?
+    double shown = 0.0;  // for how long motion had shown before it what the arm is off by [s]
     // Of the present event, for how long [s]:
     double lasted = 0.0;
     double clear = 0.0;  // it has been known to exceed its limits clearly
@@ -148,6 +150,13 @@ class SegmentLevels {
 
   // Has the arm shown that it is not as told?
   bool is_off(std::size_t g) const { return rows_.off[g] != 0; }
+
+  // May a push that has lasted for so long be an error of the model after all? Not where motion had
+  // shown for as long how large these are, and it is clearly more.
+  bool is_learned(std::size_t g) const {
+    const Segment& s = segments_[g];
+    return s.lasted > tuning_.hand && !(s.shown > tuning_.hand && s.top > tuning_.hand_times);
+  }
 
   // Which rows of a segment: all, or those that its sensor's wrench has.
   enum class Rows { all, wrench };

@@ -183,6 +183,10 @@ struct DetectorTuning {
   // A push on an arm in motion rarely lasts longer [s]. Half: a guiding hand's push ends early.
   // Double: an error of the model lasts 4 s as an event.
   double hand = 2.0;
+  // Limits: motion had shown before how much a model errs, and what jumps to so many times that is a hand,
+  // however long it lasts. Half: an error of the model may last as an event. Double: a hand that holds on
+  // for 2 s hides the pushes of the next 10 s.
+  double hand_times = 4.0;
 
   // ---- What ends one ----
   // Of an event's peak: what may rest after it, as friction does. Half: what sticks lasts as an
@@ -266,6 +270,7 @@ struct DetectorTuning {
     v("trend", "1/K", t.trend);
     v("creep_share", "1", t.creep_share);
     v("hand", "s", t.hand);
+    v("hand_times", "1", t.hand_times);
     v("little", "1", t.little);
     v("trace", "1", t.trace);
     v("slow", "1", t.slow);
