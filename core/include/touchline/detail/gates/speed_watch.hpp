@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // A velocity is the derivative of its position: what positions and velocities differ by, over some
 // samples, is compared with what they have differed by so far. And which of the two stands still.
+// Of a joint that is slow little is enough: what a velocity is wrong by grows with itself, and, as it
+// comes late, with its changes. A position is at most a sample behind.
 // Theory: docs/theory.md, section 3.3.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "touchline/detail/gates/tuning.hpp"
@@ -20,12 +23,17 @@ class SpeedWatch {
   SpeedWatch(std::size_t joints, double period, int silent, const GatesTuning& tuning)
       : joints_(joints),
         silent_(silent),
+        period_(period),
         tuning_(tuning),
         over_(std::max(tuning.speed_window, tuning.speed_window_samples * period)),
         kept_(std::exp(-period / over_)),
         least_(tuning.speed_error * over_),
         drift_(joints),
+        way_(joints),
+        turn_(joints),
         usual_(joints),
+        most_(joints),
+        grain_(joints, std::numeric_limits<double>::infinity()),
         same_(2 * joints),
         often_(2 * joints) {}
 
@@ -37,10 +45,16 @@ class SpeedWatch {
     const double* __restrict now = readings.data();
     const double* __restrict last = before.data();
     double* __restrict drift = drift_.data();
+    double* __restrict way = way_.data();
+    double* __restrict turn = turn_.data();
     double* __restrict usual = usual_.data();
+    double* __restrict limit = most_.data();
+    double* __restrict grain = grain_.data();
     const double silent = silent_, rate = learned, kept = kept_;
     const double stands = tuning_.stands, surely = tuning_.surely, stale = tuning_.stale;
-    const double disagrees = tuning_.disagrees;
+    const double disagrees = tuning_.disagrees, lively = tuning_.lively;
+    const double slight = tuning_.speed_slight * over_, part = tuning_.speed_part,
+                 late = tuning_.speed_late, period = period_;
     double* __restrict same = same_.data();
     double* __restrict often = often_.data();
     for (std::size_t c = 0; c < 2 * n; ++c) {
@@ -51,12 +65,24 @@ class SpeedWatch {
     const double least = least_;
     double worst = 0.0;
     for (std::size_t j = 0; j < n; ++j) {
-      const double off = now[j] - last[j] - 0.5 * dt * (now[n + j] + last[n + j]);
-      const double sum = kept * drift[j] + off, size = std::fabs(sum);
+      const double step = now[j] - last[j], travel = 0.5 * dt * (now[n + j] + last[n + j]);
+      const double sum = kept * drift[j] + step - travel, size = std::fabs(sum);
+      const double by_speed = kept * way[j] + travel;
+      const double faster = kept * turn[j] + now[n + j] - last[n + j];
       drift[j] = sum == sum ? sum : 0.0;
-      const double most = disagrees * usual[j] > least ? disagrees * usual[j] : least;
+      way[j] = by_speed == by_speed ? by_speed : 0.0;
+      turn[j] = faster == faster ? faster : 0.0;
+      const double change = std::fabs(step);
+      grain[j] = change > 0.0 && change < grain[j] ? change : grain[j];
+      const bool alive = same[n + j] < stands && often[n + j] > lively && often[j] > lively;
+      const double lag = turn[j] * drift[j] > 0.0 ? late : period;
+      const double clear = slight + part * std::fabs(way[j]) + lag * std::fabs(turn[j]) +
+                           kGrains * grain[j];
+      const double error = alive && clear < least ? clear : least;
+      const double most = disagrees * usual[j] > error ? disagrees * usual[j] : error;
       const double clipped = size < most ? size : most;
       usual[j] += rate * (clipped - usual[j]);
+      limit[j] = most;
       const bool dead = same[n + j] >= stands && often[n + j] > surely;
       const double over = dead ? 2.0 : (same[n + j] < silent ? size : stale * size) / most;
       worst = over > worst ? over : worst;
@@ -67,7 +93,7 @@ class SpeedWatch {
   // Do position and velocity of joint j disagree?
   bool far(std::size_t j) const {
     const double off = std::fabs(drift_[j]) * (same_[joints_ + j] >= silent_ ? tuning_.stale : 1.0);
-    return off > std::max(tuning_.disagrees * usual_[j], least_);
+    return off > most_[j];
   }
   // Has a velocity that changes with each sample stopped to do so?
   bool is_still(std::size_t j) const {
@@ -79,15 +105,24 @@ class SpeedWatch {
   bool is_dull(std::size_t c) const { return often_[c] < tuning_.lively; }
 
   // What joint j has differed by counts no more; that of all.
-  void forget(std::size_t j) { drift_[j] = 0.0; }
-  void forget_all() { std::fill(drift_.begin(), drift_.end(), 0.0); }
+  void forget(std::size_t j) { drift_[j] = way_[j] = turn_[j] = 0.0; }
+  void forget_all() {
+    for (std::vector<double>* sums : {&drift_, &way_, &turn_})
+      std::fill(sums->begin(), sums->end(), 0.0);
+  }
 
  private:
+  static constexpr double kGrains = 2.0;  // a position stands until its joint has come by one of them
+
   std::size_t joints_;
   int silent_;  // [samples]
+  double period_;  // [s]
   const GatesTuning& tuning_;
   double over_, kept_, least_;  // [s]; of a sum from sample to sample; [rad or m]
-  std::vector<double> drift_, usual_;  // per joint [rad or m]
+  std::vector<double> drift_, way_;    // per joint: what they differ by; its way by its velocity [rad or m]
+  std::vector<double> turn_;           // by what its velocity has changed [rad/s or m/s]
+  std::vector<double> usual_, most_;   // of what they differ by: the mean, and what is believed [rad or m]
+  std::vector<double> grain_;          // the smallest change of its position [rad or m]
   std::vector<double> same_, often_;   // per position, then per velocity: samples; of the samples
 };
 

@@ -120,6 +120,12 @@ struct GatesTuning {
   // A velocity may be wrong by so much [rad/s or m/s]. Half: delays of one sample count in hard
   // motion. Double: twice the error is believed.
   double speed_error = 0.1;
+  // One that changes with each sample may be wrong by this [rad/s or m/s], by this part of itself, and
+  // by what it changes in this time [s], if that is less. Half: offsets of 5 mrad/s, scales of a
+  // quarter, filters of 5 ms disagree. Double: a wrong sign is not seen below 0.02 rad/s.
+  double speed_slight = 0.01;
+  double speed_part = 0.5;
+  double speed_late = 0.01;
   // So many times the mean difference is a disagreement. Half: motions the arm has not yet shown.
   // Double: twice as wrong.
   double disagrees = 10.0;
@@ -199,6 +205,9 @@ struct GatesTuning {
     v("speed_window", "s", t.speed_window);
     v("speed_window_samples", "samples", t.speed_window_samples);
     v("speed_error", "rad/s", t.speed_error);
+    v("speed_slight", "rad/s", t.speed_slight);
+    v("speed_part", "1", t.speed_part);
+    v("speed_late", "s", t.speed_late);
     v("disagrees", "1", t.disagrees);
     v("stands", "samples", t.stands);
     v("surely", "1", t.surely);
