@@ -77,12 +77,12 @@ class LinkEvidence {
   }
 
   // Takes a sample of the touch, which `measurement` has read. So many `units` of its work
-  // (`PlaceTuning::search_work`) are left for the walk; samples slower than 1 kHz leave time for all of it.
+  // (`PlaceTuning::search_work`) are left for the walk.
   void take(const double* row, const double* q, const Measurement& measurement, int units) {
     if (!resting_.known()) return;
     add(row + observer_.row_layout().segment_torque(), q);
     if (!walking_ && changed()) start(measurement);
-    if (walking_) walk(period_ > kHurried ? std::numeric_limits<int>::max() : units);
+    if (walking_) walk(units);
   }
 
   // Has a walk been finished since the touch began?
@@ -97,7 +97,6 @@ class LinkEvidence {
   // Units of work: a patch; the pushes that may come there; the free way that they need.
   static constexpr int kPatch = 9, kPushes = 15, kApproach = 17;
   static constexpr int kLeast = 4;  // such a part of a sample's patches is looked at in any case
-  static constexpr double kHurried = 1.001e-3;  // s: slower samples leave time for whatever is due
 
   struct Patch {
     int body, surface, sample;
