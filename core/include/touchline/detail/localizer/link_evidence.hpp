@@ -76,13 +76,12 @@ class LinkEvidence {
     ++revision_;
   }
 
-  // Takes a sample of the touch, which `measurement` has read. So many `units` of its work
-  // (`PlaceTuning::search_work`) are left for the walk.
-  void take(const double* row, const double* q, const Measurement& measurement, int units) {
+  // Takes a sample of the touch, which `measurement` has read.
+  void take(const double* row, const double* q, const Measurement& measurement) {
     if (!resting_.known()) return;
     add(row + observer_.row_layout().segment_torque(), q);
     if (!walking_ && changed()) start(measurement);
-    if (walking_) walk(units);
+    if (walking_) walk();
   }
 
   // Has a walk been finished since the touch began?
@@ -94,9 +93,6 @@ class LinkEvidence {
   static constexpr double kNone = -std::numeric_limits<double>::infinity();
   // Of the way to where two bodies are alike, no unit: rounding must not decide which is the first.
   static constexpr double kShort = 0.95;
-  // Units of work: a patch; the pushes that may come there; the free way that they need.
-  static constexpr int kPatch = 9, kPushes = 15, kApproach = 17;
-  static constexpr int kLeast = 4;  // such a part of a sample's patches is looked at in any case
 
   struct Patch {
     int body, surface, sample;
@@ -164,16 +160,13 @@ class LinkEvidence {
     if (!cholesky(covariance_.data(), rows_, 1e-15)) return;
     std::fill(sums_.begin(), sums_.end(), 0.0);
     best_ = kNone;
-    next_ = due_ = 0;
+    next_ = 0;
     body_ = -1;
     walking_ = true;
   }
 
-  // On to where it is due by now: as far as there are units of work, the samples that follow catch up.
-  void walk(int units) {
-    due_ = std::min(due_ + each_, patches_.size());
-    const std::size_t least = next_ + (each_ + kLeast - 1) / kLeast;
-    for (; next_ < due_ && (units > 0 || next_ < least); ++next_) units -= look(patches_[next_]);
+  void walk() {
+    for (std::size_t k = 0; k < each_ && next_ < patches_.size(); ++k) look(patches_[next_++]);
     if (next_ < patches_.size()) return;
     walking_ = false;
     double all = 0.0, even = 0.0;
@@ -234,8 +227,7 @@ class LinkEvidence {
     }
   }
 
-  // The units of work of it.
-  int look(const Patch& patch) {
+  void look(const Patch& patch) {
     const int node = surfaces_.bodies(segment_)[patch.body].node;
     if (patch.body != body_) {
       body_ = patch.body;
@@ -250,8 +242,7 @@ class LinkEvidence {
         evidence_.at(quadratic_, X.R * sample.point + X.p, X.R * sample.normal, grasped, radius,
                      best_ - settings_.negligible_patch - scale);
     double value = e.log_evidence + scale;
-    if (!e.judged) return kPatch;
-    if (!(value > best_ - settings_.negligible_patch)) return kPatch + kPushes;
+    if (!(value > best_ - settings_.negligible_patch)) return;
     const Vec3 force = transposed_times(X.R, e.force);
     if (!grasped) {  // as the arm stands now: other links may be in the way
       value += approach(surfaces_, surfaces_.to_world(sample.point, node),
@@ -268,7 +259,6 @@ class LinkEvidence {
     if (sums_[patch.body] == 0.0 || value > found.share)
       found = {node, patch.surface, value, sample.point, sample.normal, force, radius};
     sums_[patch.body] += weight;
-    return kPatch + kPushes + (grasped ? 0 : kApproach);
   }
 
   const Observer& observer_;
@@ -295,7 +285,7 @@ class LinkEvidence {
   std::vector<int> joints_;
   std::vector<BodyShare> found_, shares_;  // `share` of the first: log of the evidence
   Quadratic quadratic_;
-  std::size_t next_ = 0, due_ = 0;  // patches: the next one, and up to where it shall have come
+  std::size_t next_ = 0;
   int rows_ = 0, body_ = -1, revision_ = 0;
   double best_ = kNone;
   bool walking_ = false, known_ = false;

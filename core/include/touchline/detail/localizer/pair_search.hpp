@@ -75,9 +75,9 @@ class PairSearch {
   static constexpr double kLittle = 0.02;     // of cost: not worth a step
   static constexpr double kEver = std::numeric_limits<double>::infinity();  // any cost may still fall
 
-  // Units of work: the beginning of a descent, where no cache has its meshes and from where one has come
-  // to; where a force enters its body; the evidence of a solution; another view.
-  static constexpr int kElsewhere = 100, kBegin = 12, kEntries = 150, kWeight = 230, kView = 150;
+  // Units of work: the beginning of a descent; where a force enters its body; the evidence of a solution;
+  // another view.
+  static constexpr int kBegin = 12, kEntries = 150, kWeight = 230, kView = 150;
 
   // From points spread over the links, by descents, to solutions. What was measured in the meantime
   // moves them a little; with other entries of their forces they are weighed by that.
@@ -97,7 +97,7 @@ class PairSearch {
         return done;
       }
       case Stage::descents:
-        if (descent_.working() || next_ < starts_.count()) return descend(units, starts_, kElsewhere);
+        if (descent_.working() || next_ < starts_.count()) return descend(units, starts_);
         if (now.time == seen_) {
           begin_entries();
           return 0;
@@ -105,7 +105,7 @@ class PairSearch {
         renew(now, measurement);
         return kView;
       case Stage::renewals:
-        if (descent_.working() || next_ < renewed_) return descend(units, former_, kBegin);
+        if (descent_.working() || next_ < renewed_) return descend(units, former_);
         begin_entries();
         return 0;
       case Stage::entries:
@@ -130,12 +130,12 @@ class PairSearch {
     return 0;
   }
 
-  // Goes on from the pair at hand, or begins with the next one: so many units of work.
+  // Goes on from the pair at hand, or begins with the next one.
   template <class Pairs>
-  int descend(int units, const Pairs& from, int begin) {
+  int descend(int units, const Pairs& from) {
     if (!descent_.working()) {
       descent_.begin(from[next_++], {kSteps, kHopeless, kLittle, kEver}, false);
-      return begin;
+      return kBegin;
     }
     const int done = descent_.work(units);
     const Pair& s = descent_.pair();

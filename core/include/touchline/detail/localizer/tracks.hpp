@@ -70,9 +70,6 @@ class Tracks {
     return reports_.next();
   }
 
-  // Units of the last sample's work that are left for the walk over links.
-  int left() const { return share_.left(); }
-
   // What is said after the last sample.
   const Reports& reports() const { return reports_; }
 
@@ -124,7 +121,7 @@ class Tracks {
     if (!measurement_.can_be_followed() || settings_.first_entry) {
       const Ask ask{Ask::kSole, again(s), true, own_};
       report(s.touched.first, single_.locate(g, 0.0, measurement_, ask));
-      share_.spend(single_.units() + single_.weighed());
+      share_.spend(single_.units());
       return;
     }
     now_.lag =

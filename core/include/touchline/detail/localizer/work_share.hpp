@@ -22,7 +22,6 @@ class WorkShare {
       before_ = searching_;
       searching_ = 0;
       left_ = units_;
-      beyond_ = 0;
       left_first_ = units_ / kFirst;
       time_ = time;
     }
@@ -31,26 +30,19 @@ class WorkShare {
     return first ? std::min(own, left_first_) : own;
   }
   void spend(int units) {
-    beyond_ += std::max(0, units - left_);
     left_ = std::max(0, left_ - units);
     if (first_) left_first_ = std::max(0, left_first_ - units);
     searching_ += units > units_ / kLittle ? 1 : 0;
   }
-  // Units for the walk over links: its own, and what the searches have left or taken of them.
-  int left() const { return std::max(0, left_ + kWalk - beyond_); }
 
  private:
   static constexpr int kLittle = 16;  // so small a part of a sample's work is no search
   static constexpr int kFirst = 8;    // touches have such a part in their first sample
-  // Units that the walk over links has beside: some 15 of its patches. It goes on while a place is searched
-  // for, and with those of the search a sample is in time.
-  static constexpr int kWalk = 600;
 
   int units_;
-  // Of the sample of this time [s]: how many have searched, and in the one before; units that are left,
-  // and those taken beyond.
+  // Of the sample of this time [s]: how many have searched, and in the one before; units that are left.
   double time_ = -std::numeric_limits<double>::infinity();
-  int searching_ = 0, before_ = 0, left_ = 0, left_first_ = 0, beyond_ = 0;
+  int searching_ = 0, before_ = 0, left_ = 0, left_first_ = 0;
   bool first_ = false;  // was it the first sample of the touch that has taken last?
 };
 

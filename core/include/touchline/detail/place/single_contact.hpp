@@ -31,8 +31,6 @@ class SingleContact {
   void forget(int g) { found_.forget(g); }
   // Units of work that the last search took.
   int units() const { return found_.units(); }
-  // And to weigh what it has found.
-  int weighed() const { return kWeighed * found_.count(); }
 
   // The contact on segment g, which `measurement` has read; its wrench is `lag` [s] old.
   const Answer& locate(int g, double lag, Measurement& measurement, const Ask& ask) {
@@ -100,7 +98,6 @@ class SingleContact {
  private:
   static constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   static constexpr int kUnknowns = 5;  // of one contact: two of its place, three of its force
-  static constexpr int kWeighed = 15;  // units of work: a candidate, with the free way that its push needs
 
   // A steady twist and force are assumed. A past that is remembered is exact up to the first order:
   // the rest (`Mean::moment`) is that of the body's origin.

@@ -34,7 +34,6 @@ class SurfaceEvidence {
   struct Explained {
     double log_evidence = -std::numeric_limits<double>::infinity();  // per area
     Vec3 force;  // the most likely, as far as the rows tell [N]
-    bool judged = false;  // have the pushes been weighed that may come there?
   };
 
   // A patch about `point` with the outward `normal`, `radius` [m] one sigma of the places on it along
@@ -70,7 +69,6 @@ class SurfaceEvidence {
     double C[9];
     for (int i = 0; i < 9; ++i) C[i] = P[5 * (i / 3) + i % 3];
     if (!cholesky(C, 3)) return e;
-    e.judged = true;
     e.log_evidence = fitted + std::log(density(fitter, C, e.force, normal, grasped));
     return e;
   }
