@@ -6,7 +6,8 @@ import pytest
 from shapes import chain
 from timeline import Push, ramp, signals
 
-from touchline.model.robot import load_robot
+from touchline.model.perturbed import perturbed
+from touchline.model.robot import Robot, load_robot
 from touchline.observer.dynamics import contact_loads
 from touchline.pipeline.pipeline import Pipeline
 from touchline.trials.free_motion import MotionMaker, Trajectory
@@ -155,6 +156,39 @@ def test_a_push_on_an_error_that_has_crept_over_its_limit_is_its_own_event():
     assert 2.3 < crept[0] < 2.9
     assert 3.0 < push[0] < 3.05
     assert push[1] is not None and 3.5 < push[1] < 3.8
+
+
+@pytest.mark.parametrize("newton", [20.0, 60.0])
+def test_a_push_that_is_held_in_motion_hides_not_the_next_one(newton):
+    # Masses 2 % off: 7 s of motion have shown how far the model errs.
+    robot, n = load_robot("sara"), 7
+    way = Trajectory(
+        np.linspace(-0.4, 0.5, n),
+        np.full((1, n), 0.3),
+        np.linspace(1.0, 2.5, n)[None, :],
+        np.linspace(0.0, 5.0, n)[None, :],
+        (1e-3, 0.0),
+    )
+    real = Robot(robot.description, perturbed(robot.mechanism, 0.02, np.random.default_rng(4)))
+    maker = MotionMaker(robot, real, 1000.0, 17.0)
+    q, qd, loads = maker.loads(way)
+
+    def held(begin: float, end: float) -> np.ndarray:
+        rise, fall = (np.clip((maker.time - t) / 0.02, 0.0, 1.0) for t in (begin, end))
+        return rise - fall
+
+    size = newton * held(7.0, 13.0) + 20.0 * held(15.0, 15.5)
+    force = size[:, None] * np.array([0.0, 0.0, -1.0])
+    at = np.array([robot.T_world_links(x)["link3"][:3, 3] for x in q])
+    contact = contact_loads(robot, q, "link3", np.hstack([force, np.cross(at, force)]))
+    loads[:, :n] -= contact.torque
+    loads[:, n:] -= contact.wrench.reshape(len(q), -1)
+    s = maker.sensed(q, qd, loads, np.random.default_rng(1))
+    pipeline = Pipeline(robot)
+    pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+    long, next_one = spans(pipeline)
+    assert 7.0 < long[0] < 7.05 and 13.0 < long[1] < 13.5
+    assert 15.0 < next_one[0] < 15.05 and 15.5 < next_one[1] < 15.9
 
 
 def test_of_slow_samples_what_trembles_after_a_strong_touch_does_not_prolong_it():

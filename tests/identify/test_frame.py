@@ -68,6 +68,27 @@ def test_a_shift_is_told_of_a_sensor_that_is_hardly_turned(robot):
     assert np.degrees(np.linalg.norm(found.turn - rpy)) < 0.01  # so small that angles add
 
 
+def test_what_is_left_of_a_frame_that_was_told_is_taken_out_however_little_it_is(robot):
+    """Turns of two degrees are not small: the first round is off by more than noise explains."""
+    sensors = list(robot.description.sensors)
+    turned = tuple(np.radians([2.0, -1.5, 1.0]).tolist())
+    sensors[WRIST] = replace(sensors[WRIST], rpy=turned)
+    real = Robot(replace(robot.description, sensors=tuple(sensors)), robot.mechanism)
+    samples = recorded(robot, real)
+    first = find_frames(gather(robot, [[samples]]))
+    once = with_frames(robot, first)
+    evidence = gather(once, [[samples]])
+    assert find_frames(evidence) == []  # nothing of it is sure
+    (more,) = find_frames(evidence, first)
+    twice = with_frames(once, [more])
+    R = rotation_rpy(turned).T
+    left = [
+        np.arccos((np.trace(R @ rotation_rpy(r.description.sensors[WRIST].rpy)) - 1.0) / 2.0)
+        for r in (once, twice)
+    ]
+    assert left[1] < left[0]
+
+
 def test_a_later_round_keeps_the_errors_of_what_it_does_not_tell():
     nothing, one, two = np.zeros(3), np.ones(3), np.full(3, 2.0)
     first = FrameError("base", one, 0.1 * one, two, 0.2 * one)

@@ -23,17 +23,17 @@ AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 _motions = {}
 
 
-def in_motion(name, seed=0, rate=RATE):
-    """The arm swings, nothing touches it, and its sensors are noisy; its model is 2 % off."""
-    key = name, seed, rate
+def in_motion(name, seed=0, rate=RATE, swing=0.3):
+    """The arm swings [rad], nothing touches it, and its sensors are noisy; its model is 2 % off."""
+    key = name, seed, rate, swing
     if key not in _motions:
         robot = robot_named(name)
         rng = np.random.default_rng(seed)
         n = len(robot.joint_names)
         time = np.arange(round(SECONDS * rate)) / rate
         phase, pace = rng.uniform(0.0, 2 * np.pi, n), rng.uniform(1.0, 3.0, n)
-        q = 0.6 + 0.3 * np.sin(np.outer(time, pace) + phase)
-        qd = 0.3 * pace * np.cos(np.outer(time, pace) + phase)
+        q = 0.6 + swing * np.sin(np.outer(time, pace) + phase)
+        qd = swing * pace * np.cos(np.outer(time, pace) + phase)
         tau, wrench = exact_loads(robot, time, q, qd)
         tau, wrench = 1.005 * tau, 1.005 * wrench
         noise = rng.normal(0.0, 1.0, (len(time), 3 * n + 6 * len(robot.sensor_names)))
@@ -279,6 +279,25 @@ def test_a_position_or_velocity_that_is_lost_is_stood_in_for_by_the_other(name, 
             told = np.flatnonzero(estimate.health & bit)
             assert told.tolist() == list(range(AT, AT + 300))
             assert np.all(estimate.health[AT : AT + 300] & tl.Health.FAULTY)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("fault", ["position stands", "velocity of the wrong sign"])
+def test_what_disagrees_of_a_joint_slower_than_a_tenth_of_a_radian_per_second_is_told(name, fault):
+    robot = robot_named(name)
+    for j in range(len(robot.joint_names)):
+        s = in_motion(name, swing=0.04)
+        if not 0.04 < abs(s.qd[AT, j]) < 0.09:
+            continue
+        if fault == "position stands":
+            s.q[AT:, j] = s.q[AT, j]
+        else:
+            s.qd[AT:, j] *= -1.0
+        pipeline = tl.Pipeline(robot)
+        run(pipeline, s)
+        told = {c.channel.partition(".")[2]: c.sample for c in reversed(pipeline.faults)}
+        assert set(told) == {robot.joint_names[j]}
+        assert AT <= told[robot.joint_names[j]] <= AT + 50
 
 
 def test_a_joint_without_position_and_velocity_is_not_made_up():

@@ -76,13 +76,12 @@ class Chooser:
     Args:
         evidence: all instants.
         use: (N,) those that may be used.
-        least_scatter: of each row, as a part of its largest reading.
     """
 
-    def __init__(self, evidence: Evidence, use: Mask, least_scatter: float = LEAST_SCATTER) -> None:
+    def __init__(self, evidence: Evidence, use: Mask) -> None:
         self.evidence, self.use = evidence, use
         self.start = evidence.residual()
-        self.floor = least_scatter * np.abs(evidence.reading).max(axis=0, initial=0.0)
+        self.floor = LEAST_SCATTER * np.abs(evidence.reading).max(axis=0, initial=0.0)
         self.folds = list(folds_of(evidence, use))
         self.blocks = blocks_of(evidence)
         self.moved = np.sqrt(np.mean(evidence.qd[use] ** 2, axis=0)) > MOVED

@@ -22,9 +22,6 @@ from touchline.model.transforms import rotation_about, rotation_rpy, rpy_of
 
 SURE = 5.0  # standard errors
 LEAST = {"turn": np.radians(0.1), "shift": 5e-4}  # rad, m; smaller ones are left alone
-# Of a row's largest reading, as a converter of 12 bits has it: a shift shows in some mNm beside
-# hundreds of Nm.
-RESOLVED = 2.5e-4
 DIGITS = 6  # of a written figure: 1e-6 rad or m
 
 
@@ -55,19 +52,19 @@ def find_frames(evidence: Evidence, before: Sequence[FrameError] = ()) -> list[F
     sensors = _judged(evidence)
     if not sensors:
         return []
-    refined = {
+    told = {
         (kind, evidence.joints + 6 * s)
         for s in sensors
         for frame in before
         for kind, error in (("turn", frame.turn_error), ("shift", frame.shift_error))
         if frame.name == evidence.robot.sensor_names[s] and error.any()
     }
-    chooser = Chooser(evidence, np.ones(len(evidence), dtype=bool), RESOLVED)
+    chooser = Chooser(evidence, np.ones(len(evidence), dtype=bool))
     every = frame_columns(evidence)
     turns = tuple(c for c in every if c.kind == "turn")
-    if not refined and not _sure_columns(chooser.fit_beside(every)):
+    if not told and not _sure_columns(chooser.fit_beside(every)):
         return []
-    known = tuple(c for c in every if (c.kind, c.row) in refined)
+    known = tuple(c for c in every if (c.kind, c.row) in told)
     options = [known, tuple(c for c in every if c in known or c in turns), every]
     found = chooser.choose_beside(list(dict.fromkeys(options)))
     while True:
