@@ -274,6 +274,12 @@ def test_missing_columns_with_a_hint(tmp_path):
     assert "qd" not in text
 
 
+def test_a_hint_is_no_column_of_another_joint(tmp_path):
+    header = COLUMNS.replace("q.j2", "q.jnt2", 1)
+    text = problems(write_csv(tmp_path / "log.csv", *rows(3), header=header))
+    assert "missing column 'q.j2' (did you mean 'q.jnt2'?)" in text
+
+
 def test_one_missing_torque(tmp_path):
     header = COLUMNS.replace("tau.j2", "torque2")
     text = problems(write_csv(tmp_path / "log.csv", *rows(3), header=header))

@@ -111,9 +111,11 @@ def _missing_problems(
             f"{', '.join(repr(pick.column.name) for pick in missing[:MOST_NAMED])}; columns "
             f"present: {listing(present, 20)}; other names are given under `log`"
         ]
+    taken = {pick.column.name for pick in picks}
+    free = [name for name in present if name not in taken]  # no other signal's column is meant
     for pick in missing:
         problems.append(
-            f"{path}: missing column {pick.column.name!r}{did_you_mean(pick.column.name, present)}"
+            f"{path}: missing column {pick.column.name!r}{did_you_mean(pick.column.name, free)}"
         )
     told = "other names are given under `log`"
     if any(pick.signal == "tau" for pick in missing):
