@@ -104,6 +104,42 @@ def test_links_keep_their_names(made, tmp_path):
     assert found["arm/again"]["status"] == "ok" and found["lost"]["status"] == "skipped"
 
 
+def test_results_beside_recordings_are_none(made, tmp_path, monkeypatch):
+    """As where somebody works in the folder of the recordings."""
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    shutil.copy(made / "a" / "whole.parquet", folder / "one.parquet")
+    shutil.copy(made / "a" / "whole.parquet", folder / "two.parquet")
+    monkeypatch.chdir(folder)
+    assert run("one.parquet", "--robot", "sara", "--out", ".") == 0
+    assert [r.name for r in make_plan(["."], "sara")] == ["one", "two"]
+    assert run(".", "--robot", "sara", "--out", ".") == 0
+    (folder / "two" / "touchline.unfinished" / "estimates.parts").mkdir(parents=True)
+    shutil.copy(
+        "one.parquet", folder / "two" / "touchline.unfinished" / "estimates.parts" / "0.parquet"
+    )
+    for word in (".", "*", "**", "**/*.parquet", str(folder / "**")):
+        assert [r.name for r in make_plan([word], "sara")] == ["one", "two"], word
+    assert set(rows(folder)) == {"one", "two"}
+
+
+def test_one_recording_takes_the_robot_beside_it(made, tmp_path, capsys):
+    """As each of several does, and as the plan says."""
+    log = tmp_path / "day" / "one.parquet"
+    log.parent.mkdir()
+    shutil.copy(made / "a" / "whole.parquet", log)
+    assert run(log, "--out", tmp_path / "out") == 2
+    assert "no robot: give --robot, or put a robot.yaml beside it" in capsys.readouterr().err
+    joints = [
+        f"{{name: joint{k}{', torque: none' if k in (1, 6, 7) else ''}}}" for k in range(1, 8)
+    ]
+    text = f"name: x\nmodel: robot:sara\njoints: [{', '.join(joints)}]\n"
+    (tmp_path / "robot.yaml").write_text(text)
+    assert run(log, "--out", tmp_path / "out") == 0
+    told = json.loads((tmp_path / "out" / "analysis.json").read_text())
+    assert str(tmp_path / "robot.yaml") in json.dumps(told)
+
+
 def test_every_recording_has_its_row(made, results):
     found = rows(results)
     assert {name: row["status"] for name, row in found.items()} == STATUS

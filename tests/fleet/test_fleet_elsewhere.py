@@ -84,6 +84,17 @@ def test_recordings_in_memory(made, tmp_path, local):
         make_plan(["nosuch://a"], "sara")
 
 
+def test_results_beside_recordings_elsewhere_are_none(made, tmp_path):
+    fsspec = pytest.importorskip("fsspec", reason="fsspec is not installed: touchline[fleet]")
+    shutil.copy(made / "a.parquet", tmp_path / "one.parquet")
+    assert run(tmp_path, "--out", tmp_path, "--workers", 1) == 0
+    assert (tmp_path / "tables").is_dir() and (tmp_path / "one" / "estimates.parquet").exists()
+    memory = fsspec.filesystem("memory")
+    memory.put(str(tmp_path), "/beside", recursive=True)
+    for url in (f"file://{tmp_path}", f"file://{tmp_path}/**", "memory://beside"):
+        assert [r.name for r in make_plan([url], "sara")] == ["one"], url
+
+
 @contextmanager
 def served(folder):
     handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=str(folder))

@@ -77,7 +77,7 @@ def analyze(
             workers must see the same folders.
     """
     from touchline.fleet.forecast import forecast, forecast_text
-    from touchline.fleet.plan import is_single, make_plan
+    from touchline.fleet.plan import NO_ROBOT, is_single, make_plan, nearest_robot
 
     if not logs:
         raise InputError("LOG: name at least one recording, folder, pattern or list")
@@ -87,11 +87,11 @@ def analyze(
     options = {"bandwidth": bandwidth, "method": method, "report": report}
     options |= {"friction": friction, "reach": reach}
     if is_single(logs):
-        if robot is None:
-            raise InputError(f"{logs[0]}: --robot is missing; it names the robot of this recording")
-        return _one(
-            Path(logs[0]), robot, out, options | {"beside": beside}, Viewers(rerun, foxglove)
-        )
+        log = Path(logs[0])
+        robot = robot or nearest_robot(log)
+        if not robot:
+            raise InputError(f"{log}: {NO_ROBOT}")
+        return _one(log, robot, out, options | {"beside": beside}, Viewers(rerun, foxglove))
     if beside is not None:
         raise InputError("--beside: of one recording; analyze that one alone")
     if rerun is not None or foxglove is not None:

@@ -4,9 +4,9 @@
 import csv
 import glob
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 from touchline.errors import InputError
@@ -15,11 +15,13 @@ from touchline.fleet.remote import found, is_url
 from touchline.fleet.tables import COMMON
 from touchline.logs.log import BAGS, TABLES
 from touchline.logs.parquet import damages, first_line
-from touchline.report.outputs import ANALYSIS, NAMES
+from touchline.report.outputs import NAMES
 
 ROBOT_FILE = "robot.yaml"
 LOG_COLUMN, ROBOT_COLUMN = "log", "robot"
 ENDINGS = (*TABLES, *BAGS)
+# Folders of results that are not whole yet.
+UNFINISHED = {f"{Path(name).stem}.parts" for name in NAMES}
 NO_ROBOT = f"no robot: give --robot, or put a {ROBOT_FILE} beside it"
 
 
@@ -81,14 +83,15 @@ def make_plan(logs: Sequence[str], robot: str | None) -> list[Recording]:
     for word in logs:
         for log, own in _named(word):
             if is_url(log):
-                remote |= {url: (size, robot or own) for url, size in found(log, ENDINGS)}
+                there = found(log, ENDINGS, is_result)
+                remote |= {url: (size, robot or own) for url, size in there}
                 continue
             # A link keeps its own name: what it leads to may be called by its hash alone.
             path = Path(os.path.abspath(log))
             if path.resolve() in targets:
                 continue
             targets.add(path.resolve())
-            chosen = robot or own or _nearest_robot(path)
+            chosen = robot or own or nearest_robot(path)
             local[path] = (chosen, "" if chosen else NO_ROBOT)
     if not local and not remote:
         raise InputError(f"{', '.join(logs)}: no recordings there ({', '.join(ENDINGS)})")
@@ -121,9 +124,9 @@ def _named(word: str) -> Iterator[tuple[str, str]]:
         matches = sorted(glob.glob(word, recursive=True)) if glob.has_magic(word) else []
         if not matches:
             raise InputError(f"{word}: no such file" + (" matches" if glob.has_magic(word) else ""))
-        for match in matches:
-            if Path(match).is_dir() or _is_log(Path(match)):
-                yield from _named(match)
+        for match in map(Path, matches):
+            if (match.is_dir() or _is_log(match)) and not is_result(match, os.path.exists):
+                yield from _named(str(match))
     elif path.is_dir() and not _is_bag_folder(path):
         for log in _below(path):
             yield str(log), ""
@@ -135,19 +138,33 @@ def _named(word: str) -> Iterator[tuple[str, str]]:
 
 def _below(folder: Path) -> Iterator[Path]:
     """Recordings in a folder and the folders in it, without results of earlier analyses."""
-    common = folder.name == COMMON and (folder.parent / MANIFEST).exists()
-    if common or (folder / ANALYSIS).exists():
-        return
     for path in sorted(folder.iterdir()):
-        if path.name.startswith(".") or path.name.endswith(".parts"):
+        hidden = path.name.startswith(".") or path.name.endswith(".parts")
+        if hidden or is_result(path, os.path.exists):
             continue
         if path.is_dir():
             if _is_bag_folder(path):
                 yield path
             else:
                 yield from _below(path)
-        elif _is_log(path) and path.name not in NAMES and not _is_list(path):
+        elif _is_log(path) and not _is_list(path):
             yield path
+
+
+def is_result(path: PurePath, exists: Callable[[str], bool]) -> bool:
+    """Whether an earlier analysis wrote a file or folder, which may stand beside recordings.
+
+    Args:
+        path: of the file or folder.
+        exists: whether there is a file.
+    """
+    if path.name in NAMES:
+        return True
+    return any(
+        folder.name in UNFINISHED
+        or (folder.name == COMMON and exists(str(folder.parent / MANIFEST)))
+        for folder in (path, *path.parents)
+    )
 
 
 def _is_log(path: Path) -> bool:
@@ -213,7 +230,9 @@ def _list_rows(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
             yield f"line {number}", row
 
 
-def _nearest_robot(log: Path) -> str:
+def nearest_robot(log: Path) -> str:
+    """The `robot.yaml` in a recording's folder or the nearest above it; empty where none is."""
+    log = Path(os.path.abspath(log))
     for folder in (*log.parents, *log.resolve().parents):
         if (folder / ROBOT_FILE).is_file():
             return str(folder / ROBOT_FILE)

@@ -2,9 +2,9 @@
 """Recordings that are elsewhere: any URL that fsspec knows, such as s3:// and http://."""
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
+from pathlib import Path, PurePath, PurePosixPath
 from typing import Any
 
 from touchline.errors import InputError
@@ -20,8 +20,17 @@ def is_url(word: str) -> bool:
     return "://" in word
 
 
-def found(url: str, endings: tuple[str, ...]) -> list[tuple[str, int]]:
+def found(
+    url: str,
+    endings: tuple[str, ...],
+    is_result: Callable[[PurePath, Callable[[str], bool]], bool],
+) -> list[tuple[str, int]]:
     """Recordings below a URL or that a pattern matches, with their sizes [bytes].
+
+    Args:
+        url: of a file, a folder, or a pattern.
+        endings: of the names of recordings.
+        is_result: whether an earlier analysis wrote a file; `touchline.fleet.plan.is_result`.
 
     Raises:
         InputError: nothing is there, or it cannot be reached.
@@ -32,10 +41,14 @@ def found(url: str, endings: tuple[str, ...]) -> list[tuple[str, int]]:
         if any(mark in path for mark in "*?["):
             paths = system.glob(path)
         elif path.lower().endswith(endings) and not _is_folder(system, path):
-            paths = [path]
+            return [(str(system.unstrip_protocol(path)), int(system.size(path) or 0))]
         else:
             paths = system.find(path)
-        names = sorted(p for p in paths if p.lower().endswith(endings))
+        names = sorted(
+            p
+            for p in paths
+            if p.lower().endswith(endings) and not is_result(PurePosixPath(p), system.exists)
+        )
         sizes = [
             (str(system.unstrip_protocol(name)), int(system.size(name) or 0)) for name in names
         ]
