@@ -43,6 +43,10 @@ def test_a_place_that_creeps_is_no_surer_than_right(run):
         pytest.param(29, 6, id="along a curve on a round link"),
         pytest.param(32, 6, id="behind an edge, where no force on it is in the cone"),
         pytest.param(69, 0, id="three centimetres along the link"),
+        pytest.param(15, 41, id="while the first hand seems to slide"),
+        pytest.param(61, 42, id="while it seems to slide, on the other side of the link"),
+        pytest.param(51, 42, id="where the first hand would pull"),
+        pytest.param(40, 43, id="by a region that the unrest may widen"),
     ],
 )
 def test_what_forces_that_change_leave_open_is_not_located(run, seed):

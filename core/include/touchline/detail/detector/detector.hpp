@@ -387,16 +387,17 @@ class Detector {
     const bool stopped = motion_.has_stopped(dt);
     for (std::size_t g = 0; g < rows_.segments(); ++g) {
       const bool felt = levels_.is_felt(g), pending = levels_.is_pending(g);
+      const bool begins = levels_.is_beginning(g);
       const bool learns_now =
-          learns(g) && dt > 0.0 && (felt ? levels_.is_own_doing(g) : !levels_.steps(g));
+          learns(g) && dt > 0.0 && (felt ? begins : !levels_.steps(g));
       const bool rests = stopped && rows_.off[g] != 0;
-      const bool usual = !(confirmed || looking || learns_now || felt || rests || pending);
+      const bool usual = !(confirmed || looking || learns_now || felt || begins || rests || pending);
       for (const std::size_t i : rows_.of(g)) {
         averages_[i] = rows_.known[i];
         if (usual || !rows_.samples[i].known) continue;
         if (offsets_.is_to_confirm(i)) confirm_start(i);
         if (learns_now && rows_[i].seen > 0.0) {
-          drift_.learn(i, rows_.samples[i].residual - offsets_.baseline(i), dt, felt);
+          drift_.learn(i, rows_.samples[i].residual - offsets_.baseline(i), dt, begins);
           shown_by_motion_[i] = std::max(shown_by_motion_[i], drift_.shown(i));
         }
         if (looking) look(i);
@@ -408,7 +409,7 @@ class Detector {
         // it is no baseline.
         const bool noise = first_looks_[i].ratio() > 1.0 && seen(g) != Seen::enough &&
                            scores_[g].score < tuning_.unseen;
-        if (felt || (pending && !noise)) averages_[i] = 0.0;
+        if (felt || begins || (pending && !noise)) averages_[i] = 0.0;
       }
     }
     offset_ = offsets_.follow_baselines(averages_, shown_by_motion_, dt);

@@ -83,9 +83,10 @@ class ModelDrift {
         lately_share_(rows.segments(), 0.0),
         drift_(rows.size(), 0.0) {}
 
-  // Row i is so far off its baseline [N or Nm] for a time dt [s] of motion, `felt` or not.
-  void learn(std::size_t i, double off, double dt, bool felt) {
-    spreads_[i].add(off, way2_[rows_[i].segment], dt, felt, tuning_);
+  // Row i is so far off its baseline [N or Nm] for a time dt [s] of motion. While that `begins` to
+  // show it is learned quickly.
+  void learn(std::size_t i, double off, double dt, bool begins) {
+    spreads_[i].add(off, way2_[rows_[i].segment], dt, begins, tuning_);
   }
   // What motion alone hardly exceeds [N or Nm].
   double shown(std::size_t i) const { return spreads_[i].limit(tuning_); }

@@ -25,10 +25,9 @@ class MotionSpread {
   };
 
   // A residual less its baseline [N or Nm], for a time dt [s] of motion, so far from where that was
-  // averaged [rad2]. While it is taken for a contact (`touched`) it counts for more: an error that
-  // begins with motion ends as an event soon.
-  void add(double off, double way2, double dt, bool touched, const DetectorTuning& tuning) {
-    const double news = touched ? tuning.motion_touched * dt : dt;
+  // averaged [rad2]. While it `begins` to show it counts for more: what it makes an event of ends soon.
+  void add(double off, double way2, double dt, bool begins, const DetectorTuning& tuning) {
+    const double news = begins ? tuning.motion_touched * dt : dt;
     time_ = std::min(time_ + news, tuning.motion_memory);
     if (!(time_ > 0.0)) return;
     const double share = std::min(1.0, news / time_);

@@ -61,6 +61,12 @@ class SegmentLevels {
     return is_off(g) && motion_.moves() && (s.origin != Origin::push || is_learned(g));
   }
 
+  // Does an error of the model begin to show, or may it grow after it has been felt? Then it is learned
+  // quickly. What exceeds its limits anew may be a push.
+  bool is_beginning(std::size_t g) const {
+    return is_felt(g) ? is_own_doing(g) : segments_[g].grows > 0.0 && !is_pending(g);
+  }
+
   // Has the arm shown that it is not as told, and does it move, or has it since the event began?
   bool has_moved_off(std::size_t g) const {
     return is_off(g) && (segments_[g].in_motion || motion_.moves());
@@ -103,6 +109,7 @@ class SegmentLevels {
     if (!is_felt(g)) {
       s.top = s.top_wrench = s.rest = s.back = s.below = s.lasted = s.clear = 0.0;
       s.in_motion = motion_.moves();
+      s.grows = std::max(0.0, s.grows - dt);
       if (is_off(g) && motion_.moves()) s.shown += dt;
       return;
     }
@@ -137,6 +144,7 @@ class SegmentLevels {
     Holding contact, collision;
     Origin origin = Origin::start;
     bool in_motion = false;  // did the present event begin while the arm moved?
+    double grows = 0.0;  // for how long what was the arm's own doing may go on to grow [s]
     double shown = 0.0;  // for how long motion had shown before it what the arm is off by [s]
     // Of the present event, for how long [s]:
     double lasted = 0.0;
@@ -172,7 +180,10 @@ class SegmentLevels {
     s.top_wrench = std::max(s.top_wrench, lately(g, Rows::wrench));
     if (s.top > tuning_.barely) s.clear += dt;
     s.rest = lasting((may_rest(g) && is_steady(g)) || only_joints_left(g), dt, s.rest);
-    if (s.below >= times_.hold) levels_[g] = 0;
+    if (s.below >= hold(g)) {
+      levels_[g] = 0;
+      s.grows = times_.hold - s.below;  // only the arm's own doing ends before
+    }
     const double least = tuning_.rest / rows_.slowest(g);
     const double least_moving = std::max(least, tuning_.rest_moving);
     if (is_felt(g) && s.rest >= (motion_.stands() ? least : least_moving)) come_to_rest(g);
@@ -196,6 +207,12 @@ class SegmentLevels {
       case Seen::some: return score > tuning_.alone;
       default: return score > tuning_.alone || borne > 1.0;
     }
+  }
+
+  // How long an event must be below what releases it, to end [s]: what wavers about that is one push. Of
+  // the arm's own doing limits have grown, and it is over with the mean of the last moments.
+  double hold(std::size_t g) const {
+    return is_own_doing(g) ? std::min(times_.hold, tuning_.trend / rows_.slowest(g)) : times_.hold;
   }
 
   // For how long something has held, but for single samples of noise.

@@ -72,7 +72,8 @@ class Arrivals {
     if (subsided(s)) return;
     const int for_slides = left_ / kSlides;
     int left = for_slides;
-    const Slides::Outcome outcome = slides_.follow(s, now, left, read);
+    const Slides::Outcome outcome = slides_.follow(
+        s, now, left, rivals_[now.segment].any(), read, [&](const KnownContact& k) { add_known(s, k); });
     left_ -= for_slides - left;
     switch (outcome) {
       case Slides::Outcome::none:
@@ -98,7 +99,7 @@ class Arrivals {
       if (!contested || against >= 0) suspect_ = suspect_beside_free_forces(s, against, read);
     }
     if (suspect_.any()) {  // what has come is no contact, as far as is felt
-      for (int c = 0; c < s.known.contacts.count; ++c) add_known(before.contacts.known[c]);
+      for (int c = 0; c < s.known.contacts.count; ++c) add_known(s, before.contacts.known[c]);
       s.unexplained.placed.reset();
       return;
     }
@@ -130,7 +131,7 @@ class Arrivals {
     const double since = u.slide.seen ? std::max(u.since, *u.slide.seen) : u.since;
     const bool lasting = now_.time - since >= settings_.suspected * now_.brief();
     for (int c = 0; c < s.known.contacts.count; ++c) {
-      add_known(s.known.before.contacts.known[c]);
+      add_known(s, s.known.before.contacts.known[c]);
       if (lasting && !placed(a)) reports_.doubt_last();
     }
     if (!placed(a) && !lasting) return;
@@ -138,16 +139,21 @@ class Arrivals {
     add_newcomer(s, a);
   }
 
-  // Its place is wider than it seems where it is not known well how restless the known ones are.
   void add_newcomer(SegmentContacts& s, const Answer& a) {
     reports_.add(number(s), a);
+    doubt_last_if_wide(s);
+  }
+
+  // Places are wider than they seem where it is not known well how restless the known ones are.
+  void doubt_last_if_wide(const SegmentContacts& s) {
     const JointEstimate& known = s.known.before.contacts;
     reports_.doubt_last_if_wide(settings_, known.unrest_doubt(now_.bandwidth, settings_));
   }
 
-  // One whose rivals have yet to decide is not sure in the meantime.
-  void add_known(const KnownContact& k) {
+  // One whose rivals have yet to decide is not sure in the meantime, nor is a wide one of several.
+  void add_known(const SegmentContacts& s, const KnownContact& k) {
     reports_.add(k);
+    if (s.known.contacts.count > 1) doubt_last_if_wide(s);
     if (rivals_[now_.segment].undecided(k.serial)) reports_.doubt_last();
   }
 
@@ -185,7 +191,7 @@ class Arrivals {
     for (int c = 0; c < before.count; ++c) {
       const KnownContact& k = before.known[c];
       if (!takes_back(k, a, single_.surfaces(), settings_)) continue;
-      for (int i = 0; i < before.count; ++i) add_known(before.known[i]);
+      for (int i = 0; i < before.count; ++i) add_known(s, before.known[i]);
       reports_.change_force(c, k.force + a.force);
       s.unexplained.placed.reset();  // what was suspected ends when all is explained
       return true;
@@ -215,7 +221,7 @@ class Arrivals {
     JointEstimate& known = s.known.contacts;
     known = s.known.before.contacts;
     fit_.accept(known, known_.change(), 0.0);
-    for (int c = 0; c < known.count; ++c) add_known(known.known[c]);
+    for (int c = 0; c < known.count; ++c) add_known(s, known.known[c]);
     if (now_.time - s.unexplained.calm >= now_.brief()) end(s);
   }
 
@@ -292,7 +298,7 @@ class Arrivals {
     JointEstimate& all = s.known.contacts;
     all = s.known.before.contacts;
     const int old = all.count;
-    for (int c = 0; c < old; ++c) add_known(all.known[c]);
+    for (int c = 0; c < old; ++c) add_known(s, all.known[c]);
     add_newcomer(s, a);
     read();
     Change change;

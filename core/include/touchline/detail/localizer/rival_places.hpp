@@ -326,8 +326,12 @@ class RivalPlaces {
   }
   double cone(const KnownContact& k) const { return cone(k.surface, k.node, k.normal, k.force); }
 
+  // All forces follow from where the newcomer is: one that pulls at a known contact is as improbable.
   double weigh(const Rival& r) const {
-    return r.evidence - 0.5 * std::min(cone(own(r)), 2.0 * kNegligible);
+    double outside = 0.0;
+    for (int c = 0; c <= own_; ++c)
+      outside += std::min(cone(r.contacts.known[c]), 2.0 * kNegligible);
+    return r.evidence - 0.5 * outside;
   }
 
   int most_probable() const {

@@ -30,8 +30,11 @@ class Slides {
   // Has one contact moved along its body, no faster than contacts slide? Of several the one that
   // explains best. Then all are reported, also where a sample says otherwise in between; once it
   // rests they are known from where it does. `left`: units of work, of which it takes what it needs.
-  template <class Read>
-  Outcome follow(SegmentContacts& s, const SegmentSample& now, int& left, Read&& read) {
+  // `undecided`: is it open where one of them is? Then none that is taken for a slider is sure.
+  // `report(k)` tells of one that is held.
+  template <class Read, class Report>
+  Outcome follow(SegmentContacts& s, const SegmentSample& now, int& left, bool undecided, Read&& read,
+                 Report&& report) {
     const JointEstimate& before = s.known.before.contacts;
     Slide& slide = s.unexplained.slide;
     const double time = now.time, brief = now.brief(), since = s.unexplained.since;
@@ -59,7 +62,7 @@ class Slides {
     if (slider < 0 && !(slide.seen && time - *slide.seen < brief)) return Outcome::none;
     const bool found = slider >= 0;
     if (found) {
-      if (!decided(s, slider) && moved(before.known[slider]) > settings_.place_radius)
+      if (undecided || (!decided(s, slider) && moved(before.known[slider]) > settings_.place_radius))
         answer_.status = Status::ambiguous;
       slide.seen = time;
       slide.place = answer_;
@@ -68,7 +71,7 @@ class Slides {
       slider = *slide.slider;
     }
     for (int i = 0; i < before.count; ++i) {
-      if (i != slider) reports_.add(before.known[i]);
+      if (i != slider) report(before.known[i]);
     }
     reports_.add(before.known[slider].serial, slide.place);
     const bool anew = slide.slider != slider || !slide.rests;

@@ -96,9 +96,9 @@ class Tracks {
 
   void report(int serial, const Answer& answer) { reports_.add(serial, answer); }
   void report(const KnownContact& k) { reports_.add(k); }
-  void report_one_of_several(const KnownContact& k) {
+  void report_one_of_several(const KnownContact& k, double doubt) {
     report(k);
-    reports_.doubt_last_if_wide(settings_);
+    reports_.doubt_last_if_wide(settings_, doubt);
   }
   void end(int serial) { reports_.end(serial); }
 
@@ -315,8 +315,9 @@ class Tracks {
     RivalPlaces& rivals = rivals_[now_.segment];
     if (rivals.any())
       spent_ += rivals.follow(s.known, now_, measurement_, fit_, known_.change(), beside(s), newcomer);
+    const double doubt = known.unrest_doubt(now_.bandwidth, settings_);
     for (const KnownContact* k = known.known; k != known.known + known.count; ++k)
-      report_one_of_several(k->serial == newcomer.serial ? newcomer : *k);
+      report_one_of_several(k->serial == newcomer.serial ? newcomer : *k, doubt);
     if (rivals.searching()) reports_.search_last();  // the newcomer was added last
     release(s);
     s.enter_known();
