@@ -160,10 +160,10 @@ class SegmentLevels {
   bool is_off(std::size_t g) const { return rows_.off[g] != 0; }
 
   // May a push that has lasted for so long be an error of the model after all? Not where motion had
-  // shown for as long how large these are, and it is clearly more.
+  // shown for as long how large these are, and a sensor has clearly more: friction loads joints alone.
   bool is_learned(std::size_t g) const {
     const Segment& s = segments_[g];
-    return s.lasted > tuning_.hand && !(s.shown > tuning_.hand && s.top > tuning_.hand_times);
+    return s.lasted > tuning_.hand && !(s.shown > tuning_.hand && s.top_wrench > tuning_.hand_times);
   }
 
   // Which rows of a segment: all, or those that its sensor's wrench has.

@@ -183,8 +183,8 @@ struct DetectorTuning {
   // A push on an arm in motion rarely lasts longer [s]. Half: a guiding hand's push ends early.
   // Double: an error of the model lasts 4 s as an event.
   double hand = 2.0;
-  // Limits: motion had shown before how much a model errs, and what jumps to so many times that is a hand,
-  // however long it lasts. Half: an error of the model may last as an event. Double: a hand that holds on
+  // Limits: motion had shown before how much a model errs, and what jumps on a sensor to so many times that
+  // is a hand, however long it lasts. Half: an error of the model may last as an event. Double: a hand that holds on
   // for 2 s hides the pushes of the next 10 s.
   double hand_times = 4.0;
 
