@@ -244,7 +244,8 @@ class ChannelGates {
           return;
         }
         if (borne_out(c, dt)) {
-          if (c >= at_.wrench() && !felt_elsewhere(c)) unproven_[c] = any_unproven_ = true;
+          const bool first = !(ratio_before_[c] > 1.0);  // what goes on to step changes
+          if (first && c >= at_.wrench() && !felt_elsewhere(c)) unproven_[c] = any_unproven_ = true;
           return;
         }
         fault_[c] = Fault::spike;
