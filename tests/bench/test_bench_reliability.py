@@ -138,6 +138,39 @@ def test_a_wild_torque_that_passes_by_chance_counts_only_once_it_is_over(pushed_
     assert not said.estimate.joint_settled[lost, joint].any()
 
 
+def recorded(name, seed):
+    """A recording of an arm, and a pipeline that has heard nothing."""
+    robot = tl.load_robot(name)
+    return tl.Pipeline(robot), record(robot, seed), None
+
+
+def test_a_gap_in_a_push_that_lasts_is_no_blow():
+    """The filters begin anew after it: they rise from zero as if something struck the arm."""
+    pytest.importorskip("example_robot_data")
+    said, _ = with_fault(recorded("panda", 110), "gap", "time", "contact")
+    assert [e.level for e in said.events] == ["contact"]
+
+
+def test_a_sensor_that_dies_as_a_push_is_let_go_strikes_nobody():
+    """Its weight is gone at once, as if one force had lifted it."""
+    said, _ = with_fault(recorded("sara-full", 110), "sensor zero", "base", "release")
+    assert [e.level for e in said.events if e.detected > RELEASED - 0.01] == ["contact"]
+
+
+@pytest.mark.parametrize("rise", [0.005, 0.05])
+def test_a_push_along_an_axis_of_the_innermost_sensor_is_no_fault(rise):
+    """That axis carries the weight of the arm: an error of its scale would come within a sample."""
+    robot = tl.load_robot("sara")
+    point, force = np.array([0.002, 0.001, 0.05]), np.array([0.0, 0.0, -FORCE])
+    push = ScriptedContact("link0", point, force, Profile(0.6, 0.5, rise, rise), force_frame="link")
+    settings = Run(seed=1, noise=SensorNoise(), model_error=MODEL_ERROR, physics=2000.0)
+    said = listen(tl.Pipeline(robot), scripted(robot, [push], 1.5, SPEED, settings).samples)
+    assert said.named == {}
+    assert [(e.segment, e.level, e.detected < 0.65) for e in said.events] == [
+        ("base", "contact", True)
+    ]
+
+
 def test_axes_that_are_swapped_beside_a_push_are_named_within_moments(pushed_sara):
     pipeline, recording, healthy = pushed_sara
     channel = channel_named(recording.robot, "handle")

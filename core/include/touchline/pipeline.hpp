@@ -84,9 +84,10 @@ class Pipeline {
 
   // Events of segment g that have begun at `since` or later are doubted until `until` [s]: a channel
   // that it feels is not what it was. What is doubted is no collision, and its link is not sure. No
-  // contact becomes a collision then.
+  // contact becomes a collision then, however long ago it is.
   void doubt(std::size_t g, double since, double until) {
     suspicions_[g].extend(observer_.time(), since, until);
+    classifier_.forget_blows(g, since);
   }
 
   // What a joint's torque, or a sensor, had last is not believed: with the next sample its estimates
@@ -147,7 +148,8 @@ class Pipeline {
   Result follow(const Sample& sample, const double* row) {
     detector_.step(row, sample.q, sample.qd);
     std::copy(detector_.levels().begin(), detector_.levels().end(), levels_.begin());
-    classifier_.step(sample.time, row, levels_.data());
+    classifier_.step(sample.time, row, levels_.data(),
+                     [&](std::size_t g) { return suspicions_[g].lasts(sample.time); });
     recorder_.begin();
     suspects_.begin(sample);
     count_ = 0;
@@ -192,8 +194,7 @@ class Pipeline {
           Contact& contact = contacts_[count_++];
           const LastingEvent* event = recorder_.of(reports[k].serial);
           const double began = event != nullptr ? event->detected : sample.time;
-          const bool unsure = suspicions_[segment].lasts(sample.time) ||
-                              suspicions_[segment].covers(classifier_.blow(g));
+          const bool unsure = suspicions_[segment].lasts(sample.time);
           const bool since_begun = suspicions_[segment].meets(sample.time, began);
           const bool doubted = reports[k].doubted || since_begun;
           const bool known = event != nullptr && event->level == ContactLevel::collision;

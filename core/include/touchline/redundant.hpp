@@ -80,7 +80,7 @@ class RedundantPipeline {
       while (!judged && healthy() && end < samples && end - i < kAhead) {
         believed = gates_.judge(at(end));
         absent_.find(believed, gates_, robot());
-        judged = absent_.any() || !gates_.all_sound();
+        judged = absent_.any() || gates_.any_unproven();
         if (judged) break;
         std::copy(gates_.ratios().begin(), gates_.ratios().end(),
                   ratios_.begin() + (end - i) * sound_.size());
@@ -153,10 +153,8 @@ class RedundantPipeline {
   // A sample of which the gates believe `judged`.
   Result take(const Sample& judged, const std::vector<Fault>& faults, const double* ratios) {
     const Sample believed = left_out_.any() ? left_out_.without(judged) : judged;
-    if (!gates_.all_sound()) {
-      begin_anew();
-      doubts_.foresee(faults, judged.time);
-    }
+    if (!gates_.all_sound()) begin_anew();
+    if (gates_.any_unproven()) doubts_.foresee(faults, judged.time);
     absent_.find(believed, gates_, robot());
     const bool whole = healthy();
     const Result result = whole ? whole_.update(believed) : step(believed);

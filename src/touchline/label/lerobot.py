@@ -3,13 +3,8 @@
 
 import atexit
 import json
-import multiprocessing
-import os
 import signal
-import threading
-import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +22,7 @@ from touchline.label.labelled import Labelled
 from touchline.label.naming import Given, choose
 from touchline.logs.parquet import damages, first_line
 from touchline.model.robot import Robot
+from touchline.workers import workers
 
 INFO, STATS, ABOUT = "meta/info.json", "meta/stats.json", "meta/touchline.json"
 PREFIX = "observation.touch."
@@ -116,16 +112,8 @@ _HANDS: list[_Hand] = []  # the one of this process, where it is one of several
 
 def _begin(task: _Task) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one who asks sees to it
-    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
     _HANDS.append(_Hand(task))
     atexit.register(_HANDS.clear)  # before native types go
-
-
-def _end_with(parent: int) -> None:
-    """End when the process that asks is gone, though it was killed."""
-    while os.getppid() == parent:
-        time.sleep(1.0)
-    os._exit(1)
 
 
 def _label_here(file: Path) -> tuple[Labelled, "_Spread", tuple[str, ...]]:
@@ -139,8 +127,7 @@ def _hands(task: _Task, count: int) -> Iterator[Callable[[list[Path]], Iterator[
         hand = _Hand(task)
         yield lambda files: map(hand.label, files)
         return
-    context = multiprocessing.get_context("spawn")  # native threads do not survive a fork
-    with ProcessPoolExecutor(count, context, _begin, (task,)) as pool:
+    with workers(count, _begin, task) as pool:
         yield lambda files: pool.map(_label_here, files)
 
 

@@ -2,9 +2,9 @@
 """The long computations of the detection benchmark, cut into pieces for all cores."""
 
 from collections.abc import Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from touchline.trials.free_motion import (
     random_trajectory,
     with_noise,
 )
+from touchline.workers import workers
 
 METHODS = cal.METHODS
 ERROR = 0.02  # 1 sigma of the inertias
@@ -125,16 +126,15 @@ def push_statistics(
 class Pool:
     """Runs pieces of work on all cores, with a progress bar for each kind of work."""
 
-    def __init__(self, workers: int | None = None) -> None:
-        import multiprocessing
-
-        self._pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"))
+    def __init__(self, count: int | None = None) -> None:
+        self._workers = workers(count)
 
     def __enter__(self) -> "Pool":
+        self._pool = self._workers.__enter__()
         return self
 
-    def __exit__(self, *error: object) -> None:
-        self._pool.shutdown(cancel_futures=True)
+    def __exit__(self, *error: Any) -> None:
+        self._workers.__exit__(*error)
 
     def map(self, what: str, work, pieces: list[tuple]) -> list:
         """`work(*piece)` for every piece, in their order."""

@@ -8,9 +8,8 @@ Poses are random. Points are reachable, uniform over the area of the links: outs
 
 import os
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
 from pathlib import Path
 from time import perf_counter
 
@@ -40,6 +39,7 @@ from touchline.trials.scene import (
     told_and_real,
     touched_segments,
 )
+from touchline.workers import workers
 
 CHUNK = 25  # runs handed to a process at once
 TIMED = 6  # runs whose updates are timed
@@ -134,13 +134,10 @@ def run_plan(plan: Plan, processes: int | None = None) -> Iterator[list[Trial]]:
         yield from (_run_chunk(*chunk) for chunk in chunks)
         return
     count = processes or len(os.sched_getaffinity(0))
-    with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
+    with workers(count) as pool:
         waiting = [pool.submit(_run_chunk, *chunk) for chunk in chunks]
-        try:
-            for done in as_completed(waiting):
-                yield done.result()
-        finally:
-            pool.shutdown(cancel_futures=True)
+        for done in as_completed(waiting):
+            yield done.result()
 
 
 def _run_chunk(cell: Cell, runs: range, seed: int, baselines: tuple[str, ...]) -> list[Trial]:

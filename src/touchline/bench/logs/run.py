@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """`touchline bench logs`."""
 
-import multiprocessing
 import os
 import tempfile
 import time
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
@@ -24,6 +22,7 @@ from touchline.model.robot import Robot, load_robot
 from touchline.observer.observer import Observer
 from touchline.observer.samples import Samples
 from touchline.trials.touches import TouchSampler, touch_loads
+from touchline.workers import workers
 
 ROBOT = "sara-full"
 ROUNDS = 3
@@ -202,8 +201,7 @@ def _analysis(folder: Path, robot: Robot, minutes: float) -> str:
     rows: list[Row] = [("analyze --report", "events", *head, "memory MB")]
     for report, (most, longest) in HOUR.items():
         # A process of its own, so that its memory and start are counted.
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(1, context) as pool:
+        with workers(1) as pool:
             done = pool.submit(_analyzed, str(log), robot, str(folder / report), report)
             events, spent, clock, memory = done.result()
         cpu = (f"{spent:.2f}", f"{spent / hours:.1f}", f"{most:g}")

@@ -2,11 +2,9 @@
 """Arms that move and are not as told, pushed every three seconds; nothing is calibrated."""
 
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
-from multiprocessing import get_context
 
 import numpy as np
 
@@ -20,6 +18,7 @@ from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scene import Run
 from touchline.trials.arms import described_arm
 from touchline.trials.recordings import EVERY, push_often
+from touchline.workers import workers
 
 PHYSICS = 2000.0  # Hz
 HEAD = (
@@ -87,7 +86,7 @@ def tallies(parts: Sequence[Part], processes: int) -> Iterator[Tally]:
     if processes <= 1 or len(parts) <= 1:
         yield from bar(map(run, parts))
         return
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+    with workers(processes) as pool:
         yield from bar(pool.map(run, parts))
 
 

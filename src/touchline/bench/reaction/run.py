@@ -10,9 +10,7 @@ is led by its handle for an hour.
 import csv
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +22,7 @@ from touchline.numbers import check_least
 from touchline.reaction.reaction import REACTIONS
 from touchline.trials.guiding import PART, Guided, guide, told
 from touchline.trials.reacting import MASSES, QUIET, SCENES, SPRINGS, Case, Trial, cases, play
+from touchline.workers import workers
 
 IN_TIME = 0.3  # s within which a clamping force is to be gone
 SAME = 1.005  # peaks that differ by less are the same
@@ -45,7 +44,7 @@ def _on_all_cores(function: Callable[[Any], Any], arguments: Sequence[Any], name
     if not arguments:
         return []
     processes = len(os.sched_getaffinity(0))
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+    with workers(processes) as pool:
         results = pool.map(function, arguments)
         return list(tqdm(results, total=len(arguments), desc=name, disable=None, leave=False))
 

@@ -4,10 +4,9 @@
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass, fields
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import TypeVar
 
@@ -21,6 +20,7 @@ from touchline.native import core
 from touchline.pipeline.pipeline import Pipeline
 from touchline.trials.faults import FAULTS, Channel, FaultType, cases_of, channels_of
 from touchline.trials.recordings import PHASES, record, robot_named
+from touchline.workers import workers
 
 _P = TypeVar("_P")
 _R = TypeVar("_R")
@@ -146,7 +146,7 @@ def spread(work: Callable[[_P], _R], parts: Sequence[_P], processes: int) -> Ite
     if processes <= 1 or len(parts) <= 1:
         yield from map(work, bar(parts))
         return
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+    with workers(processes) as pool:
         futures = [pool.submit(work, part) for part in parts]
         for _ in bar(as_completed(futures)):
             pass

@@ -3,6 +3,7 @@
 // begins fast: the force grows by more than `onset` to more than `collision`. What has not begun so
 // within `decide_within` is a contact; a later blow makes it a collision. Forces have passed the
 // observer's low-pass, which shows a step of F as a rate of at most 0.63 F / `rate_window` (K = 100).
+// A filter that begins anew rises from zero whatever lasts: that is no growth of a force.
 // No allocation per sample.
 // Theory: docs/theory.md, section 7.1.
 #pragma once
@@ -40,6 +41,7 @@ class Classifier {
         bandwidths_(limits_.size()),
         sizes_(limits_.size()),
         touches_(limits_.size()),
+        settled_(limits_.size(), 0),
         history_(limits_.size(), tuning_.rate_window),
         clamping_(limits_.size(), tuning_) {
     bool good = limits_.size() == static_cast<std::size_t>(row_.segments);
@@ -64,11 +66,29 @@ class Classifier {
 
   // Takes a sample: the observer's row and the detector's level of each segment.
   void step(double time, const double* row, const double* levels) {
+    step(time, row, levels, [](std::size_t) { return false; });
+  }
+  // The same; what segment g shows is no blow where `doubted(g)`.
+  template <class Doubted>
+  void step(double time, const double* row, const double* levels, Doubted&& doubted) {
     time_ = std::fmax(time_, time);
-    for (std::size_t g = 0; g < limits_.size(); ++g) sizes_[g] = size(static_cast<int>(g), row);
+    for (std::size_t g = 0; g < limits_.size(); ++g) sizes_[g] = size(g, row);
     history_.add(time_, sizes_.data());
+    for (std::size_t g = 0; g < limits_.size(); ++g) {
+      const int settled = count_settled(g, row);
+      if (settled != std::exchange(settled_[g], settled)) history_.begin_anew(g);
+    }
     clamping_.step(time_, row + row_.segment_wrench(), levels);
-    for (std::size_t g = 0; g < limits_.size(); ++g) decide(static_cast<int>(g), levels[g] > 0.0);
+    for (std::size_t g = 0; g < limits_.size(); ++g)
+      decide(static_cast<int>(g), levels[g] > 0.0, doubted(g));
+  }
+
+  // What segment g has shown since then [s] was no blow.
+  void forget_blows(std::size_t g, double since) {
+    Touch& touch = touches_[g];
+    if (!(touch.blow >= since)) return;
+    touch.blow = kNaN;
+    touch.kind = Kind::undecided;
   }
 
   // What is said of the contacts on segment g in that sample.
@@ -94,17 +114,28 @@ class Classifier {
     double begin = 0.0, rate = kNaN, blow = kNaN;
   };
 
-  // Of the force on segment g [N].
-  double size(int g, const double* row) const {
+  // Of the force on segment g, from what has settled [N].
+  double size(std::size_t g, const double* row) const {
     const double* w = row + row_.segment_wrench() + 6 * g;
-    if (limits_[g].joints.empty()) return norm(Vec3{w[0], w[1], w[2]});
+    if (limits_[g].joints.empty())
+      return row[row_.segment_settled() + g] > 0.0 ? norm(Vec3{w[0], w[1], w[2]}) : kNaN;
     double most = 0.0;
-    for (const int joint : limits_[g].joints)
-      most = std::fmax(most, std::fabs(row[row_.segment_torque() + joint]));
+    for (const int joint : limits_[g].joints) {
+      if (row[row_.joint_settled() + joint] > 0.0)
+        most = std::fmax(most, std::fabs(row[row_.segment_torque() + joint]));
+    }
     return most / tuning_.lever;
   }
 
-  void decide(int g, bool touched) {
+  // How much of what segment g is felt with has settled.
+  int count_settled(std::size_t g, const double* row) const {
+    if (limits_[g].joints.empty()) return row[row_.segment_settled() + g] > 0.0 ? 1 : 0;
+    int count = 0;
+    for (const int joint : limits_[g].joints) count += row[row_.joint_settled() + joint] > 0.0 ? 1 : 0;
+    return count;
+  }
+
+  void decide(int g, bool touched, bool doubted) {
     Touch& touch = touches_[g];
     if (!touched) {
       touch = Touch{};
@@ -114,7 +145,7 @@ class Classifier {
     const BlowLimits& limits = limits_[g];
     touch.rate = history_.rate(g);
     const bool strong = sizes_[g] + touch.rate / bandwidths_[g] > limits.collision;
-    if (touch.rate > limits.onset && strong) {
+    if (!doubted && touch.rate > limits.onset && strong) {
       touch.kind = Kind::collision;
       touch.blow = time_;
     } else if (touch.kind == Kind::undecided && time_ >= touch.begin + tuning_.decide_within) {
@@ -127,6 +158,7 @@ class Classifier {
   std::vector<BlowLimits> limits_;
   std::vector<double> bandwidths_, sizes_;  // of the segments' wrenches [rad/s], forces [N]
   std::vector<Touch> touches_;
+  std::vector<int> settled_;  // per segment, at the last sample: see `count_settled`
   ForceHistory history_;
   Clamping clamping_;
   double time_ = -std::numeric_limits<double>::infinity();

@@ -13,18 +13,15 @@ class Suspicion {
  public:
   // What has begun at `since` or later is doubted until `until` [s].
   void extend(double time, double since, double until) {
-    if (!lasts(time)) from_ = time;
     since_ = lasts(time) ? std::min(since_, since) : since;
     until_ = std::max(until_, until);
   }
   bool lasts(double time) const { return time < until_; }
   // Is an event doubted that has begun then [s]?
   bool meets(double time, double began) const { return lasts(time) && began >= since_; }
-  // Was it there when a blow was felt [s]? Then that was no blow, however long ago it is.
-  bool covers(double blow) const { return blow >= from_ && blow < until_; }
 
  private:
-  double from_ = 0.0, since_ = 0.0, until_ = -kAbsurd;  // [s]
+  double since_ = 0.0, until_ = -kAbsurd;  // [s]
 };
 
 }  // namespace touchline

@@ -72,6 +72,7 @@ class ChannelGates {
         ratio_before_(at_.count()),
         spiked_(at_.count(), -std::numeric_limits<double>::infinity()),
         moved_(at_.count(), Moved::no),
+        unproven_(at_.count(), 0),
         far_(at_.joints),
         since_(at_.count()),
         calm_(at_.count()),
@@ -97,6 +98,7 @@ class ChannelGates {
     gather(sample);
     const bool gap = !(dt < tuning_.step_periods * period_);
     const bool usual = measure(dt);
+    if (any_unproven_) prove();
     if (!usual || !all_sound_ || absurd_ || gap) settle(dt, gap);
     learn();
     track(dt, gap);
@@ -108,6 +110,10 @@ class ChannelGates {
   }
 
   bool all_sound() const { return all_sound_; }
+  // Does any channel say nothing yet of how fast anything grows: is it held, or has it stepped where its
+  // own sensor alone bears it out, and not changed since? A sensor that dies steps by one force, too.
+  bool any_unproven() const { return any_unproven_ || !all_sound_; }
+  bool unproven(std::size_t c) const { return unproven_[c] != 0 || fault_[c] == Fault::spike; }
   // Of positions and velocities that were not there: what another one stands in for.
   Health absent() const { return absent_; }
   // Has channel c jumped twice of late since the last call, or been taken at another level, which no
@@ -237,7 +243,11 @@ class ChannelGates {
           ways_.turn(c, turns);
           return;
         }
-        if (borne_out(c, dt)) return;
+        if (borne_out(c, dt)) {
+          const bool first = !(ratio_before_[c] > 1.0);  // what goes on to step changes
+          if (first && c >= at_.wrench() && !felt_elsewhere(c)) unproven_[c] = any_unproven_ = true;
+          return;
+        }
         fault_[c] = Fault::spike;
         since_[c] = calm_[c] = 0;
         if (time_ - spiked_[c] < kAgain) moved_[c] = moved(c);
@@ -258,6 +268,15 @@ class ChannelGates {
         return;
       case Fault::disagrees:  // see `judge_speeds`
       case Fault::suspect: return;  // no gate says so
+    }
+  }
+
+  // What has stepped and changes again lives.
+  void prove() {
+    any_unproven_ = false;
+    for (std::size_t c = at_.wrench(); c < at_.count(); ++c) {
+      unproven_[c] = unproven_[c] != 0 && fault_[c] == Fault::none && !lives(c, last_[c]);
+      any_unproven_ = any_unproven_ || unproven_[c] != 0;
     }
   }
 
@@ -591,13 +610,14 @@ class ChannelGates {
   std::vector<double> mean_, step_, ratio_, ratio_before_;  // of steps
   std::vector<double> spiked_;  // when it jumped last [s]
   std::vector<Moved> moved_;    // see `take_moved`
+  std::vector<char> unproven_;  // see `any_unproven`
   std::vector<int> far_;
   std::vector<int> since_, calm_;  // samples, of what a fault waits for
   std::vector<Passes> passes_;
   std::vector<Fault> fault_;
   double time_ = kNever, rate_ = 0.0;
   int seen_ = 0, refusals_ = 0;
-  bool all_sound_ = true, any_far_ = false, absurd_ = false;
+  bool all_sound_ = true, any_far_ = false, absurd_ = false, any_unproven_ = false;
   Health absent_ = 0;
 };
 

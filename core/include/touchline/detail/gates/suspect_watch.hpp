@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which channels alone explain what is felt, and have done so for long enough to be told. A wrong sign
-// or scale is wrong by a multiple of what a channel carries. What is wrong by more, and may be a push
-// along an axis of a sensor, has to last for longer than most pushes do. No allocation per sample.
+// or scale is wrong by a multiple of what a channel carries. It comes within a sample, or as that
+// changes. What is wrong by more, or comes otherwise, and may be a push along an axis of a sensor, has to
+// last for longer than most pushes do. No allocation per sample.
 // Theory: docs/theory.md, section 3.5.
 #pragma once
 
@@ -30,7 +31,16 @@ class SuspectWatch {
         seen_(at_.count(), -kNever),
         until_(at_.count(), -kNever),
         sensors_(robot.sensors),
-        read_(6 * at_.sensors, std::numeric_limits<double>::quiet_NaN()) {
+        last_(6 * at_.sensors, std::numeric_limits<double>::quiet_NaN()),
+        read_(last_),
+        lately_(last_),
+        stepped_(last_.size(), 0.0),
+        rises_(at_.count(), 0),
+        innermost_(at_.sensors, 1) {
+    for (const Segment& segment : layout.segments) {
+      if (segment.sensor < 0) continue;
+      for (const int outer : segment.successors) innermost_[outer] = 0;
+    }
     for (const DetectionRow& row : robot.rows) {
       const int sensor = layout.segments[row.segment].sensor;
       if (row.joint >= 0) least_[at_.tau() + row.joint] = kLeast * row.contact;
@@ -44,18 +54,25 @@ class SuspectWatch {
     std::fill(now_.begin(), now_.end(), 0);
     const double dt = sample.time - time_;
     time_ = sample.time;
+    const double forgets = dt > 0.0 ? dt / (kLately + dt) : 0.0;
     for (std::size_t s = 0; s < sensors_.size(); ++s) {
       const double x = dt > 0.0 ? sensors_[s].bandwidth * dt : 0.0, follows = x / (1.0 + x);
       for (std::size_t i = 6 * s; i < 6 * s + 6; ++i) {
         const double now = sensors_[s].sign * sample.wrench[i] - sensors_[s].bias[i - 6 * s];
-        if (read_[i] != read_[i]) read_[i] = now;
-        else if (now == now) read_[i] += follows * (now - read_[i]);
+        if (now != now) continue;
+        const bool first = read_[i] != read_[i];
+        read_[i] = first ? now : read_[i] + follows * (now - read_[i]);
+        if (first) lately_[i] = now;
+        else if (rises_[at_.wrench() + i] == 0) lately_[i] += forgets * (now - lately_[i]);
+        if (!first) stepped_[i] = std::max(std::fabs(now - last_[i]), (1.0 - forgets) * stepped_[i]);
+        last_[i] = now;
       }
     }
   }
   void add(const Suspect& suspect) {
     if (!suspect.any() || !suspect.told || !(std::fabs(suspect.error) > least_[suspect.channel])) return;
     const char beyond = suspect.touched && is_beyond(suspect) ? 1 : 0;
+    if (suspect.touched && has_risen(suspect)) rises_[suspect.channel] = 1;
     for (const int c : {suspect.channel, suspect.other}) {
       if (c < 0) continue;
       now_[c] = 1;
@@ -72,10 +89,10 @@ class SuspectWatch {
       if (now_[c] != 0) seen_[c] = time;
       if (!(time - seen_[c] < kMissed)) {
         since_[c] = kNever;
-        beyond_[c] = 0;
+        beyond_[c] = rises_[c] = 0;
       }
       if (now_[c] != 0 && !(since_[c] <= time)) since_[c] = time;
-      const double dwell = beyond_[c] != 0 ? kLasts : kDwell;
+      const double dwell = beyond_[c] != 0 || rises_[c] != 0 ? kLasts : kDwell;
       if (now_[c] != 0 && time - since_[c] >= dwell) out(static_cast<int>(c), until_[c] = time + kOut);
       told_[c] = time < until_[c];
       any_ = any_ || since_[c] < kNever || !(time >= until_[c]);
@@ -94,6 +111,12 @@ class SuspectWatch {
   static constexpr double kLasts = 1.0;
   // Times what a channel carries: a wrong sign is wrong by twice of it, and filters and noise by the rest.
   static constexpr double kMultiple = 3.0;
+  // Of the error: a fault that comes at once brings this part within one sample. A push that rises in
+  // five brings a third.
+  static constexpr double kAtOnce = 0.5;
+  // [s] over which it has carried something lately. Half: a lie that grows with a slow motion is a push for
+  // longer. Double: where the arm has come to in the last seconds counts less.
+  static constexpr double kLately = 5.0;
   // Of the error: what two swapped axes may differ by beside it, by noise and the model's errors.
   static constexpr double kUnlike = 0.5;
   static constexpr double kMissed = 0.01; // [s] for which noise may hide it
@@ -113,13 +136,29 @@ class SuspectWatch {
     return std::fabs(error - (carried - other)) > kUnlike * std::fabs(error);
   }
 
+  // Has a force of the innermost sensor become wrong over several samples, while what it carries has hardly
+  // changed? It may carry so much that a push is a small part of that. An outer sensor has another one
+  // inboard, which feels the push.
+  bool has_risen(const Suspect& suspect) const {
+    if (suspect.channel < static_cast<int>(at_.wrench()) || suspect.other >= 0) return false;
+    const std::size_t i = suspect.channel - at_.wrench();
+    const SensorRow& sensor = sensors_[i / 6];
+    if (i % 6 >= 3 || sensor.gravity_compensated || innermost_[i / 6] == 0) return false;
+    const double size = std::fabs(suspect.error), carried = read_[i] + suspect.error;
+    return stepped_[i] < kAtOnce * size && size > kMultiple * std::fabs(carried - lately_[i]);
+  }
+
   ChannelLayout at_;
   std::vector<double> least_;  // [N, Nm]
   std::vector<char> now_, told_, beyond_;
   bool any_ = false;
   std::vector<double> since_, seen_, until_;  // [s]
   std::vector<SensorRow> sensors_;
-  std::vector<double> read_;  // per axis: readings as the filters have them [N, Nm]
+  // Per axis: its last reading, readings as the filters have them, their mean of late, but for what has
+  // risen, and their largest step of late [N, Nm].
+  std::vector<double> last_, read_, lately_, stepped_;
+  std::vector<char> rises_;      // per channel: has it risen while it was suspected, see `has_risen`
+  std::vector<char> innermost_;  // per sensor: has it none inboard?
   double time_ = std::numeric_limits<double>::quiet_NaN();  // [s]
 };
 

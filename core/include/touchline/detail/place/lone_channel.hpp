@@ -71,7 +71,7 @@ class LoneChannel {
                        left < chi2_limit(std::max(1, size - 1 - free), kUsual);
     if (left > limit + kShape * kShape * all_) return {};
     Suspect found = best.suspect;
-    found.told = !contested && (left <= kLeft * all_ || clear);
+    found.told = !contested && (left <= kLeft * all_ || clear) && !may_be_load(best);
     return found.told || noise ? found : Suspect{};
   }
 
@@ -218,6 +218,25 @@ class LoneChannel {
       weighed_.pop_back();
     }
     return {};
+  }
+
+  // Is a torque suspected, but something that turns what its joint carries is likelier? That is what a
+  // model errs by, and loads the joints and the sensor inboard, too.
+  bool may_be_load(const Weighed& of) {
+    if (of.suspect.channel >= static_cast<int>(at_.wrench())) return false;
+    const int node = observer_.joints()[of.suspect.channel - at_.tau()].nodes[0];
+    const Vec3 axis = measurement_.posture().pose(node).R.z;
+    const bool turns = observer_.tree().nodes()[node].kind == NodeKind::revolute;
+    const double values[6] = {turns ? 0.0 : axis.x, turns ? 0.0 : axis.y, turns ? 0.0 : axis.z,
+                              turns ? axis.x : 0.0, turns ? axis.y : 0.0, turns ? axis.z : 0.0};
+    measurement_.load(node, touchline::load(values), 0.0, column_.data(), 1);
+    measurement_.whiten(column_.data(), 1);
+    double along = 0.0, square = 0.0;
+    for (int i = 0; i < measurement_.size(); ++i) {
+      along += column_[i] * rows_[i];
+      square += column_[i] * column_[i];
+    }
+    return square > 0.0 && along * along / square > of.explains;
   }
 
   // What any other such channel explains that has no part in a suspect.

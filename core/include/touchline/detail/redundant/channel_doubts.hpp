@@ -47,13 +47,15 @@ class ChannelDoubts {
   }
 
   // The same of what the gates tell now, before anything is made of the sample: what begins with it,
-  // or was about to become a collision, is doubted, too.
+  // or was about to become a collision, is doubted, too. So is a collision, but nothing else, where a
+  // channel says nothing yet.
   void foresee(const std::vector<Fault>& faults, double time) {
     for (std::size_t c = 0; c < faults.size(); ++c) {
       const Moved moved = gates_.moved_lately(c);
       const bool news = is_wrong(faults[c]) && faults[c] != before_[c];
       if (moved == Moved::wrongly || news) doubt(c, time, time - kUntold);
       else if (moved == Moved::alone) doubt(c, time, kNever);
+      else if (gates_.unproven(c)) doubt(c, time, kNever, kSample);
     }
   }
 
@@ -67,6 +69,7 @@ class ChannelDoubts {
   static constexpr double kNever = std::numeric_limits<double>::infinity();  // [s]
   static constexpr double kUntold = 0.06;   // [s] for which a channel may be wrong before it is told
   static constexpr double kDoubtful = 1.0;  // [s] in which more of it may come
+  static constexpr double kSample = 1e-6;   // [s]: one sample, whatever its period
 
   static bool is_wrong(Fault fault) {
     return fault == Fault::step || fault == Fault::wild || fault == Fault::stuck ||
