@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "touchline/detail/model/dense.hpp"
+#include "touchline/detail/model/lanes.hpp"
 #include "touchline/detail/model/mesh.hpp"
 #include "touchline/detail/place/quadratic.hpp"
 #include "touchline/detail/place/settings.hpp"
@@ -42,7 +43,9 @@ class ForceFitter {
   explicit ForceFitter(const PlaceSettings& settings)
       : settings_(settings),
         cone_(std::atan(settings.friction)),
+        directions_(1.0 - std::cos(cone_)),
         surely_in_cone_(std::cos(cone_) + kCosineRounding),
+        surely_straight_(std::cos(settings.slant) + kCosineRounding),
         turns_(turns()) {}
 
   // The force at `point` that explains best, in the friction cone of the outward `normal`, or, if
@@ -96,9 +99,9 @@ class ForceFitter {
   // Logarithm of how dense forces are, per volume: their directions, in the friction cone or all
   // of them, and sizes are equally likely, but that people push near the normal.
   double log_prior(const Fit& fit, bool grasped) const {
-    const double directions = grasped ? 2.0 : 1.0 - std::cos(cone_);
+    const double directions = grasped ? 2.0 : directions_;
     const double volume = directions * std::max(dot(fit.force, fit.force), 1.0);
-    if (grasped) return -std::log(volume);
+    if (grasped || fit.cosine > surely_straight_) return -std::log(volume);  // the angle is dear
     const double angle = std::acos(std::clamp(fit.cosine, -1.0, 1.0));
     const double beyond = std::max(0.0, angle - settings_.slant), sigma = settings_.slant_sigma;
     return -std::log(volume) - 0.5 * beyond * beyond / (sigma * sigma);
@@ -237,7 +240,7 @@ class ForceFitter {
       for (int i = 0; i < kAll; ++i) cosine[i] = std::cos(angle[i]), sine[i] = std::sin(angle[i]);
     }
 
-    double cosine[kAll], sine[kAll];
+    double cosine[kAll + kLanes] = {}, sine[kAll + kLanes] = {};  // room: for the last side by side
     int halved[kAll];  // where the three of it stand at the next half step
 
     static constexpr double kTurn = 6.283185307179586;  // [rad]
@@ -300,31 +303,37 @@ class ForceFitter {
               const double* g, double worth) const {
     Vec3 s, t;
     tangents(normal, s, t);
-    double best = 0.0;
+    const double part[3][3] = {{s.x, s.y, s.z}, {t.x, t.y, t.z}, {normal.x, normal.y, normal.z}};
+    double best = 0.0, size = 0.0;
     int at = 0;
-    Vec3 force;
-    const auto offer = [&](int direction) {
-      const double cosine = turns_.cosine[direction], sine = turns_.sine[direction];
-      const Vec3 u = settings_.friction * (cosine * s + sine * t) - normal;
-      const double x[3] = {u.x, u.y, u.z};
-      double along = 0.0, curve = 0.0;
-      for (int i = 0; i < 3; ++i) {
-        along += g[i] * x[i];
-        for (int j = 0; j < 3; ++j) curve += x[i] * A[3 * i + j] * x[j];
+    // So many directions from one on, side by side; each as if alone.
+    const auto offer = [&](int first, int count) {
+      for (int i = first; i < first + count; i += kLanes) {
+        const Lanes cosine = load_lanes(turns_.cosine + i), sine = load_lanes(turns_.sine + i);
+        Lanes x[3], along{}, curve{};
+        for (int k = 0; k < 3; ++k)
+          x[k] = settings_.friction * (cosine * part[0][k] + sine * part[1][k]) - part[2][k];
+        for (int k = 0; k < 3; ++k) {
+          along += g[k] * x[k];
+          for (int j = 0; j < 3; ++j) curve += x[k] * A[3 * k + j] * x[j];
+        }
+        const Lanes less = along * along / curve;
+        for (int k = 0; k < std::min(kLanes, first + count - i); ++k) {
+          if (lane(along, k) <= 0.0 || lane(less, k) <= best) continue;
+          best = lane(less, k);
+          at = i + k;
+          size = lane(along, k) / lane(curve, k);
+        }
       }
-      if (along <= 0.0 || along * along / curve <= best) return;
-      best = along * along / curve;
-      at = direction;
-      force = (along / curve) * u;
     };
-    for (int i = 0; i < Turns::kFirst; ++i) offer(i);
+    offer(0, Turns::kFirst);
     for (int halving = 0; halving < Turns::kHalvings; ++halving) {
-      const int less = at = turns_.halved[at];
-      offer(less + 1);
-      offer(less + 2);
+      at = turns_.halved[at];
+      offer(at + 1, Turns::kEach - 1);
     }
     Fit fit;
-    fit.force = force;
+    if (best > 0.0)
+      fit.force = size * (settings_.friction * (turns_.cosine[at] * s + turns_.sine[at] * t) - normal);
     fit.cone = std::numeric_limits<double>::infinity();
     const double least = q.constant - best;
     if (best > 0.0 && least - kRounding * (1.0 + std::fabs(q.constant)) < worth)
@@ -334,7 +343,9 @@ class ForceFitter {
 
   const PlaceSettings& settings_;
   double cone_;            // half of its opening [rad]
+  double directions_;      // in it, as a part of half of all
   double surely_in_cone_;  // a cosine: above it nothing is beyond the cone
+  double surely_straight_;  // and above this one no push is oblique
   const Turns& turns_;
 };
 
