@@ -46,6 +46,7 @@ class ForceFitter {
         directions_(1.0 - std::cos(cone_)),
         surely_in_cone_(std::cos(cone_) + kCosineRounding),
         surely_straight_(std::cos(settings.slant) + kCosineRounding),
+        surely_plain_(std::max(surely_in_cone_, surely_straight_)),
         turns_(turns()) {}
 
   // The force at `point` that explains best, in the friction cone of the outward `normal`, or, if
@@ -78,6 +79,34 @@ class ForceFitter {
     return q(w);
   }
 
+  // Of several points side by side: what a force there costs at least, its size included, but for
+  // rounding. NaN where forces are not known.
+  Lanes least_cost(const Quadratic& q, const BasicVec3<Lanes>& p) const {
+    Lanes a[6][3];  // the information that each row has on a force along x, y and z
+    for (int r = 0; r < 6; ++r) {
+      const double* row = q.information + 6 * r;
+      a[r][0] = row[0] + p.z * row[4] - p.y * row[5];
+      a[r][1] = row[1] - p.z * row[3] + p.x * row[5];
+      a[r][2] = row[2] + p.y * row[3] - p.x * row[4];
+    }
+    const double* h = q.vector;
+    const Lanes g[3] = {h[0] + p.z * h[4] - p.y * h[5], h[1] - p.z * h[3] + p.x * h[5],
+                        h[2] + p.y * h[3] - p.x * h[4]};
+    const double size = 1.0 / (settings_.force_scale * settings_.force_scale);
+    const Lanes xx = a[0][0] + p.z * a[4][0] - p.y * a[5][0] + size,
+                yx = a[1][0] - p.z * a[3][0] + p.x * a[5][0],
+                yy = a[1][1] - p.z * a[3][1] + p.x * a[5][1] + size,
+                zx = a[2][0] + p.y * a[3][0] - p.x * a[4][0],
+                zy = a[2][1] + p.y * a[3][1] - p.x * a[4][1],
+                zz = a[2][2] + p.y * a[3][2] - p.x * a[4][2] + size;
+    // The elements of L D L^T, and of L^-1 g.
+    const Lanes lyx = yx / xx, lzx = zx / xx, dy = yy - lyx * yx, uzy = zy - lzx * yx, lzy = uzy / dy,
+                dz = zz - lzx * zx - lzy * uzy;
+    const Lanes y = g[1] - lyx * g[0], z = g[2] - lzx * g[0] - lzy * y;
+    const Lanes gain = g[0] * g[0] / xx + y * y / dy + z * z / dz;
+    return q.constant - gain - kRounding * (1.0 + std::fabs(q.constant));
+  }
+
   // What is measured of the force at `point`, and assumed of its size:
   // chi2(f) = constant - 2 g . f + f^T A f.
   void force_terms(const Quadratic& q, const Vec3& point, double* A, double* g) const {
@@ -105,6 +134,18 @@ class ForceFitter {
     const double angle = std::acos(std::clamp(fit.cosine, -1.0, 1.0));
     const double beyond = std::max(0.0, angle - settings_.slant), sigma = settings_.slant_sigma;
     return -std::log(volume) - 0.5 * beyond * beyond / (sigma * sigma);
+  }
+
+  // How dense they are, those beyond the friction cone as far as they may be in it. Of a force: the
+  // square of its size, and the cosine between it and the inward normal.
+  double density(double square, double cosine, bool grasped) const {
+    const double volume = (grasped ? 2.0 : directions_) * std::max(square, 1.0);
+    if (grasped || cosine > surely_plain_) return 1.0 / volume;
+    if (cosine <= 0.0) return 0.0;
+    const double angle = std::acos(std::min(1.0, cosine));
+    const double slanted = std::max(0.0, angle - settings_.slant) / settings_.slant_sigma;
+    const double beyond = std::max(0.0, angle - cone_) / settings_.cone_softness;
+    return std::exp(-0.5 * (slanted * slanted + beyond * beyond)) / volume;
   }
 
   const PlaceSettings& settings() const { return settings_; }
@@ -162,6 +203,11 @@ class ForceFitter {
   // assumed where nothing is measured; `gradient` (5): of -chi2 / 2.
   void information(const Quadratic& q, const Vec3& point, const Vec3& normal, const Vec3& force,
                    double* H, double* gradient) const {
+    information(q, point, normal, force, settings_.place_scale, H, gradient);
+  }
+  // The same, with one sigma of the place along its surface [m].
+  void information(const Quadratic& q, const Vec3& point, const Vec3& normal, const Vec3& force,
+                   double place_scale, double* H, double* gradient) const {
     double D[6][5], w[6], rest[6];
     Vec3 along[2];
     tangents(normal, along[0], along[1]);
@@ -192,7 +238,7 @@ class ForceFitter {
         for (int r = 0; r < 6; ++r) sum += D[r][a] * LD[r][b];
         H[5 * a + b] = H[5 * b + a] = sum;
       }
-      const double scale = a < 3 ? settings_.force_scale : settings_.place_scale;
+      const double scale = a < 3 ? settings_.force_scale : place_scale;
       H[6 * a] += 1.0 / (scale * scale);
     }
   }
@@ -345,7 +391,8 @@ class ForceFitter {
   double cone_;            // half of its opening [rad]
   double directions_;      // in it, as a part of half of all
   double surely_in_cone_;  // a cosine: above it nothing is beyond the cone
-  double surely_straight_;  // and above this one no push is oblique
+  double surely_straight_;  // above it no push is oblique
+  double surely_plain_;    // above it neither
   const Turns& turns_;
 };
 
