@@ -13,6 +13,7 @@
 #include "arrays.hpp"
 #include "classifier_bindings.hpp"
 #include "detector_bindings.hpp"
+#include "estimates.hpp"
 #include "guard.hpp"
 #include "live_bindings.hpp"
 #include "localizer_bindings.hpp"
@@ -53,16 +54,6 @@ void step(Observer& o, double time, nb::handle q, nb::handle qd, nb::handle tau,
   const tl::Sample in = samples::one(o.value.row_layout(), time, q, qd, tau, wrench);
   const guard::Turn turn(o.turn);
   o.value.step(in);
-}
-
-nb::object update(Observer& o, double time, nb::handle q, nb::handle qd, nb::handle tau,
-                  nb::handle wrench) {
-  const tl::Sample in = samples::one(o.value.row_layout(), time, q, qd, tau, wrench);
-  const std::size_t width = o.value.output().size();
-  arrays::Out out({width});
-  const guard::Turn turn(o.turn);
-  std::copy_n(o.value.step(in), width, out.data());
-  return out.release();
 }
 
 nb::object run(Observer& o, nb::handle time, nb::handle q, nb::handle qd, nb::handle tau,
@@ -254,8 +245,6 @@ void bind(nanobind::module_& m) {
            })
       .def("step", &step, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a,
            nb::sig("def step(self, time: float, " TOUCHLINE_SIGNALS ") -> None"))
-      .def("update", &update, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a,
-           nb::sig("def update(self, time: float, " TOUCHLINE_SIGNALS ") -> " TOUCHLINE_ARRAY))
       .def("run", &run, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a,
            nb::sig("def run(self, time: object, " TOUCHLINE_SIGNALS ") -> " TOUCHLINE_ARRAY))
       .def("terms", &terms, "q"_a, "qd"_a,
@@ -274,6 +263,7 @@ void bind(nanobind::module_& m) {
         for (const tl::Segment& s : o.value.layout().segments) sensors.push_back(s.sensor);
         return sensors;
       });
+  estimates::bind(m);
 }
 
 }  // namespace touchline::bindings

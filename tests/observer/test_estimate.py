@@ -53,3 +53,8 @@ def test_it_can_be_read(estimates):
     assert repr(estimates) == "Estimate of 5 samples"
     text = repr(estimates.like(estimates.rows[4]))
     assert text.startswith("Estimate(tau_ext=") and "health=1)" in text
+
+
+def test_its_parts_keep_their_docstrings():
+    assert tl.Estimate.tau_ext.__doc__.startswith("External joint torques (n,) [Nm]")
+    assert tl.Estimate.segment_gap_std.__doc__.startswith("The same (m, 2) [N, Nm]")

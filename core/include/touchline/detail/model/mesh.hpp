@@ -75,6 +75,16 @@ class Mesh {
   const std::vector<Triangle>& triangles() const { return tree_->triangles; }
   bool empty() const { return tree_->triangles.empty(); }
 
+  // Is a point in the box about all of it, or no farther from that than `reach` [m]?
+  bool within(const Vec3& p, double reach) const {
+    if (empty()) return false;
+    const Box& all = tree_->boxes[0];
+    const auto beside = [](double x, float low, float high) { return std::max({low - x, x - high, 0.0}); };
+    const Vec3 way{beside(p.x, all.low.x, all.high.x), beside(p.y, all.low.y, all.high.y),
+                   beside(p.z, all.low.z, all.high.z)};
+    return dot(way, way) <= reach * reach;
+  }
+
   // Calls `visit(Crossing)` for each crossing of the whole line, in no order. A line through an
   // edge is reported by both triangles and never by none.
   template <class Visit>

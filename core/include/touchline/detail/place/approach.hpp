@@ -24,6 +24,8 @@ inline double approach(const LinkSurfaces& surfaces, const Vec3& point, const Ve
   const ForceLine line{point, (1.0 / size) * force};
   double gap = kFar, depth = 0.0;
   for (const LinkSurface& surface : surfaces.all()) {
+    // From farther away a link neither holds the point nor narrows the gap.
+    if (!surface.mesh.within(surfaces.to_node(point, surface.node), settings.finger + kHere)) continue;
     const ForceLine local = surfaces.to_node(line, surface.node);
     int ahead = 0, behind = 0;
     double way = kFar;  // back to where the line enters this link

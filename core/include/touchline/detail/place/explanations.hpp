@@ -579,7 +579,10 @@ class Explanations {
     Candidate starts[kStarts];
     int found = 0;
     for (; found < look.count; ++found) starts[found] = placed(view, look.best[found]);
-    for (; look.sample < all && left_ > 0; ++look.sample, left_ -= kTried) {
+    Lanes least{};  // that a force at each of the next points costs
+    for (int at = 0; look.sample < all && left_ > 0; ++look.sample, ++at, left_ -= kTried) {
+      if (at % kLanes == 0) least = least_costs(view, samples, look.sample);
+      if (lane(least, at % kLanes) >= beaten(starts, kStarts, found)) continue;
       const SurfaceSample& sample = samples[look.sample];
       const double few = settings_.rough_few;
       const double limit = std::max(
@@ -599,6 +602,19 @@ class Explanations {
       course_->starts.back().spread = course_->starts.back().fresh = true;
     }
     return done;
+  }
+
+  // What a force costs at least at the points of a body from `first` on, side by side.
+  Lanes least_costs(const View& view, const std::vector<SurfaceSample>& samples, int first) const {
+    BasicVec3<Lanes> points{};
+    for (int k = 0; k < kLanes; ++k) {
+      const std::size_t i = std::min<std::size_t>(first + k, samples.size() - 1);
+      const Vec3 p = view.earlier(surfaces_.to_world(samples[i].point, view.node));
+      set_lane(points.x, k, p.x);
+      set_lane(points.y, k, p.y);
+      set_lane(points.z, k, p.z);
+    }
+    return fitter_.least_cost(view.q, points);
   }
 
   // A point that is as rough as those of a surface are far apart: some work there is for it.

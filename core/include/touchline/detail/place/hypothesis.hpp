@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "touchline/detail/model/dense.hpp"
+#include "touchline/detail/model/lanes.hpp"
 #include "touchline/detail/model/mesh.hpp"
 #include "touchline/detail/place/quadratic.hpp"
 #include "touchline/detail/place/settings.hpp"
@@ -42,7 +43,10 @@ class ForceFitter {
   explicit ForceFitter(const PlaceSettings& settings)
       : settings_(settings),
         cone_(std::atan(settings.friction)),
+        directions_(1.0 - std::cos(cone_)),
         surely_in_cone_(std::cos(cone_) + kCosineRounding),
+        surely_straight_(std::cos(settings.slant) + kCosineRounding),
+        surely_plain_(std::max(surely_in_cone_, surely_straight_)),
         turns_(turns()) {}
 
   // The force at `point` that explains best, in the friction cone of the outward `normal`, or, if
@@ -75,6 +79,34 @@ class ForceFitter {
     return q(w);
   }
 
+  // Of several points side by side: what a force there costs at least, its size included, but for
+  // rounding. NaN where forces are not known.
+  Lanes least_cost(const Quadratic& q, const BasicVec3<Lanes>& p) const {
+    Lanes a[6][3];  // the information that each row has on a force along x, y and z
+    for (int r = 0; r < 6; ++r) {
+      const double* row = q.information + 6 * r;
+      a[r][0] = row[0] + p.z * row[4] - p.y * row[5];
+      a[r][1] = row[1] - p.z * row[3] + p.x * row[5];
+      a[r][2] = row[2] + p.y * row[3] - p.x * row[4];
+    }
+    const double* h = q.vector;
+    const Lanes g[3] = {h[0] + p.z * h[4] - p.y * h[5], h[1] - p.z * h[3] + p.x * h[5],
+                        h[2] + p.y * h[3] - p.x * h[4]};
+    const double size = 1.0 / (settings_.force_scale * settings_.force_scale);
+    const Lanes xx = a[0][0] + p.z * a[4][0] - p.y * a[5][0] + size,
+                yx = a[1][0] - p.z * a[3][0] + p.x * a[5][0],
+                yy = a[1][1] - p.z * a[3][1] + p.x * a[5][1] + size,
+                zx = a[2][0] + p.y * a[3][0] - p.x * a[4][0],
+                zy = a[2][1] + p.y * a[3][1] - p.x * a[4][1],
+                zz = a[2][2] + p.y * a[3][2] - p.x * a[4][2] + size;
+    // The elements of L D L^T, and of L^-1 g.
+    const Lanes lyx = yx / xx, lzx = zx / xx, dy = yy - lyx * yx, uzy = zy - lzx * yx, lzy = uzy / dy,
+                dz = zz - lzx * zx - lzy * uzy;
+    const Lanes y = g[1] - lyx * g[0], z = g[2] - lzx * g[0] - lzy * y;
+    const Lanes gain = g[0] * g[0] / xx + y * y / dy + z * z / dz;
+    return q.constant - gain - kRounding * (1.0 + std::fabs(q.constant));
+  }
+
   // What is measured of the force at `point`, and assumed of its size:
   // chi2(f) = constant - 2 g . f + f^T A f.
   void force_terms(const Quadratic& q, const Vec3& point, double* A, double* g) const {
@@ -96,12 +128,24 @@ class ForceFitter {
   // Logarithm of how dense forces are, per volume: their directions, in the friction cone or all
   // of them, and sizes are equally likely, but that people push near the normal.
   double log_prior(const Fit& fit, bool grasped) const {
-    const double directions = grasped ? 2.0 : 1.0 - std::cos(cone_);
+    const double directions = grasped ? 2.0 : directions_;
     const double volume = directions * std::max(dot(fit.force, fit.force), 1.0);
-    if (grasped) return -std::log(volume);
+    if (grasped || fit.cosine > surely_straight_) return -std::log(volume);  // the angle is dear
     const double angle = std::acos(std::clamp(fit.cosine, -1.0, 1.0));
     const double beyond = std::max(0.0, angle - settings_.slant), sigma = settings_.slant_sigma;
     return -std::log(volume) - 0.5 * beyond * beyond / (sigma * sigma);
+  }
+
+  // How dense they are, those beyond the friction cone as far as they may be in it. Of a force: the
+  // square of its size, and the cosine between it and the inward normal.
+  double density(double square, double cosine, bool grasped) const {
+    const double volume = (grasped ? 2.0 : directions_) * std::max(square, 1.0);
+    if (grasped || cosine > surely_plain_) return 1.0 / volume;
+    if (cosine <= 0.0) return 0.0;
+    const double angle = std::acos(std::min(1.0, cosine));
+    const double slanted = std::max(0.0, angle - settings_.slant) / settings_.slant_sigma;
+    const double beyond = std::max(0.0, angle - cone_) / settings_.cone_softness;
+    return std::exp(-0.5 * (slanted * slanted + beyond * beyond)) / volume;
   }
 
   const PlaceSettings& settings() const { return settings_; }
@@ -159,6 +203,11 @@ class ForceFitter {
   // assumed where nothing is measured; `gradient` (5): of -chi2 / 2.
   void information(const Quadratic& q, const Vec3& point, const Vec3& normal, const Vec3& force,
                    double* H, double* gradient) const {
+    information(q, point, normal, force, settings_.place_scale, H, gradient);
+  }
+  // The same, with one sigma of the place along its surface [m].
+  void information(const Quadratic& q, const Vec3& point, const Vec3& normal, const Vec3& force,
+                   double place_scale, double* H, double* gradient) const {
     double D[6][5], w[6], rest[6];
     Vec3 along[2];
     tangents(normal, along[0], along[1]);
@@ -189,7 +238,7 @@ class ForceFitter {
         for (int r = 0; r < 6; ++r) sum += D[r][a] * LD[r][b];
         H[5 * a + b] = H[5 * b + a] = sum;
       }
-      const double scale = a < 3 ? settings_.force_scale : settings_.place_scale;
+      const double scale = a < 3 ? settings_.force_scale : place_scale;
       H[6 * a] += 1.0 / (scale * scale);
     }
   }
@@ -237,7 +286,7 @@ class ForceFitter {
       for (int i = 0; i < kAll; ++i) cosine[i] = std::cos(angle[i]), sine[i] = std::sin(angle[i]);
     }
 
-    double cosine[kAll], sine[kAll];
+    double cosine[kAll + kLanes] = {}, sine[kAll + kLanes] = {};  // room: for the last side by side
     int halved[kAll];  // where the three of it stand at the next half step
 
     static constexpr double kTurn = 6.283185307179586;  // [rad]
@@ -300,31 +349,37 @@ class ForceFitter {
               const double* g, double worth) const {
     Vec3 s, t;
     tangents(normal, s, t);
-    double best = 0.0;
+    const double part[3][3] = {{s.x, s.y, s.z}, {t.x, t.y, t.z}, {normal.x, normal.y, normal.z}};
+    double best = 0.0, size = 0.0;
     int at = 0;
-    Vec3 force;
-    const auto offer = [&](int direction) {
-      const double cosine = turns_.cosine[direction], sine = turns_.sine[direction];
-      const Vec3 u = settings_.friction * (cosine * s + sine * t) - normal;
-      const double x[3] = {u.x, u.y, u.z};
-      double along = 0.0, curve = 0.0;
-      for (int i = 0; i < 3; ++i) {
-        along += g[i] * x[i];
-        for (int j = 0; j < 3; ++j) curve += x[i] * A[3 * i + j] * x[j];
+    // So many directions from one on, side by side; each as if alone.
+    const auto offer = [&](int first, int count) {
+      for (int i = first; i < first + count; i += kLanes) {
+        const Lanes cosine = load_lanes(turns_.cosine + i), sine = load_lanes(turns_.sine + i);
+        Lanes x[3], along{}, curve{};
+        for (int k = 0; k < 3; ++k)
+          x[k] = settings_.friction * (cosine * part[0][k] + sine * part[1][k]) - part[2][k];
+        for (int k = 0; k < 3; ++k) {
+          along += g[k] * x[k];
+          for (int j = 0; j < 3; ++j) curve += x[k] * A[3 * k + j] * x[j];
+        }
+        const Lanes less = along * along / curve;
+        for (int k = 0; k < std::min(kLanes, first + count - i); ++k) {
+          if (lane(along, k) <= 0.0 || lane(less, k) <= best) continue;
+          best = lane(less, k);
+          at = i + k;
+          size = lane(along, k) / lane(curve, k);
+        }
       }
-      if (along <= 0.0 || along * along / curve <= best) return;
-      best = along * along / curve;
-      at = direction;
-      force = (along / curve) * u;
     };
-    for (int i = 0; i < Turns::kFirst; ++i) offer(i);
+    offer(0, Turns::kFirst);
     for (int halving = 0; halving < Turns::kHalvings; ++halving) {
-      const int less = at = turns_.halved[at];
-      offer(less + 1);
-      offer(less + 2);
+      at = turns_.halved[at];
+      offer(at + 1, Turns::kEach - 1);
     }
     Fit fit;
-    fit.force = force;
+    if (best > 0.0)
+      fit.force = size * (settings_.friction * (turns_.cosine[at] * s + turns_.sine[at] * t) - normal);
     fit.cone = std::numeric_limits<double>::infinity();
     const double least = q.constant - best;
     if (best > 0.0 && least - kRounding * (1.0 + std::fabs(q.constant)) < worth)
@@ -334,7 +389,10 @@ class ForceFitter {
 
   const PlaceSettings& settings_;
   double cone_;            // half of its opening [rad]
+  double directions_;      // in it, as a part of half of all
   double surely_in_cone_;  // a cosine: above it nothing is beyond the cone
+  double surely_straight_;  // above it no push is oblique
+  double surely_plain_;    // above it neither
   const Turns& turns_;
 };
 
