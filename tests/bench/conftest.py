@@ -39,4 +39,4 @@ class Here:
 @pytest.fixture
 def here(monkeypatch):
     """Makes a module do its work in this process."""
-    return lambda module: monkeypatch.setattr(module, "ProcessPoolExecutor", Here)
+    return lambda module: monkeypatch.setattr(module, "workers", Here)

@@ -8,10 +8,8 @@ confusion matrices, with the time from the first touch to the decision.
 import csv
 import os
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from functools import cache
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +24,7 @@ from touchline.pipeline.pipeline import Pipeline
 from touchline.result.event import Event
 from touchline.trials.interactions import BEGIN, Interaction, InteractionSampler
 from touchline.trials.touches import TouchSampler
+from touchline.workers import workers
 
 KINDS = ("contact", "collision")
 CHUNK = 20
@@ -101,7 +100,7 @@ def judge_all(count: int, seed: int = 0) -> Iterator[list[Verdict]]:
     """The verdicts on many interactions, part by part, on all cores."""
     parts = [(range(i, min(i + CHUNK, count)), seed) for i in range(0, count, CHUNK)]
     processes = len(os.sched_getaffinity(0))
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+    with workers(processes) as pool:
         yield from pool.map(_judge_part, *zip(*parts, strict=True))
 
 
