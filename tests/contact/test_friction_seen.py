@@ -72,3 +72,10 @@ def test_joints_that_turn_during_a_push_make_no_second_contact(arm):
 def test_an_arm_without_friction_still_tells_of_a_torque_on_one_joint(arm):
     found = events(arm, 0.0, torque=lambda t: during(3.0, 4.0, [1.0])(t)[:, 0])
     assert any(2.99 < event.detected < 3.1 for event in found)
+
+
+def test_what_begins_as_friction_does_names_no_link_surely():
+    """With torques alone friction that turns is an event; a link had been named with 1.0."""
+    found = events(load_arm("panda-torques", 1), FRICTION)
+    assert len(found) > 2
+    assert all(c.probability <= 0.5 for event in found for c in event.candidates)

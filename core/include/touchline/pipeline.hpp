@@ -201,9 +201,10 @@ class Pipeline {
           const bool later = began > classifier_.blow(g) + tuning_.classifier.decide_within;
           fill(contact, g, k, estimate);
           if (doubted || later || (unsure && !known)) contact.level = ContactLevel::contact;
-          if (doubted) touchline::doubt(contact);
+          const bool may_be_none = doubted || detector_.began_by_itself(segment);
+          if (may_be_none) touchline::doubt(contact);
           contact.event =
-              recorder_.add(reports[k].serial, contact, doubted, since_begun, reports.share(k),
+              recorder_.add(reports[k].serial, contact, may_be_none, since_begun, reports.share(k),
                             sample.time, sample.q, estimate.tau_ext(), normalized);
         }
       }

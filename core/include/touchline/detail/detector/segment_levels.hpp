@@ -57,8 +57,11 @@ class SegmentLevels {
 
   // Is what is felt of a segment most likely the arm's own doing: an error of its model in motion?
   bool is_own_doing(std::size_t g) const {
-    const Segment& s = segments_[g];
-    return is_off(g) && motion_.moves() && (s.origin != Origin::push || is_learned(g));
+    return began_by_itself(g) || (is_off(g) && motion_.moves() && is_learned(g));
+  }
+  // The same, as it began as no push does.
+  bool began_by_itself(std::size_t g) const {
+    return is_off(g) && motion_.moves() && segments_[g].origin != Origin::push;
   }
 
   // Does an error of the model begin to show, or may it grow after it has been felt? Then it is learned

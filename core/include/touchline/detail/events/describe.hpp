@@ -37,7 +37,7 @@ inline void describe(const Answer& answer, int g, Contact& c) {
   c.degrees = explained ? answer.degrees : -1;
 }
 
-// Of two explanations, a contact and a faulty channel, none is preferred.
+// Of two explanations, a contact and a faulty channel or an error of the model, none is preferred.
 constexpr double kDoubted = 0.5;
 
 // What is said of a contact or an event that may be none.

@@ -30,7 +30,7 @@ struct LastingEvent {
   std::vector<double> q;       // (n)
   std::vector<double> torque;  // (n) the largest of each joint [Nm]
   std::vector<double> sum;     // of normalized rows and force, over samples near the peak
-  int count = 0, doubted = 0;  // samples of it, and those of which a faulty channel may be the cause
+  int count = 0, doubted = 0;  // samples of it, and those that may be no contact's
   bool apart = false;  // was there an answer with a rank? It is the last one:
   Status undetermined_status = Status::none;
   int rank = -1, unknowns = -1;
@@ -70,8 +70,8 @@ class EventRecorder {
     crowded_ = false;
   }
 
-  // Takes what is said of a contact; returns the number of its event. `doubted`: one faulty channel
-  // may be the cause of this sample; `since_begun`: and of all of the event so far.
+  // Takes what is said of a contact; returns the number of its event. `doubted`: one faulty channel, or
+  // an error of the model, may be the cause of this sample; `since_begun`: a channel of all so far.
   int add(int serial, const Contact& c, bool doubted, bool since_begun, double share, double time,
           const double* q, const Span<double>& tau_ext, const Span<double>& normalized) {
     LastingEvent& e = lasting(serial, c.segment, time);
