@@ -58,13 +58,17 @@ def faulty(robot, samples, name, channel, begin):
     return injected(samples, fault, place, begin, np.random.default_rng(0))[0]
 
 
-@pytest.mark.parametrize("name", ["base.fx", "base.fz", "tau.joint4"])
-def test_a_channel_that_alone_explains_what_is_felt_is_named(arm, name):
-    robot, pipeline, samples = arm
+@pytest.mark.parametrize(
+    ("name", "within"),  # a push along a base sensor's axis rises as its force drifts, but is brief
+    [("base.fx", 1.2), ("base.fz", 1.2), ("tau.joint4", 0.2)],
+)
+def test_a_channel_that_alone_explains_what_is_felt_is_named(arm, name, within):
+    robot, pipeline, _ = arm
+    samples = record(robot, 1, pushed=False, seconds=2.0).samples
     wrong = drifting(robot, samples, name)
     _, told, events = heard(pipeline, wrong)
     assert told[0].channel == name and told[0].fault == Fault.SUSPECT
-    assert wrong.time[told[0].sample] - BEGIN < 0.2
+    assert wrong.time[told[0].sample] - BEGIN < within
     assert events != []
     for event in events:
         assert event.level == "contact" and event.status != "located"
