@@ -126,6 +126,19 @@ def test_a_push_that_begins_while_an_error_creeps_over_its_limit_is_no_error():
     assert np.max(detection.drift[-1][np.array(forces)]) < 0.5  # N
 
 
+def felt_moving(maker, q, qd, loads, force):
+    """A pipeline that has felt a force (N, 3) [N] at the frame of link3 of a moving `sara`."""
+    robot, n = load_robot("sara"), q.shape[1]
+    at = np.array([robot.T_world_links(x)["link3"][:3, 3] for x in q])
+    contact = contact_loads(robot, q, "link3", np.hstack([force, np.cross(at, force)]))
+    loads[:, :n] -= contact.torque
+    loads[:, n:] -= contact.wrench.reshape(len(q), -1)
+    s = maker.sensed(q, qd, loads, np.random.default_rng(1))
+    pipeline = Pipeline(robot)
+    pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+    return pipeline
+
+
 def test_a_push_on_an_error_that_has_crept_over_its_limit_is_its_own_event():
     # The torque of joint 5 errs by ever more as the arm moves: by 1.2 thresholds at last. Nothing
     # else has shown yet that the arm is not as told.
@@ -145,13 +158,7 @@ def test_a_push_on_an_error_that_has_crept_over_its_limit_is_its_own_event():
         (maker.time - 3.5) / 0.02, 0.0, 1.0
     )
     force = pushed[:, None] * np.array([0.0, 0.0, -20.0])
-    at = np.array([robot.T_world_links(x)["link3"][:3, 3] for x in q])
-    contact = contact_loads(robot, q, "link3", np.hstack([force, np.cross(at, force)]))
-    loads[:, :n] -= contact.torque
-    loads[:, n:] -= contact.wrench.reshape(len(q), -1)
-    s = maker.sensed(q, qd, loads, np.random.default_rng(1))
-    pipeline = Pipeline(robot)
-    pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+    pipeline = felt_moving(maker, q, qd, loads, force)
     crept, push = spans(pipeline)
     assert 2.3 < crept[0] < 2.9
     assert 3.0 < push[0] < 3.05
@@ -179,13 +186,7 @@ def test_a_push_that_is_held_in_motion_hides_not_the_next_one(newton):
 
     size = newton * held(7.0, 13.0) + 20.0 * held(15.0, 15.5)
     force = size[:, None] * np.array([0.0, 0.0, -1.0])
-    at = np.array([robot.T_world_links(x)["link3"][:3, 3] for x in q])
-    contact = contact_loads(robot, q, "link3", np.hstack([force, np.cross(at, force)]))
-    loads[:, :n] -= contact.torque
-    loads[:, n:] -= contact.wrench.reshape(len(q), -1)
-    s = maker.sensed(q, qd, loads, np.random.default_rng(1))
-    pipeline = Pipeline(robot)
-    pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+    pipeline = felt_moving(maker, q, qd, loads, force)
     long, next_one = spans(pipeline)
     assert 7.0 < long[0] < 7.05 and 13.0 < long[1] < 13.5
     assert 15.0 < next_one[0] < 15.05 and 15.5 < next_one[1] < 15.9
