@@ -11,6 +11,7 @@ import touchline as tl
 from touchline.model.description import SensorDescription
 from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
+from touchline.trials.recordings import PUSHED, record
 
 RATE = 1000.0
 DEAD = 0.3  # s at which the sensor dies
@@ -275,3 +276,32 @@ def test_a_contact_that_ends_in_a_drop_out_is_over():
     run(pipeline, without(samples, 1, 0.5, 0.8))
     assert len(pipeline.events) == 1
     assert 0.5 < pipeline.events[0].cleared < 0.75
+
+
+@pytest.fixture(scope="module")
+def held():
+    """A moving arm, 2 % off, of which an outer link is held for half a second."""
+    return record(robot_named("sara"), 0)
+
+
+def test_what_joint_torques_say_of_a_place_counts_only_until_the_sensor_is_back(held):
+    """Their errors last: of many samples they would be sure of another link."""
+    whole, pipeline = tl.Pipeline(held.robot), tl.Pipeline(held.robot)
+    run(whole, held.samples)
+    run(pipeline, without(held.samples, 0, PUSHED, PUSHED + 0.3))
+    (healthy,), (event,) = whole.events, pipeline.events
+    assert healthy.body == held.body
+    assert event.status != "located" or event.body == held.body
+    # While the sensor is lost a force is not known, which is no force of zero.
+    assert np.linalg.norm(event.force - healthy.force) < 0.2 * np.linalg.norm(healthy.force)
+
+
+def test_a_push_whose_sensor_is_lost_meanwhile_does_not_rest_there(held):
+    """A sensor that is lost does not say that it carries nothing any more."""
+    pipeline = tl.Pipeline(held.robot)
+    lossy = without(held.samples, 0, PUSHED + 0.02, PUSHED + 0.3)
+    _, detection = run(pipeline, lossy)
+    assert all(event.cleared is not None for event in pipeline.events)
+    assert (
+        np.abs(detection.normalized[-200:]).mean(axis=0).max() < 0.7
+    )  # nothing has become an offset

@@ -126,13 +126,14 @@ class RowOffsets {
   }
 
   // What is left of a contact and does not change rests there: an offset from now on. What stood
-  // there before is remembered, unless what is remembered stood there for longer.
+  // there before is remembered, unless what is remembered stood there for longer. A row that is not
+  // known has no last moments: what stands there is not seen.
   void come_to_rest(std::size_t g) {
     const bool longer = quiet_[g] > quiet_before_[g];
     if (longer) quiet_before_[g] = quiet_[g];
     for (const std::size_t i : rows_.of(g)) {
       if (longer) before_[i] = {baseline_[i], anchor_[i], shown_[i]};
-      rest(i);
+      if (!is_anew(i)) rest(i);
     }
     quiet_[g] = tuning_.trend / rows_.slowest(g);
   }

@@ -287,10 +287,15 @@ class SegmentLevels {
 
   // Does nothing of a contact load the segment's sensors any more, of such an arm? What its joints
   // then have is friction that has changed meanwhile: no contact that clamps the arm loses its load on
-  // the sensors at once and keeps that on the joints.
+  // the sensors at once and keeps that on the joints. A sensor that is lost says nothing of its load.
   bool only_joints_left(std::size_t g) const {
-    return has_moved_off(g) && segments_[g].top_wrench > 1.0 &&
+    return has_moved_off(g) && segments_[g].top_wrench > 1.0 && knows_wrench(g) &&
            lately(g, Rows::wrench) < times_.release && is_steady(g, Rows::wrench);
+  }
+  bool knows_wrench(std::size_t g) const {
+    for (const std::size_t i : rows_.of(g))
+      if (counts(i, Rows::wrench)) return true;
+    return false;
   }
 
   // The mean of the last moments, in limits: the largest of a segment's rows.

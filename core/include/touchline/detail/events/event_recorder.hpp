@@ -30,7 +30,8 @@ struct LastingEvent {
   std::vector<double> q;       // (n)
   std::vector<double> torque;  // (n) the largest of each joint [Nm]
   std::vector<double> sum;     // of normalized rows and force, over samples near the peak
-  int count = 0, doubted = 0;  // samples of it, and those that may be no contact's
+  // Samples of it, those whose wrench is known, and those that may be no contact's.
+  int count = 0, wrenches = 0, doubted = 0;
   bool apart = false;  // was there an answer with a rank? It is the last one:
   Status undetermined_status = Status::none;
   int rank = -1, unknowns = -1;
@@ -172,7 +173,7 @@ class EventRecorder {
     e.level = ContactLevel::contact;
     e.decided = e.rate = kUnknown;
     e.strength = e.force = 0.0;
-    e.count = e.doubted = 0;
+    e.count = e.wrenches = e.doubted = 0;
     std::fill_n(e.wrench, 6, 0.0);
     for (std::vector<double>* values : {&e.q, &e.torque, &e.sum})
       std::fill(values->begin(), values->end(), 0.0);
@@ -216,13 +217,14 @@ class EventRecorder {
     const double strength = share * largest;
     if (strong_share_ * strength > e.strength) {  // all that came before was weak
       std::fill(e.sum.begin(), e.sum.end(), 0.0);
-      e.count = e.doubted = 0;
+      e.count = e.wrenches = e.doubted = 0;
     }
     e.strength = std::max(e.strength, strength);
     if (strength < strong_share_ * e.strength) return false;
     const std::size_t rows = normalized.size();
     for (std::size_t i = 0; i < rows; ++i) e.sum[i] += normalized[i];
     for (std::size_t i = 0; i < 3; ++i) e.sum[rows + i] += known(wrench[i]);
+    if (wrench[0] == wrench[0]) ++e.wrenches;
     ++e.count;
     return true;
   }
@@ -253,9 +255,10 @@ class EventRecorder {
     const double samples = std::max(e.count, 1);
     for (std::size_t i = 0; i < mean_.size(); ++i) mean_[i] = e.sum[i] / samples;
     const int sensor = observer_.layout().segments[e.segment].sensor;
-    if (sensor >= 0) {
-      const double* force = mean_.data() + robot_.rows.size();
-      out.force = {force[0], force[1], force[2]};
+    if (sensor >= 0 && e.wrenches > 0) {  // while the sensor is lost a force is not known
+      const double* force = e.sum.data() + robot_.rows.size();
+      const double of = e.wrenches;
+      out.force = {force[0] / of, force[1] / of, force[2] / of};
       out.force_peak = e.force;
     }
     out.joint = loaded_joint(e, sensor);

@@ -37,12 +37,16 @@ class EventPlace {
   void restart() { *this = EventPlace{}; }
 
   // `independence`: how much of an independent sample each one is (K dt / 2 behind a filter).
+  // `by_wrench`: is the segment's wrench known? While its sensor is lost joint torques stand in: their
+  // errors last, and do not average out. Such samples count only as long as there is no better one.
   // Returns whether the sample is strong; if it is, its explanations are to be added.
-  bool begin_sample(double strength, double time, double independence, const LocalizerTuning& t) {
-    if (t.strong_share * strength > peak_) {  // all that came before was weak
-      const double peak = strength;
+  bool begin_sample(double strength, bool by_wrench, double time, double independence,
+                    const LocalizerTuning& t) {
+    if (by_wrench_ && !by_wrench) return false;
+    if (by_wrench != by_wrench_ || t.strong_share * strength > peak_) {  // all that came before was weak
       restart();
-      peak_ = peak;
+      peak_ = strength;
+      by_wrench_ = by_wrench;
     }
     peak_ = std::max(peak_, strength);
     if (strength < t.strong_share * peak_) return false;
@@ -216,7 +220,7 @@ class EventPlace {
   int count_ = 0, samples_ = 0, explained_ = 0, unexplained_ = 0;
   int statuses_[5] = {};
   double peak_ = 0.0, time_ = 0.0, independence_ = 1.0, missed_ = 0.0;
-  bool followed_ = false;
+  bool followed_ = false, by_wrench_ = false;
   double variance_ = 0.0, lasting_ = 0.0;  // sums over the explained samples
 };
 

@@ -222,7 +222,9 @@ class Localizer {
       std::copy(links_.shares().begin(), links_.shares().end(), m.links.begin());
       m.revision = links_.revision();
     }
-    if (!m.event.begin_sample(strength, time, 0.5 * period_ * bandwidth(g), settings_)) return;
+    const double independence = 0.5 * period_ * bandwidth(g);
+    const bool by_wrench = measurement_.has_wrench();
+    if (!m.event.begin_sample(strength, by_wrench, time, independence, settings_)) return;
     if (reports().count() > 1) m.event.follow();
     keep(m, EventPlace::kPlaces, q);
     const bool explained =
