@@ -146,7 +146,7 @@ def recorded(name, seed):
 
 def test_a_gap_in_a_push_that_lasts_is_no_blow():
     """The filters begin anew after it: they rise from zero as if something struck the arm."""
-    pytest.importorskip("example_robot_data")
+    pytest.importorskip("pinocchio", reason="comes with example-robot-data, the arms' models")
     said, _ = with_fault(recorded("panda", 110), "gap", "time", "contact")
     assert [e.level for e in said.events] == ["contact"]
 

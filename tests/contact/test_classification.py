@@ -111,7 +111,7 @@ def test_live_contacts_have_the_classes_of_the_events(sara, skin):
 
 
 def test_joint_torques_alone_tell_blows_from_holds():
-    pytest.importorskip("example_robot_data")
+    pytest.importorskip("pinocchio", reason="comes with example-robot-data, the arms' models")
     robot = tl.load_robot("examples/robots/panda_hand.yaml")
     skin, rng = Skin(robot), np.random.default_rng(2)
     sampler = InteractionSampler(robot, TouchSampler(skin, rng), rng)

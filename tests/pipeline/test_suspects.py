@@ -8,6 +8,7 @@ import pytest
 from test_parity import drifting, heard
 
 import touchline as tl
+from touchline.detector.thresholds import make_thresholds
 from touchline.model.robot import Robot
 from touchline.result.kinds import Fault
 from touchline.simulation.contacts import Profile, ScriptedContact
@@ -15,7 +16,7 @@ from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scenario import scripted
 from touchline.simulation.scene import Run
 from touchline.trials.faults import FAULTS, channels_of, injected
-from touchline.trials.recordings import RELEASED, record, robot_named
+from touchline.trials.recordings import PUSHED, RELEASED, record, robot_named
 
 BEGIN = 0.6  # s
 HIT = 2.2  # s
@@ -246,9 +247,41 @@ def test_a_torque_that_steps_as_a_push_lets_go_is_told_and_is_no_collision():
     assert {event.level for event in events} == {"contact"}
 
 
+def test_what_one_joint_torque_alone_makes_of_a_push_is_no_collision():
+    """Twice the torque of one joint: no single force does that, and others show no blow."""
+    pytest.importorskip("pinocchio", reason="comes with example-robot-data, the arms' models")
+    robot = robot_named("panda")
+    samples = record(robot, 110).samples
+    pipeline = tl.Pipeline(robot)
+    _, _, (healthy,) = heard(pipeline, samples)
+    assert healthy.level == "contact"
+    wrong = scaled(samples, "joint1", 2.0, PUSHED, 3.0)
+    _, _, events = heard(pipeline, wrong)
+    event = next(e for e in events if e.detected == pytest.approx(healthy.detected, abs=0.02))
+    assert (event.status, event.level) == ("not_separable", "contact")
+    assert PUSHED + 0.05 < event.decided < PUSHED + 0.2  # not before a place may have been found
+
+
 def scaled(samples, joint, part, begin, end):
     """A copy in which a joint's torque is this part of itself for a while."""
     tau = samples.tau.copy()
     during = (samples.time >= begin) & (samples.time < end)
     tau[during, int(joint[-1]) - 1] *= part
     return replace(samples, tau=tau)
+
+
+@pytest.mark.parametrize(("part", "told"), [(0.85, False), (1.5, True)])
+def test_of_what_a_push_leaves_only_more_than_a_threshold_is_a_fault(part, told):
+    """The arm has moved on since its baseline: a part of a threshold is its model's error."""
+    robot = tl.load_robot("sara")
+    samples = pushed(robot, "link4", [10.0, 12.0, -15.0], 0.5, 2.0)
+    joint = robot.joint_names.index("joint4")
+    threshold = next(
+        row.contact for row in make_thresholds(robot, 0.001).rows if row.joint == joint
+    )
+    creeps = np.clip((samples.time - BEGIN) / 0.5, 0.0, 1.0)
+    samples.tau[:, joint] += part * threshold * creeps
+    pipeline = tl.Pipeline(robot)
+    _, faults, events = heard(pipeline, samples)
+    assert len(events) == 1
+    assert {change.channel for change in faults} == ({"tau.joint4"} if told else set())

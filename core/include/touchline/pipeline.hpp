@@ -188,7 +188,7 @@ class Pipeline {
       localizer_.follow(g, felt, row, detector_.placing().data(), sample.time, sample.q);
       const Reports& reports = localizer_.reports();
       if (felt) {
-        suspects_.add(localizer_.suspect());
+        suspects_.add(localizer_.suspect(), detector_.is_over(g));
         classifier_.consider(g, reports);
         for (int k = 0; k < reports.count(); ++k) {
           Contact& contact = contacts_[count_++];
@@ -201,6 +201,7 @@ class Pipeline {
           const bool later = began > classifier_.blow(g) + tuning_.classifier.decide_within;
           fill(contact, g, k, estimate);
           if (doubted || later || (unsure && !known)) contact.level = ContactLevel::contact;
+          if (!known && classifier_.by_one_joint(g)) ask_place(contact, sample.time);
           const bool may_be_none = doubted || detector_.began_by_itself(segment);
           if (may_be_none) touchline::doubt(contact);
           contact.event =
@@ -216,6 +217,15 @@ class Pipeline {
         memory->serial = -1;
       }
     }
+  }
+
+  // One joint's torque alone says that a contact is a collision. It may be wrong: the others must have a
+  // place at which one force does all of it, as soon as one is found and while the blow is young.
+  void ask_place(Contact& contact, double time) const {
+    const bool late = time > classifier_.blow(contact.segment) + tuning_.classifier.decide_within;
+    if (!late && contact.status != Status::not_separable) return;
+    contact.level = ContactLevel::contact;
+    contact.decided = contact.decided && late;
   }
 
   // All of contact k on segment g but its event.

@@ -280,14 +280,14 @@ what is estimated where a sensor inboard contradicts it.
 A push does so where it passes near a sensor's axis. But a wrong sign, scale or delay is wrong by no
 more than a few times what the channel carries. An axis that is wrong by more, where a contact
 explains all as well, is told after a second; two axes that do not differ as swapped ones do, too.
-So a push that is told as a fault is one along an axis that carries about as much. Errors of the
-model are told, too, where a push lets go and they alone are left. For two seconds a channel that is
-told does not count. To ask there for five sigmas of noise would end these, and tell 0.6 % fewer
-signs, scales and delays in time: those whose errors are as small as the model's.
+So a push that is told as a fault is one along an axis that carries about as much. Where a push lets
+go errors of the model alone are left. There a channel is told only if it is wrong by more than the
+threshold of a contact. For two seconds a channel that is told does not count.
 
 A joint and a sensor with no body between them must agree: what they differ by begins no event, and
 one of the two is named. With joint torques alone nothing of this is told: a push on the first link
 loads one joint, too. But where one steps alone within a sample, nothing becomes a collision for a
 second. What a push does to the others for many samples, as it comes or goes, does not count then.
-What is left: an error that makes a push look stronger than it is.
+And where one joint alone makes a push a blow, one force must explain all joints: else it is none.
+What is left: an error that makes a push look stronger, and that a push elsewhere explains as well.
 """

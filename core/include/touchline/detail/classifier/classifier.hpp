@@ -4,6 +4,8 @@
 // within `decide_within` is a contact; a later blow makes it a collision. Forces have passed the
 // observer's low-pass, which shows a step of F as a rate of at most 0.63 F / `rate_window` (K = 100).
 // A filter that begins anew rises from zero whatever lasts: that is no growth of a force.
+// Of joint torques the largest stands for the force. Where no other one shows a blow it may be wrong:
+// `by_one_joint` tells.
 // No allocation per sample.
 // Theory: docs/theory.md, section 7.1.
 #pragma once
@@ -39,10 +41,10 @@ class Classifier {
         row_(observer.row_layout()),
         limits_(std::move(limits)),
         bandwidths_(limits_.size()),
-        sizes_(limits_.size()),
+        sizes_(2 * limits_.size()),
         touches_(limits_.size()),
         settled_(limits_.size(), 0),
-        history_(limits_.size(), tuning_.rate_window),
+        history_(sizes_.size(), tuning_.rate_window),
         clamping_(limits_.size(), tuning_) {
     bool good = limits_.size() == static_cast<std::size_t>(row_.segments);
     for (const BlowLimits& of_segment : limits_) {
@@ -72,11 +74,13 @@ class Classifier {
   template <class Doubted>
   void step(double time, const double* row, const double* levels, Doubted&& doubted) {
     time_ = std::fmax(time_, time);
-    for (std::size_t g = 0; g < limits_.size(); ++g) sizes_[g] = size(g, row);
+    for (std::size_t g = 0; g < limits_.size(); ++g) find_sizes(g, row);
     history_.add(time_, sizes_.data());
     for (std::size_t g = 0; g < limits_.size(); ++g) {
       const int settled = count_settled(g, row);
-      if (settled != std::exchange(settled_[g], settled)) history_.begin_anew(g);
+      if (settled == std::exchange(settled_[g], settled)) continue;
+      history_.begin_anew(g);
+      history_.begin_anew(other(g));
     }
     clamping_.step(time_, row + row_.segment_wrench(), levels);
     for (std::size_t g = 0; g < limits_.size(); ++g)
@@ -88,6 +92,7 @@ class Classifier {
     Touch& touch = touches_[g];
     if (!(touch.blow >= since)) return;
     touch.blow = kNaN;
+    touch.borne_out = false;
     touch.kind = Kind::undecided;
   }
 
@@ -103,6 +108,10 @@ class Classifier {
   bool clamped(int g, int k) const { return clamping_(g, k); }
   // When the present touch of a segment last began fast, or grew as fast [s]; NaN: never.
   double blow(int g) const { return touches_[g].blow; }
+  // Is the present touch of a segment a collision by the torque of one joint alone?
+  bool by_one_joint(int g) const {
+    return touches_[g].kind == Kind::collision && !touches_[g].borne_out;
+  }
   // Of the segment's force [N/s]; NaN where it is not touched.
   double rate(int g) const { return touches_[g].rate; }
 
@@ -112,19 +121,28 @@ class Classifier {
   struct Touch {
     Kind kind = Kind::none;
     double begin = 0.0, rate = kNaN, blow = kNaN;
+    bool borne_out = false;  // has more than one joint shown a blow?
   };
 
-  // Of the force on segment g, from what has settled [N].
-  double size(std::size_t g, const double* row) const {
+  // Where the second size of segment g stands.
+  std::size_t other(std::size_t g) const { return limits_.size() + g; }
+
+  // Of the force on segment g, from what has settled; the second is what its other joints say without the
+  // one that says most [N]. A wrench needs no second.
+  void find_sizes(std::size_t g, const double* row) {
     const double* w = row + row_.segment_wrench() + 6 * g;
-    if (limits_[g].joints.empty())
-      return row[row_.segment_settled() + g] > 0.0 ? norm(Vec3{w[0], w[1], w[2]}) : kNaN;
-    double most = 0.0;
-    for (const int joint : limits_[g].joints) {
-      if (row[row_.joint_settled() + joint] > 0.0)
-        most = std::fmax(most, std::fabs(row[row_.segment_torque() + joint]));
+    double &most = sizes_[g], &second = sizes_[other(g)];
+    if (limits_[g].joints.empty()) {
+      most = second = row[row_.segment_settled() + g] > 0.0 ? norm(Vec3{w[0], w[1], w[2]}) : kNaN;
+      return;
     }
-    return most / tuning_.lever;
+    most = second = 0.0;
+    for (const int joint : limits_[g].joints) {
+      if (!(row[row_.joint_settled() + joint] > 0.0)) continue;
+      const double size = std::fabs(row[row_.segment_torque() + joint]) / tuning_.lever;
+      second = std::fmax(second, std::fmin(size, most));
+      most = std::fmax(most, size);
+    }
   }
 
   // How much of what segment g is felt with has settled.
@@ -142,21 +160,27 @@ class Classifier {
       return;
     }
     if (touch.kind == Kind::none) touch = {Kind::undecided, time_, kNaN};
-    const BlowLimits& limits = limits_[g];
     touch.rate = history_.rate(g);
-    const bool strong = sizes_[g] + touch.rate / bandwidths_[g] > limits.collision;
-    if (!doubted && touch.rate > limits.onset && strong) {
+    if (!doubted && is_blow(g, g)) {
       touch.kind = Kind::collision;
       touch.blow = time_;
+      touch.borne_out = touch.borne_out || is_blow(g, other(g));
     } else if (touch.kind == Kind::undecided && time_ >= touch.begin + tuning_.decide_within) {
       touch.kind = Kind::contact;
     }
   }
 
+  // Does a size of segment g grow as a blow does?
+  bool is_blow(std::size_t g, std::size_t size) const {
+    const double rate = history_.rate(size);
+    return rate > limits_[g].onset && sizes_[size] + rate / bandwidths_[g] > limits_[g].collision;
+  }
+
   ClassifierTuning tuning_;
   RowLayout row_;
   std::vector<BlowLimits> limits_;
-  std::vector<double> bandwidths_, sizes_;  // of the segments' wrenches [rad/s], forces [N]
+  std::vector<double> bandwidths_;  // of the segments' wrenches [rad/s]
+  std::vector<double> sizes_;  // of the segments' forces, and then their second ones [N]
   std::vector<Touch> touches_;
   std::vector<int> settled_;  // per segment, at the last sample: see `count_settled`
   ForceHistory history_;

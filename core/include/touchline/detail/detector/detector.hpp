@@ -126,6 +126,8 @@ class Detector {
   // Per row: can a contact load it?
   const std::vector<char>& loadable() const { return loadable_; }
   const std::vector<int>& levels() const { return levels_.levels(); }  // per segment
+  // Does any row of segment g exceed its limit?
+  bool is_over(std::size_t g) const { return scores_[g].peak > 1.0; }
   // Did what is felt of segment g begin as no push does, but as an error of the model in motion?
   bool began_by_itself(std::size_t g) const { return levels_.began_by_itself(g); }
   // Per segment: over how long its baseline has been averaged [s].

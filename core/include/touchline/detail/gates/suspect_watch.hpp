@@ -23,7 +23,7 @@ class SuspectWatch {
   // Of a robot whose parts fit; `layout` is its observer's.
   SuspectWatch(const Robot& robot, const Layout& layout)
       : at_{robot.joints.size(), robot.sensors.size()},
-        least_(at_.count(), std::numeric_limits<double>::infinity()),
+        contact_(at_.count(), std::numeric_limits<double>::infinity()),
         now_(at_.count(), 0),
         told_(at_.count(), 0),
         beyond_(at_.count(), 0),
@@ -43,9 +43,9 @@ class SuspectWatch {
     }
     for (const DetectionRow& row : robot.rows) {
       const int sensor = layout.segments[row.segment].sensor;
-      if (row.joint >= 0) least_[at_.tau() + row.joint] = kLeast * row.contact;
+      if (row.joint >= 0) contact_[at_.tau() + row.joint] = row.contact;
       if (row.component >= 0 && sensor >= 0)
-        least_[at_.wrench() + 6 * sensor + row.component] = kLeast * row.contact;
+        contact_[at_.wrench() + 6 * sensor + row.component] = row.contact;
     }
   }
 
@@ -69,8 +69,12 @@ class SuspectWatch {
       }
     }
   }
-  void add(const Suspect& suspect) {
-    if (!suspect.any() || !suspect.told || !(std::fabs(suspect.error) > least_[suspect.channel])) return;
+  // `over`: does any row of the segment exceed its limit still? Where none does a push has let go, and what
+  // is left of an arm in motion is its model's error: a part of a threshold is no fault then.
+  void add(const Suspect& suspect, bool over) {
+    if (!suspect.any() || !suspect.told) return;
+    const double least = (over ? kLeast : 1.0) * contact_[suspect.channel];
+    if (!(std::fabs(suspect.error) > least)) return;
     const char beyond = suspect.touched && is_beyond(suspect) ? 1 : 0;
     if (suspect.touched && has_risen(suspect)) rises_[suspect.channel] = 1;
     for (const int c : {suspect.channel, suspect.other}) {
@@ -149,7 +153,7 @@ class SuspectWatch {
   }
 
   ChannelLayout at_;
-  std::vector<double> least_;  // [N, Nm]
+  std::vector<double> contact_;  // per channel: threshold of a contact [N, Nm]
   std::vector<char> now_, told_, beyond_;
   bool any_ = false;
   std::vector<double> since_, seen_, until_;  // [s]
