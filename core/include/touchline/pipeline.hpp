@@ -202,10 +202,10 @@ class Pipeline {
           fill(contact, g, k, estimate);
           if (doubted || later || (unsure && !known)) contact.level = ContactLevel::contact;
           const bool may_be_none = doubted || detector_.began_by_itself(segment);
-          if (may_be_none) touchline::doubt(contact);
           contact.event =
               recorder_.add(reports[k].serial, contact, may_be_none, since_begun, reports.share(k),
                             sample.time, sample.q, estimate.tau_ext(), normalized);
+          if (may_be_none) touchline::doubt(contact);  // the recorder doubts its event by itself
         }
       }
       for (Localizer::Memory* memory : localizer_.ended()) {
