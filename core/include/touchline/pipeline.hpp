@@ -201,10 +201,11 @@ class Pipeline {
           const bool later = began > classifier_.blow(g) + tuning_.classifier.decide_within;
           fill(contact, g, k, estimate);
           if (doubted || later || (unsure && !known)) contact.level = ContactLevel::contact;
-          const bool may_be_none = doubted || detector_.began_by_itself(segment);
+          const bool own = detector_.is_own_doing(segment);
+          const bool may_be_none = doubted || own || detector_.may_be_own_doing(segment);
           contact.event =
-              recorder_.add(reports[k].serial, contact, may_be_none, since_begun, reports.share(k),
-                            sample.time, sample.q, estimate.tau_ext(), normalized);
+              recorder_.add(reports[k].serial, contact, may_be_none, since_begun || own,
+                            reports.share(k), sample.time, sample.q, estimate.tau_ext(), normalized);
           if (may_be_none) touchline::doubt(contact);  // the recorder doubts its event by itself
         }
       }
