@@ -121,7 +121,7 @@ class SegmentLevels {
     if (!is_felt(g)) {
       s.top = s.top_wrench = s.rest = s.back = s.below = s.lasted = s.clear = 0.0;
       s.in_motion = motion_.moves();
-      s.arm_off = is_arm_off();
+      s.arm_off = is_arm_off() || now.age < tuning_.confirm / rows_.slowest(g);
       if (s.in_motion) s.moved += dt;
       s.grows = std::max(0.0, s.grows - dt);
       if (is_off(g) && motion_.moves()) s.shown += dt;
@@ -159,7 +159,8 @@ class SegmentLevels {
     Origin origin = Origin::start;
     bool in_motion = false;  // did the present event begin while the arm moved?
     double grows = 0.0;  // for how long what was the arm's own doing may go on to grow [s]
-    bool arm_off = false;    // has the arm shown that it is not as told, up to now in an event?
+    // Has the arm shown that it is not as told, up to now in an event? In its first moments it may be.
+    bool arm_off = false;
     double moved = 0.0;  // for how long the arm has moved, but for events [s]
     double shown = 0.0;  // for how long motion had shown before it what the arm is off by [s]
     // Of the present event, for how long [s]:
