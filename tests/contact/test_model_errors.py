@@ -16,6 +16,7 @@ from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot
 from touchline.model.transforms import move_wrench
 from touchline.observer.dynamics import contact_loads, gravity_loads
+from touchline.trials.arms import load_arm
 from touchline.trials.cell import Cell
 from touchline.trials.free_motion import MotionMaker, Trajectory
 from touchline.trials.scene import make_pipeline, make_scene, told_and_real
@@ -231,3 +232,18 @@ def test_an_event_of_a_moving_arm_that_is_off_is_hardly_surer_than_one_sample(sa
     of_samples = np.array(pipeline.contacts.columns()["body_probability"], float)
     assert event.body_probability < 0.9999
     assert event.body_probability > np.nanmedian(of_samples) - 0.05
+
+
+def test_the_first_motion_of_a_wrong_arm_names_no_link_surely():
+    """It rests and sets off; what its model and its friction add had been a place with 1.0."""
+    arm, rng, n = load_arm("panda", 1), np.random.default_rng(9), 7
+    real = Robot(arm.description, perturbed(arm.mechanism, 0.1, rng))
+    center = np.linspace(-0.4, 0.5, n) - np.eye(n)[3] * 1.5
+    turns = np.linspace(2.0, 3.5, n)[None, :], np.linspace(0.0, 5.0, n)[None, :]
+    motion = Trajectory(center, np.full((1, n), 0.5), *turns, (2.0 * np.pi, np.pi))
+    maker = MotionMaker(arm, real, 500.0, 1.4)
+    s = maker.sensed(*maker.loads(motion), rng)
+    pipeline = tl.Pipeline(arm, period=1.0 / 500.0)
+    pipeline.run(s.time, s.q, s.qd, s.tau + 0.5 * np.tanh(s.qd / 0.01), s.wrench)
+    assert len(pipeline.events) > 2
+    assert all(c.probability <= 0.5 for event in pipeline.events for c in event.candidates)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """One finite wrong signal that the others contradict is named and left out; touches are not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -139,3 +141,27 @@ def test_during_a_touch_a_joint_and_the_sensor_behind_it_are_in_doubt_together()
         "tau.shoulder_pan_joint",
         "base.mz",
     }
+
+
+@pytest.fixture(scope="module")
+def rubbing():
+    """A UR5 whose joints rub with 1 Nm and 0.5 Nm s/rad; a sensor is right behind the last one."""
+    robot = robot_named("ur5")
+    samples = record(robot, 1, pushed=False, seconds=5.0).samples
+    friction = np.tanh(samples.qd / 0.01) + 0.5 * samples.qd
+    return robot, tl.Pipeline(robot), replace(samples, tau=samples.tau + friction)
+
+
+def test_friction_of_a_joint_right_before_a_sensor_is_no_fault(rubbing):
+    """The torque differs from the sensor for as long as the joint turns; it was called a fault."""
+    _, pipeline, samples = rubbing
+    assert heard(pipeline, samples)[1] == []
+
+
+def test_a_torque_that_wanders_beside_friction_is_a_fault(rubbing):
+    _, pipeline, samples = rubbing
+    tau = samples.tau.copy()
+    tau[:, 5] += 4.0 * np.clip(samples.time - 3.0, 0.0, 1.0)
+    told = heard(pipeline, replace(samples, tau=tau))[1]
+    assert told[0].channel == "tau.wrist_3_joint"
+    assert 3.0 < samples.time[told[0].sample] < 5.0

@@ -202,11 +202,12 @@ class Pipeline {
           fill(contact, g, k, estimate);
           if (doubted || later || (unsure && !known)) contact.level = ContactLevel::contact;
           if (!known && classifier_.by_one_joint(g)) ask_place(contact, sample.time);
-          const bool may_be_none = doubted || detector_.began_by_itself(segment);
-          if (may_be_none) touchline::doubt(contact);
+          const bool own = detector_.is_own_doing(segment);
+          const bool may_be_none = doubted || own || detector_.may_be_own_doing(segment);
           contact.event =
-              recorder_.add(reports[k].serial, contact, may_be_none, since_begun, reports.share(k),
-                            sample.time, sample.q, estimate.tau_ext(), normalized);
+              recorder_.add(reports[k].serial, contact, may_be_none, since_begun || own,
+                            reports.share(k), sample.time, sample.q, estimate.tau_ext(), normalized);
+          if (may_be_none) touchline::doubt(contact);  // the recorder doubts its event by itself
         }
       }
       for (Localizer::Memory* memory : localizer_.ended()) {

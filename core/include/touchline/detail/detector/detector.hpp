@@ -92,7 +92,7 @@ class Detector {
     time_ = now;
     if (dt > 0.0) follow_motion(q, qd, dt);
     for (std::size_t g = 0; g < rows_.segments(); ++g) read_segment(g, qd);
-    if (dt > 0.0 && sound_) friction_.follow(placed_ ? &posture_ : nullptr, dt);
+    if (dt > 0.0 && sound_) friction_.follow(placed_ ? &posture_ : nullptr, loadable_, dt);
     borne_out_.add(rows_.residuals, rows_.known, dt);
     for (std::size_t g = 0; g < rows_.segments(); ++g) {
       if (rows_.any_known(g)) ages_[g] += dt;
@@ -128,8 +128,9 @@ class Detector {
   const std::vector<int>& levels() const { return levels_.levels(); }  // per segment
   // Does any row of segment g exceed its limit?
   bool is_over(std::size_t g) const { return scores_[g].peak > 1.0; }
-  // Did what is felt of segment g begin as no push does, but as an error of the model in motion?
-  bool began_by_itself(std::size_t g) const { return levels_.began_by_itself(g); }
+  // Is what is felt of segment g most likely the arm's own doing: an error of its model in motion? May it be?
+  bool is_own_doing(std::size_t g) const { return levels_.is_own_doing(g); }
+  bool may_be_own_doing(std::size_t g) const { return levels_.may_be_own_doing(g); }
   // Per segment: over how long its baseline has been averaged [s].
   const std::vector<double>& quiet() const { return offsets_.quiet(); }
   // Per segment, for each test: what is compared with its limit.
@@ -167,6 +168,7 @@ class Detector {
     double& age = ages_[rows_[row].segment];
     age = std::max(age, offsets_.age(row));
     motion_.go_on_from(other.motion_);
+    levels_.expect_errors(rows_[row].segment);
   }
   const Observer& observer() const { return observer_; }
 

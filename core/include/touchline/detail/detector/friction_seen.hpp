@@ -37,29 +37,29 @@ class FrictionSeen {
   }
 
   // Joints that are tested beside a force-torque sensor, which feels none of it; `posture`: null while
-  // it is not known.
-  void follow(const Posture* posture, double dt) {
+  // it is not known. Of those that no contact can load, as `loadable` says by row, all is friction.
+  void follow(const Posture* posture, const std::vector<char>& loadable, double dt) {
     for (std::size_t g = 0; g < rows_.segments(); ++g) {
       for (const std::size_t i : torques_of(g)) {
         if (!rows_.samples[i].known) continue;
         const double part = std::min(1.0, dt * rows_.bandwidths[i]);
         joints_[i].follow(rows_.samples[i].speed, part, std::min(1.0, part / tuning_.trend), tuning_);
       }
-      if (!has_sensor(g)) continue;
-      const bool silent = posture != nullptr && is_silent(g);
+      const bool watched = has_sensor(g), silent = watched && posture != nullptr && is_silent(g);
       const Spatial felt = silent ? felt_by_sensor(g, *posture) : Spatial{};
       double most = 0.0;
       for (const std::size_t i : torques_of(g)) {
-        if (!shows(i)) continue;
+        const bool bare = loadable[i] == 0;
+        if (!shows(i) || !(watched || bare)) continue;
         Joint& joint = joints_[i];
         const bool tells = joint.turned() >= tuning_.friction_turned;
-        if (silent && offsets_.started(i) && tells)
-          joint.learn(unexplained(i, felt, *posture), dt, tuning_);
+        if ((silent || bare) && offsets_.started(i) && tells)
+          joint.learn(bare ? off(i) : unexplained(i, felt, *posture), dt, tuning_);
         shown_[i] = joint.shown(rows_[i].contact, tuning_);
         most = std::max(most, shown_[i]);
       }
       for (const std::size_t i : torques_of(g))
-        if (shows(i)) expect(i, most);
+        if (shows(i) && (watched || loadable[i] == 0)) expect(i, most);
     }
   }
 

@@ -63,6 +63,15 @@ class SegmentLevels {
   bool began_by_itself(std::size_t g) const {
     return is_off(g) && motion_.moves() && segments_[g].origin != Origin::push;
   }
+  // May it be so, as far as one can tell? In motion an arm that has shown anywhere that it is not as told
+  // feels what begins as no push does, or before motion had shown how much the model errs.
+  bool may_be_own_doing(std::size_t g) const {
+    const Segment& s = segments_[g];
+    return s.arm_off && s.in_motion && (s.origin != Origin::push || s.moved < tuning_.motion_told);
+  }
+
+  // Motion has yet to show how much the model of this segment errs.
+  void expect_errors(std::size_t g) { segments_[g].moved = 0.0; }
 
   // Does an error of the model begin to show, or may it grow after it has been felt? Then it is learned
   // quickly. What exceeds its limits anew may be a push.
@@ -112,6 +121,8 @@ class SegmentLevels {
     if (!is_felt(g)) {
       s.top = s.top_wrench = s.rest = s.back = s.below = s.lasted = s.clear = 0.0;
       s.in_motion = motion_.moves();
+      s.arm_off = is_arm_off() || now.age < tuning_.confirm / rows_.slowest(g);
+      if (s.in_motion) s.moved += dt;
       s.grows = std::max(0.0, s.grows - dt);
       if (is_off(g) && motion_.moves()) s.shown += dt;
       return;
@@ -148,6 +159,9 @@ class SegmentLevels {
     Origin origin = Origin::start;
     bool in_motion = false;  // did the present event begin while the arm moved?
     double grows = 0.0;  // for how long what was the arm's own doing may go on to grow [s]
+    // Has the arm shown that it is not as told, up to now in an event? In its first moments it may be.
+    bool arm_off = false;
+    double moved = 0.0;  // for how long the arm has moved, but for events [s]
     double shown = 0.0;  // for how long motion had shown before it what the arm is off by [s]
     // Of the present event, for how long [s]:
     double lasted = 0.0;
@@ -161,6 +175,11 @@ class SegmentLevels {
 
   // Has the arm shown that it is not as told?
   bool is_off(std::size_t g) const { return rows_.off[g] != 0; }
+  bool is_arm_off() const {
+    for (std::size_t g = 0; g < segments_.size(); ++g)
+      if (is_off(g)) return true;
+    return false;
+  }
 
   // May a push that has lasted for so long be an error of the model after all? Not where motion had
   // shown for as long how large these are, and a sensor has clearly more: friction loads joints alone.
@@ -179,6 +198,7 @@ class SegmentLevels {
   void follow(std::size_t g, double dt) {
     Segment& s = segments_[g];
     s.lasted += dt;
+    s.arm_off = s.arm_off || is_arm_off();
     s.top = std::max(s.top, lately(g));
     s.top_wrench = std::max(s.top_wrench, lately(g, Rows::wrench));
     if (s.top > tuning_.barely) s.clear += dt;

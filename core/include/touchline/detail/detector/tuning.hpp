@@ -73,6 +73,9 @@ struct DetectorTuning {
   // What motion has shown is doubted by the share of so long of motion [s]: an error that grows has yet
   // to show the rest. Half: in the first second places are too sure. Double: they are too unsure.
   double motion_few = 0.5;
+  // An arm that is not as told must have moved for so long [s] to show how much it errs in motion: until
+  // then no link is sure. Half: first motions name links surely. Double: so do pushes 2 s later.
+  double motion_told = 1.0;
   // While it is taken for a contact an error counts so many times: it then fills the memory in 0.5
   // s. Half: false events of motion last twice as long. Double: a push that lasts is learned in
   // 0.25 s.
@@ -238,6 +241,7 @@ struct DetectorTuning {
     v("first_clearly", "1", t.first_clearly);
     v("motion_memory", "s", t.motion_memory);
     v("motion_few", "s", t.motion_few);
+    v("motion_told", "s", t.motion_told);
     v("motion_touched", "1", t.motion_touched);
     v("motion_sigmas", "1", t.motion_sigmas);
     v("drift_way", "rad", t.drift_way);

@@ -209,13 +209,14 @@ class ParityWatch {
                                        tuning_.parity_noise * tuning_.parity_noise));
   }
 
-  // A joint's torque beyond what the sensor right behind it says.
+  // A joint's torque beyond what the sensor right behind it says, and beyond what its friction may add.
   template <class Contradicted, class Unsure>
   void compare_joint(const Bare& bare, const Result& result, double dt, Contradicted&& contradicted,
                      Unsure&& unsure) {
     const double beyond = std::fabs(result.normalized[bare.row]);
     const std::size_t torque = at_.tau() + static_cast<std::size_t>(rows_[bare.row].joint);
-    if (!broken(torque, beyond > tuning_.parity_clear, dt)) return;
+    const double expected = std::max(1.0, result.drift[bare.row] / rows_[bare.row].contact);
+    if (!broken(torque, beyond > tuning_.parity_clear * expected, dt)) return;
     const double* own = result.normalized.data() + first_[bare.outer];
     const int sensor = observer_.layout().segments[bare.outer].sensor, axis = largest(own);
     const std::size_t first = at_.wrench() + 6 * static_cast<std::size_t>(sensor);
