@@ -29,6 +29,9 @@ from touchline.fleet.tables import COMMON
 from touchline.fleet.work import Job, done
 from touchline.folder import ResultsFolder
 from touchline.logs import write_table
+from touchline.logs.cdr import JOINT_STATE
+from touchline.logs.mcap import SCENE
+from touchline.logs.mcap_writer import McapWriter
 
 OPTIONS = {"bandwidth": None, "method": "segment", "report": "none"}
 
@@ -121,6 +124,74 @@ def test_results_beside_recordings_are_none(made, tmp_path, monkeypatch):
     for word in (".", "*", "**", "**/*.parquet", str(folder / "**")):
         assert [r.name for r in make_plan([word], "sara")] == ["one", "two"], word
     assert set(rows(folder)) == {"one", "two"}
+
+
+def for_viewers(path):
+    """As `--foxglove` writes it: scenes, and no joint states."""
+    writer = McapWriter(path, {})
+    for topic, kind in (("/robot", SCENE), ("/tau_ext", "foxglove.JointStates")):
+        writer.add_channel(topic, kind, "")
+    writer.close()
+    return path
+
+
+def test_what_the_shell_expands_is_what_a_folder_holds(made, tmp_path, monkeypatch, capsys):
+    """`analyze *` where earlier results are: they are no recordings that fail."""
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    for name in ("one", "two"):
+        shutil.copy(made / "a" / "whole.parquet", folder / f"{name}.parquet")
+    monkeypatch.chdir(folder)
+    assert run("one.parquet", "two.parquet", "--robot", "sara", "--out", ".") == 0
+    assert run("one.parquet", "--robot", "sara", "--out", ".") == 0  # its results lie open there
+    (folder / "robot.yaml").write_text("name: x\nmodel: robot:sara\n")
+    (folder / "shown.rrd").write_bytes(b"RRF2")
+    for_viewers(folder / "shown.mcap")
+    words = sorted(path.name for path in folder.iterdir())
+    capsys.readouterr()
+    assert run(*words, "--robot", "sara", "--out", ".") == 0
+    told = capsys.readouterr().out
+    (own,) = (line for line in told.splitlines() if "Touchline's own results" in line)
+    names = ("fleet.html", "log.jsonl", "manifest.jsonl", "tables", "estimates.parquet")
+    assert all(name in own for name in names) and "one" not in own
+    assert "shown.mcap, shown.rrd: made for a viewer" in told and "robot.yaml" in told
+    assert set(rows(folder)) == {"one", "two"}
+    assert run(*words, "--robot", "sara", "--out", ".", "--dry-run") == 0
+    assert "Touchline's own results" in capsys.readouterr().out
+    assert run(".", "--robot", "sara", "--out", ".") == 0  # the folder says the same
+    told = capsys.readouterr().out
+    assert re.search(r"skipped .*shown.mcap: made for a viewer", told)
+    assert set(rows(folder)) == {"one", "two"}
+
+
+def test_one_that_is_no_recording_is_refused_in_words(made, results, tmp_path, capsys):
+    own = "Touchline's own results"
+    shown = for_viewers(tmp_path / "shown.mcap")
+    estimates = results / "b" / "estimates.parquet"
+    for path, reason in (
+        (results / "fleet.html", own),
+        (results / "tables", own),
+        (estimates, own),
+        (shown, "made for a viewer"),
+    ):
+        assert run(path, "--robot", "sara", "--out", tmp_path / "r") == 2, path
+        told = capsys.readouterr().err
+        assert reason in told and ".parquet, .csv" in told and "folders" in told
+        assert not (tmp_path / "r").exists()
+    assert run(estimates, shown, "--robot", "sara", "--out", tmp_path / "r") == 2
+    told = capsys.readouterr().err
+    assert own in told and "made for a viewer" in told and "name recordings" in told
+    with pytest.raises(InputError, match="no such file"):
+        make_plan([str(tmp_path / "fleet.html")], "sara")
+
+
+def test_a_file_with_scenes_and_joint_states_is_a_recording(tmp_path):
+    path = tmp_path / "both.mcap"
+    writer = McapWriter(path, {})
+    for topic, kind in (("/robot", SCENE), ("/joint_states", JOINT_STATE)):
+        writer.add_channel(topic, kind, "")
+    writer.close()
+    assert [r.name for r in make_plan([str(path)], "sara")] == ["both"]
 
 
 def test_one_recording_takes_the_robot_beside_it(made, tmp_path, capsys):

@@ -14,6 +14,7 @@ from touchline import __version__
 from touchline.errors import InputError
 from touchline.fleet.figures import FIGURES, make_figures
 from touchline.fleet.manifest import Row, file_hash, stands
+from touchline.fleet.own import why_none
 from touchline.fleet.plan import Recording
 from touchline.fleet.remote import fetched
 from touchline.logs.bagfile import first_line
@@ -124,6 +125,8 @@ def _at_hand(job: Job) -> AbstractContextManager[Path]:
 
 
 def _analyzed(job: Job, log: Path) -> Row:
+    if reason := why_none(log):  # of a URL only seen now
+        return {"status": "skipped", "reason": reason}
     from touchline.report.analysis import analyze_as
     from touchline.report.outputs import NAMES
 
