@@ -17,6 +17,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from free_motion import free_motion, pushed
+from test_workers import lives
 
 import touchline as tl
 from touchline.cli import main
@@ -377,6 +378,50 @@ def test_limits_of_time_and_memory(made, tmp_path):
     with Pool(1, 0.01, None) as pool:
         (row,) = pool.rows(jobs(made, tmp_path, 1))
     assert row["status"] == "failed" and "took longer than 0.01 s" in row["reason"]
+
+
+WAITS = """
+import sys
+from pathlib import Path
+from touchline.fleet.plan import Recording
+from touchline.fleet.pool import Pool
+from touchline.fleet.work import Job
+
+if __name__ == "__main__":
+    recording = Recording(Path(sys.argv[1]), "sara", "waits", 0)
+    with Pool(1, None, None) as pool:
+        list(pool.rows([Job(recording, Path(sys.argv[2]), "", {})]))
+"""
+
+
+def children(process):
+    return Path(f"/proc/{process}/task/{process}/children").read_text().split()
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="asks Linux which processes live")
+def test_a_worker_amid_its_work_ends_with_a_killed_coordinator(tmp_path):
+    """Else it would hold the folder of its recording, which the next run wants."""
+    script, log = tmp_path / "waits.py", tmp_path / "waits.csv"
+    script.write_text(WAITS)
+    os.mkfifo(log)
+    coordinator = subprocess.Popen([sys.executable, str(script), str(log), str(tmp_path / "out")])
+    late = time.monotonic() + 60.0
+    writer = None
+    while writer is None:  # until the worker reads, and waits for what never comes
+        assert time.monotonic() < late
+        try:
+            writer = os.open(log, os.O_WRONLY | os.O_NONBLOCK)
+        except OSError:
+            time.sleep(0.05)
+    workers = children(coordinator.pid)
+    assert workers
+    coordinator.kill()
+    coordinator.wait()
+    late = time.monotonic() + 20.0
+    while any(lives(worker) for worker in workers):
+        assert time.monotonic() < late
+        time.sleep(0.05)
+    os.close(writer)
 
 
 def _may_be_interrupted():

@@ -19,6 +19,7 @@ from touchline.fleet.plan import Recording
 from touchline.fleet.remote import fetched
 from touchline.logs.bagfile import first_line
 from touchline.memory import peak_megabytes
+from touchline.workers import follow_parent
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,7 @@ def serve(pipe: Any, memory: int | None) -> None:
         pipe: end of a `multiprocessing.Pipe`.
         memory: that the process may take [bytes].
     """
+    follow_parent()
     os.environ["TQDM_DISABLE"] = "1"
     if memory is not None:
         resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
