@@ -23,7 +23,7 @@ def workers(
         *given: what it is called with.
     """
     context = multiprocessing.get_context("spawn")  # native threads do not survive a fork
-    pool = ProcessPoolExecutor(count, context, _begin, (begin, given))
+    pool = ProcessPoolExecutor(count, context, _begin, ([begin, *given],))
     try:
         yield pool
     finally:
@@ -38,8 +38,10 @@ def follow_parent() -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
-def _begin(begin: Callable[..., object] | None, given: tuple[Any, ...]) -> None:
+def _begin(call: list[Any]) -> None:
     follow_parent()
+    begin, *given = call
+    call.clear()  # a process keeps its arguments, of which native ones would outlive their types
     if begin is not None:
         begin(*given)
 

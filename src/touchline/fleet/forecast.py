@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from touchline.errors import InputError
-from touchline.fleet.figures import HOUR, lasting
+from touchline.fleet.figures import HOUR
 from touchline.fleet.manifest import MANIFEST, Manifest
 from touchline.fleet.plan import Plan, Recording, briefly, none_text
 from touchline.logs.log import open_log
 from touchline.logs.source import HEAD_ROWS
 from touchline.model.description import RobotDescription
 from touchline.model.robot import load_robot
-from touchline.numbers import counted
+from touchline.numbers import counted, lasting
 
 # CPU time for an hour at 1 kHz, touched every ten seconds: `touchline bench logs`, rounded up [s].
 CPU = {"none": 40.0, "summary": 45.0, "full": 70.0}

@@ -13,7 +13,7 @@ from typing import Any
 from touchline.errors import InputError
 from touchline.extras import need
 from touchline.fleet.cluster import Cluster
-from touchline.fleet.figures import FIGURES, lasting, make_figures
+from touchline.fleet.figures import FIGURES, make_figures
 from touchline.fleet.manifest import JOURNAL, Manifest, Row, configuration_hash
 from touchline.fleet.page import write_page
 from touchline.fleet.plan import Recording, briefly, make_plan, none_text
@@ -21,7 +21,7 @@ from touchline.fleet.pool import Pool
 from touchline.fleet.tables import table_rows, write_tables
 from touchline.fleet.work import Job, blank
 from touchline.folder import ResultsFolder
-from touchline.numbers import counted
+from touchline.numbers import counted, lasting
 
 DONE = ("ok", "partial")
 
