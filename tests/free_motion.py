@@ -8,6 +8,7 @@ import numpy as np
 import touchline as tl
 from touchline.observer.dynamics import contact_loads
 from touchline.observer.samples import Samples
+from touchline.trials.free_motion import Trajectory
 
 
 def smooth_motion(robot, seconds, rate, seed=0, amplitude=0.5):
@@ -22,6 +23,17 @@ def smooth_motion(robot, seconds, rate, seed=0, amplitude=0.5):
     swing = amplitude * 0.5 * (upper - lower)
     q = 0.5 * (lower + upper) + swing * np.sin(w * t + phase)
     return q, swing * w * np.cos(w * t + phase)
+
+
+def swaying(joints, amplitude, slowest, fastest):
+    """A motion in which every joint goes to and fro, each at a pace of its own [rad, rad/s]."""
+    return Trajectory(
+        np.linspace(-0.4, 0.5, joints),
+        np.full((1, joints), amplitude),
+        np.linspace(slowest, fastest, joints)[None, :],
+        np.linspace(0.0, 5.0, joints)[None, :],
+        (1e-3, 0.0),
+    )
 
 
 def exact_loads(robot, time, q, qd):

@@ -23,21 +23,30 @@ def workers(
         *given: what it is called with.
     """
     context = multiprocessing.get_context("spawn")  # native threads do not survive a fork
-    pool = ProcessPoolExecutor(count, context, _begin, (begin, given))
+    pool = ProcessPoolExecutor(count, context, _begin, ([begin, *given],))
     try:
         yield pool
     finally:
         pool.shutdown(cancel_futures=True)
 
 
-def _begin(begin: Callable[..., object] | None, given: tuple[Any, ...]) -> None:
+def follow_parent() -> None:
+    """End with the process that this one works for, whatever it does then.
+
+    It may hold both ends of the pipe it asks for work, and wait there for ever, or be amid work.
+    """
     threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _begin(call: list[Any]) -> None:
+    follow_parent()
+    begin, *given = call
+    call.clear()  # a process keeps its arguments, of which native ones would outlive their types
     if begin is not None:
         begin(*given)
 
 
 def _end_with_parent() -> None:
-    """Each worker holds both ends of the pipe it asks for work: it would wait there for ever."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     wait([parent.sentinel])

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from free_motion import swaying
 from shapes import chain
 from timeline import Push, ramp, signals
 
@@ -10,7 +11,7 @@ from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot, load_robot
 from touchline.observer.dynamics import contact_loads
 from touchline.pipeline.pipeline import Pipeline
-from touchline.trials.free_motion import MotionMaker, Trajectory
+from touchline.trials.free_motion import MotionMaker
 from touchline.trials.recordings import record_pushes, robot_named
 from touchline.trials.touches import Signals
 
@@ -142,14 +143,7 @@ def felt_moving(maker, q, qd, loads, force):
 def test_a_push_on_an_error_that_has_crept_over_its_limit_is_its_own_event():
     # The torque of joint 5 errs by ever more as the arm moves: by 1.2 thresholds at last. Nothing
     # else has shown yet that the arm is not as told.
-    robot, n = load_robot("sara"), 7
-    way = Trajectory(
-        np.linspace(-0.4, 0.5, n),
-        np.full((1, n), 0.2),
-        np.linspace(2.0, 3.5, n)[None, :],
-        np.linspace(0.0, 5.0, n)[None, :],
-        (1e-3, 0.0),
-    )
+    robot, way = load_robot("sara"), swaying(7, 0.2, 2.0, 3.5)
     maker = MotionMaker(robot, robot, 1000.0, 4.5)
     q, qd, loads = maker.loads(way)
     (threshold,) = (r.contact for r in Pipeline(robot).thresholds.rows if r.joint == 4)
@@ -168,14 +162,7 @@ def test_a_push_on_an_error_that_has_crept_over_its_limit_is_its_own_event():
 @pytest.mark.parametrize("newton", [20.0, 60.0])
 def test_a_push_that_is_held_in_motion_hides_not_the_next_one(newton):
     # Masses 2 % off: 7 s of motion have shown how far the model errs.
-    robot, n = load_robot("sara"), 7
-    way = Trajectory(
-        np.linspace(-0.4, 0.5, n),
-        np.full((1, n), 0.3),
-        np.linspace(1.0, 2.5, n)[None, :],
-        np.linspace(0.0, 5.0, n)[None, :],
-        (1e-3, 0.0),
-    )
+    robot, way = load_robot("sara"), swaying(7, 0.3, 1.0, 2.5)
     real = Robot(robot.description, perturbed(robot.mechanism, 0.02, np.random.default_rng(4)))
     maker = MotionMaker(robot, real, 1000.0, 17.0)
     q, qd, loads = maker.loads(way)

@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Friction of joints that turn loads no sensor: it is learned, and makes no contact."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from free_motion import swaying
 
 import touchline as tl
 from touchline.localizer.skin import Skin
 from touchline.observer.dynamics import contact_loads
 from touchline.trials.arms import load_arm
-from touchline.trials.free_motion import MotionMaker, Trajectory
+from touchline.trials.free_motion import MotionMaker
 
 RATE, SECONDS = 500.0, 5.0
 FRICTION, TURN = 1.0, 0.01  # Nm, and over which speed it changes its sign [rad/s]
@@ -22,16 +25,9 @@ def arm():
 def motion(arm):
     """Every joint turns to and fro, each at other times."""
     n = len(arm.joint_names)
-    frequency = np.linspace(2.0, 3.5, n)[None, :]
-    trajectory = Trajectory(
-        np.linspace(-0.4, 0.5, n) - np.eye(n)[3] * 1.5,
-        np.full((1, n), 0.2),
-        frequency,
-        np.linspace(0.0, 5.0, n)[None, :],
-        (1e-3, 0.0),
-    )
+    way = swaying(n, 0.2, 2.0, 3.5)
     maker = MotionMaker(arm, arm, RATE, SECONDS)
-    return maker, *maker.loads(trajectory)
+    return maker, *maker.loads(replace(way, center=way.center - np.eye(n)[3] * 1.5))
 
 
 def events(arm, friction, torque=None, push=None):

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from free_motion import swaying
 
 import touchline as tl
 from touchline.detector.detector import Detection, Detector
@@ -18,7 +19,7 @@ from touchline.model.transforms import move_wrench
 from touchline.observer.dynamics import contact_loads, gravity_loads
 from touchline.trials.arms import load_arm
 from touchline.trials.cell import Cell
-from touchline.trials.free_motion import MotionMaker, Trajectory
+from touchline.trials.free_motion import MotionMaker
 from touchline.trials.scene import make_pipeline, make_scene, told_and_real
 from touchline.trials.touches import TouchSampler, resting_signals
 
@@ -186,13 +187,7 @@ def pushed_in_motion(robot, run):
     """A push of 20 N on an arm that has moved for 4 s, its masses 10 % off: the pipeline that has
     felt it, the pushed link, and where it was pushed at each sample."""
     rng, n = np.random.default_rng(run), len(robot.joint_names)
-    way = Trajectory(
-        np.linspace(-0.4, 0.5, n),
-        np.full((1, n), 0.3),
-        np.linspace(1.0, 2.0, n)[None, :],
-        np.linspace(0.0, 5.0, n)[None, :],
-        (1e-3, 0.0),
-    )
+    way = swaying(n, 0.3, 1.0, 2.0)
     real = Robot(robot.description, perturbed(robot.mechanism, 0.1, np.random.default_rng(run)))
     maker = MotionMaker(robot, real, 1000.0, 5.2)
     q, qd, loads = maker.loads(way)

@@ -17,6 +17,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from free_motion import free_motion, pushed
+from test_workers import lives
 
 import touchline as tl
 from touchline.cli import main
@@ -29,6 +30,9 @@ from touchline.fleet.tables import COMMON
 from touchline.fleet.work import Job, done
 from touchline.folder import ResultsFolder
 from touchline.logs import write_table
+from touchline.logs.cdr import JOINT_STATE
+from touchline.logs.mcap import SCENE
+from touchline.logs.mcap_writer import McapWriter
 
 OPTIONS = {"bandwidth": None, "method": "segment", "report": "none"}
 
@@ -121,6 +125,74 @@ def test_results_beside_recordings_are_none(made, tmp_path, monkeypatch):
     for word in (".", "*", "**", "**/*.parquet", str(folder / "**")):
         assert [r.name for r in make_plan([word], "sara")] == ["one", "two"], word
     assert set(rows(folder)) == {"one", "two"}
+
+
+def for_viewers(path):
+    """As `--foxglove` writes it: scenes, and no joint states."""
+    writer = McapWriter(path, {})
+    for topic, kind in (("/robot", SCENE), ("/tau_ext", "foxglove.JointStates")):
+        writer.add_channel(topic, kind, "")
+    writer.close()
+    return path
+
+
+def test_what_the_shell_expands_is_what_a_folder_holds(made, tmp_path, monkeypatch, capsys):
+    """`analyze *` where earlier results are: they are no recordings that fail."""
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    for name in ("one", "two"):
+        shutil.copy(made / "a" / "whole.parquet", folder / f"{name}.parquet")
+    monkeypatch.chdir(folder)
+    assert run("one.parquet", "two.parquet", "--robot", "sara", "--out", ".") == 0
+    assert run("one.parquet", "--robot", "sara", "--out", ".") == 0  # its results lie open there
+    (folder / "robot.yaml").write_text("name: x\nmodel: robot:sara\n")
+    (folder / "shown.rrd").write_bytes(b"RRF2")
+    for_viewers(folder / "shown.mcap")
+    words = sorted(path.name for path in folder.iterdir())
+    capsys.readouterr()
+    assert run(*words, "--robot", "sara", "--out", ".") == 0
+    told = capsys.readouterr().out
+    (own,) = (line for line in told.splitlines() if "Touchline's own results" in line)
+    names = ("fleet.html", "log.jsonl", "manifest.jsonl", "tables", "estimates.parquet")
+    assert all(name in own for name in names) and "one" not in own
+    assert "shown.mcap, shown.rrd: made for a viewer" in told and "robot.yaml" in told
+    assert set(rows(folder)) == {"one", "two"}
+    assert run(*words, "--robot", "sara", "--out", ".", "--dry-run") == 0
+    assert "Touchline's own results" in capsys.readouterr().out
+    assert run(".", "--robot", "sara", "--out", ".") == 0  # the folder says the same
+    told = capsys.readouterr().out
+    assert re.search(r"skipped .*shown.mcap: made for a viewer", told)
+    assert set(rows(folder)) == {"one", "two"}
+
+
+def test_one_that_is_no_recording_is_refused_in_words(made, results, tmp_path, capsys):
+    own = "Touchline's own results"
+    shown = for_viewers(tmp_path / "shown.mcap")
+    estimates = results / "b" / "estimates.parquet"
+    for path, reason in (
+        (results / "fleet.html", own),
+        (results / "tables", own),
+        (estimates, own),
+        (shown, "made for a viewer"),
+    ):
+        assert run(path, "--robot", "sara", "--out", tmp_path / "r") == 2, path
+        told = capsys.readouterr().err
+        assert reason in told and ".parquet, .csv" in told and "folders" in told
+        assert not (tmp_path / "r").exists()
+    assert run(estimates, shown, "--robot", "sara", "--out", tmp_path / "r") == 2
+    told = capsys.readouterr().err
+    assert own in told and "made for a viewer" in told and "name recordings" in told
+    with pytest.raises(InputError, match="no such file"):
+        make_plan([str(tmp_path / "fleet.html")], "sara")
+
+
+def test_a_file_with_scenes_and_joint_states_is_a_recording(tmp_path):
+    path = tmp_path / "both.mcap"
+    writer = McapWriter(path, {})
+    for topic, kind in (("/robot", SCENE), ("/joint_states", JOINT_STATE)):
+        writer.add_channel(topic, kind, "")
+    writer.close()
+    assert [r.name for r in make_plan([str(path)], "sara")] == ["both"]
 
 
 def test_one_recording_takes_the_robot_beside_it(made, tmp_path, capsys):
@@ -306,6 +378,50 @@ def test_limits_of_time_and_memory(made, tmp_path):
     with Pool(1, 0.01, None) as pool:
         (row,) = pool.rows(jobs(made, tmp_path, 1))
     assert row["status"] == "failed" and "took longer than 0.01 s" in row["reason"]
+
+
+WAITS = """
+import sys
+from pathlib import Path
+from touchline.fleet.plan import Recording
+from touchline.fleet.pool import Pool
+from touchline.fleet.work import Job
+
+if __name__ == "__main__":
+    recording = Recording(Path(sys.argv[1]), "sara", "waits", 0)
+    with Pool(1, None, None) as pool:
+        list(pool.rows([Job(recording, Path(sys.argv[2]), "", {})]))
+"""
+
+
+def children(process):
+    return Path(f"/proc/{process}/task/{process}/children").read_text().split()
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="asks Linux which processes live")
+def test_a_worker_amid_its_work_ends_with_a_killed_coordinator(tmp_path):
+    """Else it would hold the folder of its recording, which the next run wants."""
+    script, log = tmp_path / "waits.py", tmp_path / "waits.csv"
+    script.write_text(WAITS)
+    os.mkfifo(log)
+    coordinator = subprocess.Popen([sys.executable, str(script), str(log), str(tmp_path / "out")])
+    late = time.monotonic() + 60.0
+    writer = None
+    while writer is None:  # until the worker reads, and waits for what never comes
+        assert time.monotonic() < late
+        try:
+            writer = os.open(log, os.O_WRONLY | os.O_NONBLOCK)
+        except OSError:
+            time.sleep(0.05)
+    workers = children(coordinator.pid)
+    assert workers
+    coordinator.kill()
+    coordinator.wait()
+    late = time.monotonic() + 20.0
+    while any(lives(worker) for worker in workers):
+        assert time.monotonic() < late
+        time.sleep(0.05)
+    os.close(writer)
 
 
 def _may_be_interrupted():

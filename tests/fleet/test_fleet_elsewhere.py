@@ -19,6 +19,8 @@ from touchline.fleet.manifest import Manifest
 from touchline.fleet.plan import is_single, make_plan
 from touchline.fleet.work import Job, done
 from touchline.logs import write_table
+from touchline.logs.mcap import SCENE
+from touchline.logs.mcap_writer import McapWriter
 
 OPTIONS = {"bandwidth": None, "method": "segment", "report": "none"}
 
@@ -93,6 +95,20 @@ def test_results_beside_recordings_elsewhere_are_none(made, tmp_path):
     memory.put(str(tmp_path), "/beside", recursive=True)
     for url in (f"file://{tmp_path}", f"file://{tmp_path}/**", "memory://beside"):
         assert [r.name for r in make_plan([url], "sara")] == ["one"], url
+    named = make_plan(["memory://beside/one.parquet", "memory://beside/fleet.html"], "sara")
+    assert [r.name for r in named] == ["one"] and list(named.none) == ["memory://beside/fleet.html"]
+
+
+def test_what_a_viewer_is_shown_is_told_when_it_is_fetched(tmp_path):
+    fsspec = pytest.importorskip("fsspec", reason="fsspec is not installed: touchline[fleet]")
+    writer = McapWriter(tmp_path / "shown.mcap", {})
+    writer.add_channel("/robot", SCENE, "")
+    writer.close()
+    data = (tmp_path / "shown.mcap").read_bytes()
+    fsspec.filesystem("memory").pipe("/shown/shown.mcap", data)
+    (recording,) = make_plan(["memory://shown"], "sara")
+    row = done(Job(recording, tmp_path / "out", "", OPTIONS))
+    assert row["status"] == "skipped" and "made for a viewer" in row["reason"]
 
 
 @contextmanager

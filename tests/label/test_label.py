@@ -113,7 +113,7 @@ def check_channel(contact, soon, link, force, level, position):
     np.testing.assert_array_equal(soon[begin : begin + 500], expected[begin : begin + 500])
 
 
-def test_several_processes_label_the_same(lerobot, tmp_path, robot):
+def test_several_processes_label_the_same(lerobot, tmp_path, robot, capfd):
     told = []
     for workers in (1, 2):
         copy = tmp_path / f"by{workers}"
@@ -121,6 +121,7 @@ def test_several_processes_label_the_same(lerobot, tmp_path, robot):
         files = {p.relative_to(copy): p.read_bytes() for p in copy.rglob("*") if p.is_file()}
         told.append((done, files))
     assert told[0] == told[1] and done.touches >= 1 and done.episodes == EPISODES
+    assert "leaked" not in capfd.readouterr().err  # of native objects, as processes end
     spoilt = sorted((lerobot / "data").rglob("*.parquet"))[1]
     spoilt.write_bytes(spoilt.read_bytes()[:-100])
     with pytest.raises(InputError, match="file-001.parquet: not a readable Parquet file"):

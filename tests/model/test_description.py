@@ -227,7 +227,7 @@ WRIST = "{name: wrist, link: hand}"
         (WRIST, "{name: elbow, link: hand}", "force_torque_sensors[1].name: 'elbow' is also the n"),
         (WRIST, "{name: root, link: hand}", "force_torque_sensors[1].name: 'root' is reserved"),
         (WRIST, "{name: tau, link: hand}", "force_torque_sensors[1].name: 'tau' is reserved"),
-        (WRIST, "{name: a.b, link: hand}", "force_torque_sensors[1].name: 'a.b' has a dot"),
+        (WRIST, "{name: a.b, link: hand}", "force_torque_sensors[1].name: 'a.b' has a dot; dots"),
         (
             WRIST,
             "{name: wrist, link: hand, frame: bas}",
@@ -272,6 +272,13 @@ def test_one_error(folder, old, new, problem):
         found = [line for line in found if not line.startswith("joints: the model's movable")]
     assert len(found) == 1, found
     assert found[0].startswith(problem)
+
+
+def test_many_names_with_dots_are_one_line(folder):
+    many = "\n  - ".join(f"{{name: a.{k}, link: hand}}" for k in range(6))
+    (line,) = problems_of(edit(folder, (WRIST, many)))
+    told = "6 have a dot: 'a.0', 'a.1', 'a.2', 'a.3' and 2 more; dots are reserved"
+    assert line == f"force_torque_sensors[1].name: {told}"
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import pytest
 
 from touchline.cli import main
 from touchline.errors import InputError
+from touchline.logs.mcap import is_for_viewers
 from touchline.view.moments import arrow, curves, moments, told
 from touchline.view.replay import Replay
 
@@ -52,7 +53,7 @@ def test_foxglove_opens_it(replay, tmp_path):
 
     path = tmp_path / "results.mcap"
     write_foxglove(replay, path)
-    assert [p.name for p in tmp_path.iterdir()] == ["results.mcap"]
+    assert [p.name for p in tmp_path.iterdir()] == ["results.mcap"] and is_for_viewers(path)
     counts, events, wrenches = Counter(), [], []
     with path.open("rb") as file:
         for schema, channel, message in reader.make_reader(file).iter_messages():

@@ -44,10 +44,12 @@ def analyze(
 
     Several recordings are analyzed by all cores, each into a folder of its own below DIR. Name
     them, or a folder, a pattern ("runs/*.mcap"), a URL (s3://, http://), or a list (CSV, Parquet)
-    with the columns log and robot. The page fleet.html there tells what they have in common, and so
-    do tables as Parquet. The file manifest.jsonl tells what became of each and why: ok, partial
-    (something in it could not be read), failed or skipped. It has hashes of input, configuration
-    and results. The same command continues where it was stopped, and skips what is unchanged.
+    with the columns log and robot. Earlier results, robot.yaml, and files for viewers (.rrd, .mcap
+    with scenes and no joint states) may stand among them: they are skipped. The page fleet.html
+    there tells what they have in common, and so do tables as Parquet. The file manifest.jsonl tells
+    what became of each and why: ok, partial (something in it could not be read), failed or skipped.
+    It has hashes of input, configuration and results. The same command continues where it was
+    stopped, and skips what is unchanged.
     Without --robot the robot.yaml in the recording's folder, or the nearest above it, is taken.
     Exit status then: 0 all ok, 3 some are not, 1 none.
 
@@ -77,7 +79,14 @@ def analyze(
             workers must see the same folders.
     """
     from touchline.fleet.forecast import forecast, forecast_text
-    from touchline.fleet.plan import NO_ROBOT, is_single, make_plan, nearest_robot
+    from touchline.fleet.plan import (
+        ALLOWED,
+        NO_ROBOT,
+        is_single,
+        make_plan,
+        nearest_robot,
+        why_not_recording,
+    )
 
     if not logs:
         raise InputError("LOG: name at least one recording, folder, pattern or list")
@@ -88,6 +97,8 @@ def analyze(
     options |= {"friction": friction, "reach": reach}
     if is_single(logs):
         log = Path(logs[0])
+        if reason := why_not_recording(logs[0]):
+            raise InputError([f"{log}: {reason}", f"no recording: {ALLOWED}"])
         robot = robot or nearest_robot(log)
         if not robot:
             raise InputError(f"{log}: {NO_ROBOT}")

@@ -52,14 +52,6 @@ def percentile(counts: Index, share: float) -> float:
     return float(EDGES[min(step, len(EDGES) - 1)])
 
 
-def lasting(seconds: float) -> str:
-    """A duration in the unit that suits it."""
-    for unit, size in (("h", HOUR), ("min", 60.0)):
-        if seconds >= 2.0 * size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds:.3g} s"
-
-
 def hour_of(time: float, first: float) -> int:
     """Number of the hour: since 1970 where stamps are dates, else since the first sample."""
     return int(np.floor((time if abs(first) > EPOCH else time - first) / HOUR))

@@ -2,19 +2,18 @@
 """What a run would do and how long it would take, without doing it."""
 
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from touchline.errors import InputError
-from touchline.fleet.figures import HOUR, lasting
+from touchline.fleet.figures import HOUR
 from touchline.fleet.manifest import MANIFEST, Manifest
-from touchline.fleet.plan import Recording, briefly
+from touchline.fleet.plan import Plan, Recording, briefly, none_text
 from touchline.logs.log import open_log
 from touchline.logs.source import HEAD_ROWS
 from touchline.model.description import RobotDescription
 from touchline.model.robot import load_robot
-from touchline.numbers import counted
+from touchline.numbers import counted, lasting
 
 # CPU time for an hour at 1 kHz, touched every ten seconds: `touchline bench logs`, rounded up [s].
 CPU = {"none": 40.0, "summary": 45.0, "full": 70.0}
@@ -26,6 +25,7 @@ class Forecast:
 
     Attributes:
         plan: with what was found to be wrong when they were opened.
+        none: what was named and is no recording, with the reason.
         durations: name -> [s], of those of which it can be told without reading all.
         cost: CPU time for a second of a recording [s].
         measured: number of recordings that `cost` is from; 0: from the benchmark.
@@ -34,6 +34,7 @@ class Forecast:
     """
 
     plan: list[Recording]
+    none: dict[str, str]
     durations: dict[str, float]
     cost: float
     measured: int
@@ -58,7 +59,7 @@ class Forecast:
         return self.cost * max(told / self.workers, longest)
 
 
-def forecast(plan: Sequence[Recording], out: Path, report: str, workers: int) -> Forecast:
+def forecast(plan: Plan, out: Path, report: str, workers: int) -> Forecast:
     """Open all recordings that are on this machine, and look at their beginnings.
 
     Args:
@@ -92,7 +93,7 @@ def forecast(plan: Sequence[Recording], out: Path, report: str, workers: int) ->
     if done:
         cost = sum(row["cpu_seconds"] for row in done) / sum(row["duration"] for row in done)
     processes = min(workers or os.cpu_count() or 1, max(len(plan), 1))
-    return Forecast(looked, durations, cost, len(done), processes, frozenset(failing))
+    return Forecast(looked, plan.none, durations, cost, len(done), processes, frozenset(failing))
 
 
 def _robot(name: str, robots: dict[str, RobotDescription | str]) -> RobotDescription | str:
@@ -123,7 +124,7 @@ def _duration(recording: Recording, robot: RobotDescription) -> float | None:
 
 def forecast_text(told: Forecast) -> str:
     """A line for each recording, and a line of sums."""
-    lines = []
+    lines = none_text(told.none)
     for recording in told.plan:
         length = "?"
         if recording.name in told.durations:

@@ -12,6 +12,7 @@ from touchline.folder import replaced_file
 from touchline.model.robot import load_robot
 
 MANIFEST = "manifest.jsonl"
+JOURNAL = "log.jsonl"  # beside it: a line for each recording that a run is done with
 Row = dict[str, Any]
 
 

@@ -11,9 +11,10 @@ import numpy as np
 
 import touchline
 from touchline import __version__
-from touchline.fleet.figures import EDGES, Figures, lasting, percentile
+from touchline.fleet.figures import EDGES, Figures, percentile
 from touchline.fleet.manifest import Row
 from touchline.fleet.tables import SHARES, Rows
+from touchline.numbers import lasting
 from touchline.report.html import Cell, note, section, table
 from touchline.report.outputs import EVENTS, REPORT, write_text
 

@@ -4,24 +4,23 @@
 import csv
 import glob
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path, PurePath
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from touchline.errors import InputError
-from touchline.fleet.manifest import MANIFEST
+from touchline.fleet.own import OWN, ROBOT_FILE, is_result, why_none
 from touchline.fleet.remote import found, is_url
-from touchline.fleet.tables import COMMON
 from touchline.logs.log import BAGS, TABLES
 from touchline.logs.parquet import damages, first_line
-from touchline.report.outputs import NAMES
 
-ROBOT_FILE = "robot.yaml"
 LOG_COLUMN, ROBOT_COLUMN = "log", "robot"
 ENDINGS = (*TABLES, *BAGS)
-# Folders of results that are not whole yet.
-UNFINISHED = {f"{Path(name).stem}.parts" for name in NAMES}
+ALLOWED = (
+    f"name recordings ({', '.join(ENDINGS)}, or the folder of a rosbag2), folders or patterns of "
+    f"these, or lists (CSV, Parquet) with a column {LOG_COLUMN}"
+)
 NO_ROBOT = f"no robot: give --robot, or put a {ROBOT_FILE} beside it"
 
 
@@ -51,6 +50,26 @@ class Recording:
         return self.url or str(self.log)
 
 
+class Plan(list[Recording]):
+    """Recordings in a fixed order, each once.
+
+    Attributes:
+        none: what was named, or stands beside them, and is no recording, with the reason.
+    """
+
+    def __init__(self, recordings: Iterable[Recording], none: dict[str, str]) -> None:
+        super().__init__(recordings)
+        self.none = none
+
+
+def none_text(none: dict[str, str]) -> list[str]:
+    """A line for each reason why something is no recording."""
+    names: dict[str, list[str]] = {}
+    for name, reason in none.items():
+        names.setdefault(reason, []).append(name)
+    return [f"{'skipped':8} {', '.join(found)}: {reason}" for reason, found in names.items()]
+
+
 def briefly(reason: str, source: str) -> str:
     """A reason without the place of the recording, whose name stands beside it."""
     return reason.removeprefix(f"{source}: ")
@@ -64,7 +83,7 @@ def is_single(logs: Sequence[str]) -> bool:
     return _is_bag_folder(path) or not path.is_dir() and not _is_list(path)
 
 
-def make_plan(logs: Sequence[str], robot: str | None) -> list[Recording]:
+def make_plan(logs: Sequence[str], robot: str | None) -> Plan:
     """All recordings that were named, in a fixed order, each once.
 
     Args:
@@ -75,12 +94,16 @@ def make_plan(logs: Sequence[str], robot: str | None) -> list[Recording]:
             or the nearest above it.
 
     Raises:
-        InputError: something does not exist, or nothing was found.
+        InputError: something does not exist, or there is no recording.
     """
+    none: dict[str, str] = {}  # what is no recording -> the reason
     local: dict[Path, tuple[str, str]] = {}  # log -> robot, problem
     targets: set[Path] = set()  # of links, so that no recording comes twice
     remote: dict[str, tuple[int, str]] = {}  # URL -> size, robot
     for word in logs:
+        if reason := why_not_recording(word):
+            none[word] = reason
+            continue
         for log, own in _named(word):
             if is_url(log):
                 there = found(log, ENDINGS, is_result)
@@ -91,10 +114,15 @@ def make_plan(logs: Sequence[str], robot: str | None) -> list[Recording]:
             if path.resolve() in targets:
                 continue
             targets.add(path.resolve())
+            if reason := why_none(path):
+                none[log] = reason
+                continue
             chosen = robot or own or nearest_robot(path)
             local[path] = (chosen, "" if chosen else NO_ROBOT)
     if not local and not remote:
-        raise InputError(f"{', '.join(logs)}: no recordings there ({', '.join(ENDINGS)})")
+        problems = [f"{name}: {reason}" for name, reason in none.items()]
+        told = [f"no recordings: {ALLOWED}"]
+        raise InputError([*(problems or [f"{', '.join(logs)}: no recordings there"]), *told])
     paths = {url: _as_path(url) for url in remote}
     names = _names([*local, *paths.values()])
     plan = []
@@ -105,7 +133,15 @@ def make_plan(logs: Sequence[str], robot: str | None) -> list[Recording]:
     for url, (size, chosen) in remote.items():
         problem = "" if chosen else NO_ROBOT
         plan.append(Recording(paths[url], chosen, names[paths[url]], size, problem, url))
-    return sorted(plan, key=lambda recording: recording.name)
+    return Plan(sorted(plan, key=lambda recording: recording.name), none)
+
+
+def why_not_recording(word: str) -> str:
+    """Why a word of the command line names no recording but what stands beside some, or nothing."""
+    if is_url(word):
+        own = is_result(PurePosixPath(word), lambda _: False)
+        return OWN if own else ""
+    return why_none(Path(word)) if Path(word).exists() else ""
 
 
 def _as_path(url: str) -> Path:
@@ -149,22 +185,6 @@ def _below(folder: Path) -> Iterator[Path]:
                 yield from _below(path)
         elif _is_log(path) and not _is_list(path):
             yield path
-
-
-def is_result(path: PurePath, exists: Callable[[str], bool]) -> bool:
-    """Whether an earlier analysis wrote a file or folder, which may stand beside recordings.
-
-    Args:
-        path: of the file or folder.
-        exists: whether there is a file.
-    """
-    if path.name in NAMES:
-        return True
-    return any(
-        folder.name in UNFINISHED
-        or (folder.name == COMMON and exists(str(folder.parent / MANIFEST)))
-        for folder in (path, *path.parents)
-    )
 
 
 def _is_log(path: Path) -> bool:

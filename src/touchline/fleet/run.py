@@ -13,17 +13,16 @@ from typing import Any
 from touchline.errors import InputError
 from touchline.extras import need
 from touchline.fleet.cluster import Cluster
-from touchline.fleet.figures import FIGURES, lasting, make_figures
-from touchline.fleet.manifest import Manifest, Row, configuration_hash
+from touchline.fleet.figures import FIGURES, make_figures
+from touchline.fleet.manifest import JOURNAL, Manifest, Row, configuration_hash
 from touchline.fleet.page import write_page
-from touchline.fleet.plan import Recording, briefly, make_plan
+from touchline.fleet.plan import Recording, briefly, make_plan, none_text
 from touchline.fleet.pool import Pool
 from touchline.fleet.tables import table_rows, write_tables
 from touchline.fleet.work import Job, blank
 from touchline.folder import ResultsFolder
-from touchline.numbers import counted
+from touchline.numbers import counted, lasting
 
-LOG = "log.jsonl"
 DONE = ("ok", "partial")
 
 
@@ -79,11 +78,13 @@ class Outcome:
         rows: one per recording, in the order of the plan.
         unchanged: names of those whose results stood already.
         stopped: whether it was interrupted.
+        none: what was named and is no recording, with the reason.
     """
 
     rows: list[Row] = field(default_factory=list)
     unchanged: set[str] = field(default_factory=set)
     stopped: bool = False
+    none: dict[str, str] = field(default_factory=dict)
 
     @property
     def status(self) -> int:
@@ -122,9 +123,10 @@ def analyze_all(
     with ResultsFolder(out, ()) as folder:  # its lock: one such run at a time
         folder.draft.rmdir()
         manifest = Manifest(out)
-        with (out / LOG).open("a", encoding="utf-8") as journal:
+        with (out / JOURNAL).open("a", encoding="utf-8") as journal:
             outcome = _run(plan, manifest, journal, out, options, limits)
         manifest.close(recording.name for recording in plan)
+        outcome.none = plan.none
         outcome.rows = [manifest.rows[r.name] for r in plan if r.name in manifest.rows]
         if not outcome.stopped:
             _tell(outcome.rows, out)
@@ -212,7 +214,7 @@ def _bar(jobs: list[Job]) -> Any:
 
 def outcome_text(outcome: Outcome, out: Path) -> str:
     """What became of the recordings: each that is not ok, and a line of sums."""
-    lines = [
+    lines = none_text(outcome.none) + [
         f"{row['status']:8} {row['name']}: {briefly(row['reason'], row['log'])}"
         for row in outcome.rows
         if row["status"] != "ok"

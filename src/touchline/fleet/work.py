@@ -14,10 +14,12 @@ from touchline import __version__
 from touchline.errors import InputError
 from touchline.fleet.figures import FIGURES, make_figures
 from touchline.fleet.manifest import Row, file_hash, stands
+from touchline.fleet.own import why_none
 from touchline.fleet.plan import Recording
 from touchline.fleet.remote import fetched
 from touchline.logs.bagfile import first_line
 from touchline.memory import peak_megabytes
+from touchline.workers import follow_parent
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,7 @@ def serve(pipe: Any, memory: int | None) -> None:
         pipe: end of a `multiprocessing.Pipe`.
         memory: that the process may take [bytes].
     """
+    follow_parent()
     os.environ["TQDM_DISABLE"] = "1"
     if memory is not None:
         resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
@@ -124,6 +127,8 @@ def _at_hand(job: Job) -> AbstractContextManager[Path]:
 
 
 def _analyzed(job: Job, log: Path) -> Row:
+    if reason := why_none(log):  # of a URL only seen now
+        return {"status": "skipped", "reason": reason}
     from touchline.report.analysis import analyze_as
     from touchline.report.outputs import NAMES
 

@@ -14,7 +14,7 @@ from touchline.label.lerobot import is_lerobot, label_lerobot
 from touchline.label.naming import Given
 from touchline.label.table import label_table
 from touchline.model.robot import Robot, load_robot
-from touchline.numbers import counted
+from touchline.numbers import counted, lasting
 
 FAST = 1000.0  # samples per second, to which others are compared
 
@@ -91,7 +91,7 @@ def labelled_text(done: Labelled, robot: Robot) -> str:
     share = 100.0 * done.touched / done.samples if done.samples else 0.0
     lines = [
         f"{counted(done.episodes, 'episode')}, {done.samples} samples at {done.rate:.4g} Hz "
-        f"({done.seconds / 3600:.2f} h): {counted(done.touches, 'touch', 'es')}, "
+        f"({lasting(done.seconds)}): {counted(done.touches, 'touch', 'es')}, "
         f"{share:.1f} % of the samples"
     ]
     slow, fast = (_forces(robot, rate) for rate in (done.rate, FAST))

@@ -18,11 +18,13 @@ from typing import Any
 import numpy as np
 
 from touchline import _logs
+from touchline.logs.cdr import JOINT_STATE
 from touchline.logs.messages import Messages
 
 MAGIC = b"\x89MCAP0\r\n"
 # A footer record that points at no summary: readers then walk the records.
 FOOTER = b"\x02" + (20).to_bytes(8, "little") + bytes(20) + MAGIC
+SCENE = "foxglove.SceneUpdate"
 METADATA, NAME = 0x0C, "touchline"  # the record that `McapWriter` puts in front of all messages
 _LONGEST_METADATA = 1 << 20  # bytes
 _HEAD = struct.Struct("<BQ")
@@ -434,6 +436,17 @@ def _lz4() -> Any:
     import lz4.frame
 
     return lz4.frame
+
+
+def is_for_viewers(path: Path) -> bool:
+    """Whether a file has scenes to show and no joint states: it was made for a viewer."""
+    try:
+        file = McapFile(path)
+    except (DamagedFile, OSError, ValueError):
+        return False  # who opens it as a recording is told what is wrong
+    kinds = set(file.topics.values())
+    file.close()
+    return SCENE in kinds and JOINT_STATE not in kinds
 
 
 def read_metadata(path: Path) -> dict[str, str]:

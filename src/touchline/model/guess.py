@@ -15,6 +15,7 @@ import numpy as np
 
 from touchline.model.mechanism import Mechanism
 from touchline.model.topology import independent_joints, outboard_links
+from touchline.numbers import listed
 
 FINGER = frozenset("finger fingers gripper knuckle jaw claw robotiq driver coupler".split())
 DIGIT = frozenset("thumb index middle ring pinky".split())  # of something that is called a hand
@@ -157,19 +158,19 @@ def cautions(mechanism: Mechanism) -> Iterator[str]:
     wheels = [n for n, joint in moving.items() if words(n, joint.child) & WHEEL]
     if wheels:
         yield (
-            f"joints {_listed(wheels)} are wheels: the root link is taken to stand still, so a "
+            f"joints {listed(wheels)} are wheels: the root link is taken to stand still, so a "
             "robot that drives feels its own accelerations as touch"
         )
     legs = [n for n, joint in moving.items() if words(n, joint.child) & LEG]
     if len(legs) > 1 and not wheels:
         yield (
-            f"joints {_listed(legs)} are those of legs: the root link is taken to stand still, and "
+            f"joints {listed(legs)} are those of legs: the root link is taken to stand still, and "
             "the ground under the feet is felt as a touch"
         )
     coupled = [f"{n} (follows {joint.mimic.joint})" for n, joint in moving.items() if joint.mimic]
     if coupled:
         yield (
-            f"coupled joints {_listed(coupled)}: they move as the model says, and a touch of them "
+            f"coupled joints {listed(coupled)}: they move as the model says, and a touch of them "
             "loads the joint that they follow"
         )
 
@@ -208,8 +209,3 @@ def rest_position(mechanism: Mechanism, name: str) -> float:
     """Return where a joint that is not observed is taken to stand: at 0, or its nearest limit."""
     joint = mechanism.joints[name]
     return float(np.clip(0.0, joint.lower, joint.upper))
-
-
-def _listed(names: list[str], most: int = 4) -> str:
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more

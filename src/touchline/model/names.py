@@ -12,6 +12,7 @@ from typing import Any
 from touchline.model.entries import JointEntry, RobotFile, SensorEntry
 from touchline.model.mechanism import Mechanism
 from touchline.model.topology import independent_joints, outboard_links
+from touchline.numbers import listed
 from touchline.suggest import unknown
 
 Problem = tuple[str, str]
@@ -77,6 +78,7 @@ def sensor_entries(file: RobotFile) -> Iterator[tuple[str, SensorEntry]]:
 
 def _unique_names(file: RobotFile) -> Iterator[Problem]:
     first: dict[str, str] = {}
+    dotted: dict[str, str] = {}  # name -> where it stands
     entries = [(*entry, RESERVED) for entry in joint_entries(file)]
     entries += [(*entry, RESERVED_SENSORS) for entry in sensor_entries(file)]
     for place, item, reserved in entries:
@@ -90,7 +92,11 @@ def _unique_names(file: RobotFile) -> Iterator[Problem]:
         if name in reserved:
             yield where, f"'{name}' is reserved; reserved names: {', '.join(reserved)}"
         if "." in name:
-            yield where, f"'{name}' has a dot; dots are reserved"
+            dotted[f"'{name}'"] = where
+    if dotted:
+        names = listed(list(dotted))
+        what = f"{names} has a dot" if len(dotted) == 1 else f"{len(dotted)} have a dot: {names}"
+        yield next(iter(dotted.values())), f"{what}; dots are reserved"
 
 
 def _sources(file: RobotFile, names: Names) -> Iterator[Problem]:
