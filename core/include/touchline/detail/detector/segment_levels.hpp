@@ -67,7 +67,8 @@ class SegmentLevels {
   // feels what begins as no push does, or before motion had shown how much the model errs.
   bool may_be_own_doing(std::size_t g) const {
     const Segment& s = segments_[g];
-    return s.arm_off && s.in_motion && (s.origin != Origin::push || s.moved < tuning_.motion_told);
+    const bool moves = s.in_motion || motion_.moves();  // or has it set off since?
+    return s.arm_off && moves && (s.origin != Origin::push || s.moved < tuning_.motion_told);
   }
 
   // Motion has yet to show how much the model of this segment errs.
