@@ -19,7 +19,7 @@ from touchline.model.transforms import move_wrench
 from touchline.observer.dynamics import contact_loads, gravity_loads
 from touchline.trials.arms import load_arm
 from touchline.trials.cell import Cell
-from touchline.trials.free_motion import MotionMaker
+from touchline.trials.free_motion import MotionMaker, Trajectory
 from touchline.trials.scene import make_pipeline, make_scene, told_and_real
 from touchline.trials.touches import TouchSampler, resting_signals
 

@@ -64,11 +64,13 @@ class SegmentLevels {
     return is_off(g) && motion_.moves() && segments_[g].origin != Origin::push;
   }
   // May it be so, as far as one can tell? In motion an arm that has shown anywhere that it is not as told
-  // feels what begins as no push does, or before motion had shown how much the model errs.
+  // feels what begins as no push does. So it does, before motion has shown how much the model errs, what
+  // is no larger than its offsets let expect.
   bool may_be_own_doing(std::size_t g) const {
     const Segment& s = segments_[g];
     const bool moves = s.in_motion || motion_.moves();  // or has it set off since?
-    return s.arm_off && moves && (s.origin != Origin::push || s.moved < tuning_.motion_told);
+    if (!s.arm_off || !moves) return false;
+    return s.origin != Origin::push || (s.moved < tuning_.motion_told && is_expected(g));
   }
 
   // Motion has yet to show how much the model of this segment errs.
@@ -122,7 +124,7 @@ class SegmentLevels {
     if (!is_felt(g)) {
       s.top = s.top_wrench = s.rest = s.back = s.below = s.lasted = s.clear = 0.0;
       s.in_motion = motion_.moves();
-      s.arm_off = is_arm_off() || now.age < tuning_.confirm / rows_.slowest(g);
+      s.arm_off = is_arm_off();
       if (s.in_motion) s.moved += dt;
       s.grows = std::max(0.0, s.grows - dt);
       if (is_off(g) && motion_.moves()) s.shown += dt;
@@ -160,8 +162,7 @@ class SegmentLevels {
     Origin origin = Origin::start;
     bool in_motion = false;  // did the present event begin while the arm moved?
     double grows = 0.0;  // for how long what was the arm's own doing may go on to grow [s]
-    // Has the arm shown that it is not as told, up to now in an event? In its first moments it may be.
-    bool arm_off = false;
+    bool arm_off = false;  // has the arm shown that it is not as told, up to now in an event?
     double moved = 0.0;  // for how long the arm has moved, but for events [s]
     double shown = 0.0;  // for how long motion had shown before it what the arm is off by [s]
     // Of the present event, for how long [s]:
@@ -180,6 +181,17 @@ class SegmentLevels {
     for (std::size_t g = 0; g < segments_.size(); ++g)
       if (is_off(g)) return true;
     return false;
+  }
+
+  // Is the present event as small as motion may make of the offsets that the arm has shown, on sensors
+  // where the segment has one?
+  bool is_expected(std::size_t g) const {
+    const Segment& s = segments_[g];
+    const Rows which = s.top_wrench > 0.0 ? Rows::wrench : Rows::all;
+    double offset = 0.0;
+    for (std::size_t i = 0; i < rows_.size(); ++i)
+      if (counts(i, which)) offset = std::max(offset, offsets_.shown(i) / rows_.limit(i));
+    return (which == Rows::all ? s.top : s.top_wrench) < tuning_.motion_times * offset;
   }
 
   // May a push that has lasted for so long be an error of the model after all? Not where motion had

@@ -74,8 +74,11 @@ struct DetectorTuning {
   // to show the rest. Half: in the first second places are too sure. Double: they are too unsure.
   double motion_few = 0.5;
   // An arm that is not as told must have moved for so long [s] to show how much it errs in motion: until
-  // then no link is sure. Half: first motions name links surely. Double: so do pushes 2 s later.
+  // then no link of a small event is sure. Half: first motions name links surely. Double: so do pushes later.
   double motion_told = 1.0;
+  // Offsets that it has shown, which motion hardly exceeds until then: a weight that is turned over changes by
+  // twice its size. Half: quick first motions name links surely. Double: hard pushes in them do not.
+  double motion_times = 2.0;
   // While it is taken for a contact an error counts so many times: it then fills the memory in 0.5
   // s. Half: false events of motion last twice as long. Double: a push that lasts is learned in
   // 0.25 s.
@@ -242,6 +245,7 @@ struct DetectorTuning {
     v("motion_memory", "s", t.motion_memory);
     v("motion_few", "s", t.motion_few);
     v("motion_told", "s", t.motion_told);
+    v("motion_times", "1", t.motion_times);
     v("motion_touched", "1", t.motion_touched);
     v("motion_sigmas", "1", t.motion_sigmas);
     v("drift_way", "rad", t.drift_way);
