@@ -129,6 +129,12 @@ def test_several_processes_label_the_same(lerobot, tmp_path, robot, capfd):
     assert not (tmp_path / "spoilt").exists()
 
 
+def test_analyze_of_a_data_set_names_the_command_that_is_meant(lerobot, tmp_path, capsys):
+    words = ["analyze", str(lerobot), "--robot", "sara", "--out", str(tmp_path / "out")]
+    assert main(words) == 2 and not (tmp_path / "out").exists()
+    assert f"`touchline label {lerobot} --out COPY`" in capsys.readouterr().err.replace("\n", " ")
+
+
 def test_lerobot(lerobot, robot, capsys):
     before, files = read(lerobot), {p: p.read_bytes() for p in lerobot.rglob("*") if p.is_file()}
     assert main(["label", str(lerobot), "--robot", "sara"]) == 0
