@@ -9,12 +9,6 @@ def counted(number: int, word: str, plural: str = "s") -> str:
     return f"{number} {word}{plural * (number != 1)}"
 
 
-def listed(names: list[str], most: int = 4) -> str:
-    """The first names, and how many more there are."""
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
-
-
 def lasting(seconds: float) -> str:
     """A duration in the unit that suits it."""
     for unit, size in (("h", 3600.0), ("min", 60.0)):

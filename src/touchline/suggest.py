@@ -28,6 +28,9 @@ def near_misses(word: Any, allowed: Iterable[str]) -> str:
     return f" Did you mean {' or '.join(filter(None, (', '.join(told[:-1]), told[-1])))}?"
 
 
+FEW = 4  # names in a line that need not have all of them
+
+
 def listing(names: Iterable[str], limit: int = 60) -> str:
     """Return the names, comma separated, of many only the first."""
     names = list(names)

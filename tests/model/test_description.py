@@ -277,7 +277,7 @@ def test_one_error(folder, old, new, problem):
 def test_many_names_with_dots_are_one_line(folder):
     many = "\n  - ".join(f"{{name: a.{k}, link: hand}}" for k in range(6))
     (line,) = problems_of(edit(folder, (WRIST, many)))
-    told = "6 have a dot: 'a.0', 'a.1', 'a.2', 'a.3' and 2 more; dots are reserved"
+    told = "6 have a dot: 'a.0', 'a.1', 'a.2', 'a.3', ... (2 more); dots are reserved"
     assert line == f"force_torque_sensors[1].name: {told}"
 
 

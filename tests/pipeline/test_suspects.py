@@ -233,14 +233,19 @@ def test_a_blow_after_a_step_is_a_collision(torques_alone):
     assert found.detected == pytest.approx(healthy.detected, abs=0.02)
 
 
-def test_a_torque_that_steps_as_a_push_lets_go_is_told_and_is_no_collision():
-    """What the push does to the other joints meanwhile does not bear the step out."""
+def pushed_panda(seed):
+    """A Panda with torques alone, its recording with a push, and the event of that, a contact."""
     pytest.importorskip("pinocchio", reason="comes with example-robot-data, the arms' models")
     robot = robot_named("panda")
-    samples = record(robot, 0).samples
-    pipeline = tl.Pipeline(robot)
+    samples, pipeline = record(robot, seed).samples, tl.Pipeline(robot)
     _, _, (healthy,) = heard(pipeline, samples)
     assert healthy.level == "contact"
+    return robot, samples, pipeline, healthy
+
+
+def test_a_torque_that_steps_as_a_push_lets_go_is_told_and_is_no_collision():
+    """What the push does to the other joints meanwhile does not bear the step out."""
+    robot, samples, pipeline, _ = pushed_panda(0)
     _, told, events = heard(pipeline, faulty(robot, samples, "half", "tau.panda_joint4", RELEASED))
     assert (told[0].channel, told[0].fault) == ("tau.panda_joint4", Fault.SPIKE)
     assert samples.time[told[0].sample] == pytest.approx(RELEASED, abs=0.0015)
@@ -249,12 +254,7 @@ def test_a_torque_that_steps_as_a_push_lets_go_is_told_and_is_no_collision():
 
 def test_what_one_joint_torque_alone_makes_of_a_push_is_no_collision():
     """Twice the torque of one joint: no single force does that, and others show no blow."""
-    pytest.importorskip("pinocchio", reason="comes with example-robot-data, the arms' models")
-    robot = robot_named("panda")
-    samples = record(robot, 110).samples
-    pipeline = tl.Pipeline(robot)
-    _, _, (healthy,) = heard(pipeline, samples)
-    assert healthy.level == "contact"
+    _, samples, pipeline, healthy = pushed_panda(110)
     wrong = scaled(samples, "joint1", 2.0, PUSHED, 3.0)
     _, _, events = heard(pipeline, wrong)
     event = next(e for e in events if e.detected == pytest.approx(healthy.detected, abs=0.02))

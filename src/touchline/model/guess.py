@@ -15,7 +15,7 @@ import numpy as np
 
 from touchline.model.mechanism import Mechanism
 from touchline.model.topology import independent_joints, outboard_links
-from touchline.numbers import listed
+from touchline.suggest import FEW, listing
 
 FINGER = frozenset("finger fingers gripper knuckle jaw claw robotiq driver coupler".split())
 DIGIT = frozenset("thumb index middle ring pinky".split())  # of something that is called a hand
@@ -158,20 +158,20 @@ def cautions(mechanism: Mechanism) -> Iterator[str]:
     wheels = [n for n, joint in moving.items() if words(n, joint.child) & WHEEL]
     if wheels:
         yield (
-            f"joints {listed(wheels)} are wheels: the root link is taken to stand still, so a "
-            "robot that drives feels its own accelerations as touch"
+            f"joints {listing(wheels, FEW)} are wheels: the root link is taken to stand still, so "
+            "a robot that drives feels its own accelerations as touch"
         )
     legs = [n for n, joint in moving.items() if words(n, joint.child) & LEG]
     if len(legs) > 1 and not wheels:
         yield (
-            f"joints {listed(legs)} are those of legs: the root link is taken to stand still, and "
-            "the ground under the feet is felt as a touch"
+            f"joints {listing(legs, FEW)} are those of legs: the root link is taken to stand "
+            "still, and the ground under the feet is felt as a touch"
         )
     coupled = [f"{n} (follows {joint.mimic.joint})" for n, joint in moving.items() if joint.mimic]
     if coupled:
         yield (
-            f"coupled joints {listed(coupled)}: they move as the model says, and a touch of them "
-            "loads the joint that they follow"
+            f"coupled joints {listing(coupled, FEW)}: they move as the model says, and a touch of "
+            "them loads the joint that they follow"
         )
 
 

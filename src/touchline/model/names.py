@@ -12,8 +12,7 @@ from typing import Any
 from touchline.model.entries import JointEntry, RobotFile, SensorEntry
 from touchline.model.mechanism import Mechanism
 from touchline.model.topology import independent_joints, outboard_links
-from touchline.numbers import listed
-from touchline.suggest import unknown
+from touchline.suggest import FEW, listing, unknown
 
 Problem = tuple[str, str]
 RESERVED = ("root",)  # the name of a segment
@@ -94,7 +93,7 @@ def _unique_names(file: RobotFile) -> Iterator[Problem]:
         if "." in name:
             dotted[f"'{name}'"] = where
     if dotted:
-        names = listed(list(dotted))
+        names = listing(dotted, FEW)
         what = f"{names} has a dot" if len(dotted) == 1 else f"{len(dotted)} have a dot: {names}"
         yield next(iter(dotted.values())), f"{what}; dots are reserved"
 

@@ -284,10 +284,11 @@ So a push that is told as a fault is one along an axis that carries about as muc
 go errors of the model alone are left. There a channel is told only if it is wrong by more than the
 threshold of a contact. For two seconds a channel that is told does not count.
 
-A joint and a sensor with no body between them must agree, but for friction that the joint has shown.
-What they differ by begins no event, and one of the two is named. With joint torques alone nothing of this is told: a push on the first link
-loads one joint, too. But where one steps alone within a sample, nothing becomes a collision for a
-second. What a push does to the others for many samples, as it comes or goes, does not count then.
-And where one joint alone makes a push a blow, one force must explain all joints: else it is none.
+A joint and a sensor with no body between them must agree, but for friction that the joint has
+shown. What they differ by begins no event, and one of the two is named. With joint torques alone
+nothing of this is told: a push on the first link loads one joint, too. But where one steps alone
+within a sample, nothing becomes a collision for a second. What a push does to the others for many
+samples, as it comes or goes, does not count then. And where one joint alone makes a push a blow,
+one force must explain all joints: else it is none.
 What is left: an error that makes a push look stronger, and that a push elsewhere explains as well.
 """
