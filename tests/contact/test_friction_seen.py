@@ -75,3 +75,54 @@ def test_what_begins_as_friction_does_names_no_link_surely():
     found = events(load_arm("panda-torques", 1), FRICTION)
     assert len(found) > 2
     assert all(c.probability <= 0.5 for event in found for c in event.candidates)
+
+
+def setting_off(arm, at, seconds):
+    """Every joint stands until `at` [s], then goes to and fro, each at a pace of its own."""
+    n = len(arm.joint_names)
+    way = swaying(n, 0.6, 0.8, 1.4)
+    way = replace(way, center=way.center - np.eye(n)[3] * 1.5, phase=0.0 * way.phase)
+
+    def path(time):
+        s = np.maximum(time - at, 0.0)
+        rest = np.exp(-4.0 * s)  # it sets off without a jerk
+        pace, more = 1.0 - (1.0 + 4.0 * s) * rest, 16.0 * s * rest
+        q, qd, qdd = way(s - 0.5 + (0.5 + s) * rest)
+        return q, qd * pace[:, None], qdd * pace[:, None] ** 2 + qd * more[:, None]
+
+    maker = MotionMaker(arm, arm, RATE, seconds)
+    return maker, *maker.loads(path)
+
+
+def test_without_a_sensor_friction_shows_by_turns():
+    """At rest nothing is off, and what its motion shows had been a touch that never ended."""
+    arm = load_arm("panda-torques", 1)
+    maker, q, qd, loads = setting_off(arm, 1.0, 20.0)
+    s = maker.sensed(q, qd, loads, np.random.default_rng(1))
+    pipeline = tl.Pipeline(arm, period=1.0 / RATE)
+    pipeline.run(s.time, s.q, s.qd, s.tau + FRICTION * np.tanh(s.qd / TURN), s.wrench)
+    spans = [(e.detected, 20.0 if e.cleared is None else e.cleared) for e in pipeline.events]
+    late = sum(end - max(begin, 8.0) for begin, end in spans if end > 8.0)
+    assert late < 0.2 * 12.0
+    assert max(end - begin for begin, end in spans) < 5.0
+    assert all((event.body_probability or 0.0) < 0.9 for event in pipeline.events)
+
+
+def test_pushes_against_an_arm_that_turns_are_no_friction():
+    """On an arm as told, at each stroke of its second joint: each lasts until it is let go."""
+    arm = load_arm("panda-torques", 1)
+    maker, q, qd, loads = setting_off(arm, 1.0, 20.0)
+    quick = np.abs(qd[:, 1]) > 0.4
+    begins = np.flatnonzero(quick[1:] & ~quick[:-1])[1:-1]
+    assert len(begins) >= 4
+    spells = [(maker.time[i], maker.time[i] + 0.4) for i in begins]
+    for i, (begin, end) in zip(begins, spells, strict=True):
+        loads[:, 1] += 5.0 * np.sign(qd[i, 1]) * ((maker.time > begin) & (maker.time < end))
+    s = maker.sensed(q, qd, loads, np.random.default_rng(1))
+    pipeline = tl.Pipeline(arm, period=1.0 / RATE)
+    pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+    found = [(e.detected, e.cleared) for e in pipeline.events]
+    assert len(found) == len(spells)
+    for (begin, end), (detected, cleared) in zip(spells, found, strict=True):
+        assert begin < detected < begin + 0.05
+        assert end < cleared < end + 0.3

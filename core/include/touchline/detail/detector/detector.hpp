@@ -248,7 +248,7 @@ class Detector {
       off = off || offsets_.shown(i) > row.contact || meters_.contradicts(i, tuning_);
       if (!std::isfinite(s.innovation)) s.innovation = s.residual;  // samples were lost
     }
-    rows_.off[g] = off && fires_[g];
+    rows_.off[g] = (off || friction_.has_turned(g)) && fires_[g];
   }
 
   bool read_wrench(std::size_t g, double* wrench, double* innovation) const {

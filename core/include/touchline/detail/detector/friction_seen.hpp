@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // What friction a joint has shown, and what may have come of it since the baseline. A torque against
 // the joint's own velocity, which changes with that, and of which the segment's force-torque sensor
-// feels nothing, is friction: a contact loads the sensor, too. No allocation after construction.
+// feels nothing, is friction: a contact loads the sensor, too. Without a sensor joints show that there
+// is friction as they turn, again and again. No allocation after construction.
 // Theory: docs/theory.md, section 4.6.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "touchline/detail/detector/row_offsets.hpp"
@@ -29,6 +31,7 @@ class FrictionSeen {
         tuning_(tuning),
         joints_(rows.size()),
         shown_(rows.size()),
+        turns_(rows.segments()),
         first_(rows.segments()) {
     for (std::size_t g = 0; g < rows.segments(); ++g) {
       first_[g] = rows.first(g);
@@ -45,6 +48,7 @@ class FrictionSeen {
         const double part = std::min(1.0, dt * rows_.bandwidths[i]);
         joints_[i].follow(rows_.samples[i].speed, part, std::min(1.0, part / tuning_.trend), tuning_);
       }
+      if (!has_sensor(g)) follow_turns(g, loadable);
       const bool watched = has_sensor(g), silent = watched && posture != nullptr && is_silent(g);
       const Spatial felt = silent ? felt_by_sensor(g, *posture) : Spatial{};
       double most = 0.0;
@@ -81,6 +85,10 @@ class FrictionSeen {
     return change * lately < 0.0 && std::fabs(lately) >= least;
   }
 
+  // Have joints of a segment without a sensor shown friction by their turns? So often no contact comes
+  // just as a joint begins to turn, against that, one way and then the other.
+  bool has_turned(std::size_t g) const { return turns_[g] >= tuning_.friction_turns; }
+
   // What friction may have added to row i since its baseline [N or Nm].
   double added(std::size_t i) const { return joints_[i].added; }
 
@@ -96,6 +104,8 @@ class FrictionSeen {
 
   void go_on_from(const FrictionSeen& other, std::size_t of, std::size_t i) {
     joints_[i] = other.joints_[of];
+    int& turns = turns_[rows_[i].segment];
+    turns = std::max(turns, other.turns_[other.rows_[of].segment]);
   }
 
  private:
@@ -107,11 +117,16 @@ class FrictionSeen {
     double way = 0.0, trend = 0.0, base = 0.0;
     double square = 0.0, product = 0.0;  // sums of how much of it came [s], and with it [N s or Nm s]
     double added = 0.0;
+    bool over = false;  // was its row over its limit at the last sample?
+    int side = 0;       // the way it turned when that last began against it, 1 or -1; 0: never
 
     // `part`: what its filter takes of a sample, and `slow_part` the mean of the last moments.
     void follow(double speed, double part, double slow_part, const DetectorTuning& t) {
       now = speed / (std::fabs(speed) + t.friction_speed);
-      if (!started) *this = {true, now, now, now, now, 0.0, 0.0, added};
+      if (!started) {
+        way = trend = base = now;
+        started = true;
+      }
       way += (now - way) * part;
       trend += (way - trend) * slow_part;
     }
@@ -145,6 +160,25 @@ class FrictionSeen {
   RowRange torques_of(std::size_t g) const { return {first_[g], rows_.end(g)}; }
   // Of a torque.
   bool shows(std::size_t i) const { return rows_.samples[i].known && rows_[i].seen > 0.0; }
+
+  // Counts how often a joint's row goes over its limit as the joint begins to turn: against the turn, and
+  // the other way than the time before. What comes along with the turn speaks against friction.
+  void follow_turns(std::size_t g, const std::vector<char>& loadable) {
+    if (has_turned(g)) return;
+    for (const std::size_t i : torques_of(g)) {
+      if (!shows(i) || loadable[i] == 0 || !offsets_.started(i)) continue;
+      Joint& joint = joints_[i];
+      const bool before = std::exchange(joint.over, std::fabs(off(i)) > rows_.limit(i));
+      if (!joint.over || before || std::fabs(rows_.samples[i].speed) >= tuning_.reversal_speed) continue;
+      if (joint.turned() < tuning_.friction_turned) continue;
+      const double turn = joint.way - joint.base;
+      const bool against = off(i) * turn < 0.0;
+      const int side = against ? (turn > 0.0 ? 1 : -1) : 0;
+      if (!against) turns_[g] = std::max(0, turns_[g] - 1);
+      else if (joint.side == -side) ++turns_[g];
+      joint.side = side;
+    }
+  }
 
   // What may have come of the friction of a joint; `other`: the most that one beside it has shown. A
   // joint of which little has been seen may have as much, or as stood there when it was moving at the
@@ -196,6 +230,7 @@ class FrictionSeen {
   const DetectorTuning& tuning_;
   std::vector<Joint> joints_;  // per row
   std::vector<double> shown_;  // per row: the friction that it has shown [N or Nm]
+  std::vector<int> turns_;     // per segment without a sensor: see `follow_turns`
   std::vector<std::size_t> first_;  // per segment: its first row of a torque
 };
 

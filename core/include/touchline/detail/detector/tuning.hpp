@@ -134,6 +134,9 @@ struct DetectorTuning {
   // Half: one that breaks away is pushed. Double: joints that turn slowly stand, and ten of 40 pushes on
   // an arm without a sensor are lost.
   double friction_stood = 0.5;
+  // Turns of joints without a sensor that show friction. Half: two contacts while joints begin to turn
+  // are friction. Double: an arm of which only friction is not as told takes one motion more for touched.
+  int friction_turns = 3;
 
   // ---- When an arm moves ----
   // Slower than this it stands [rad/s]; a hand that pushes an arm moves it, too. Half: trembling
@@ -262,6 +265,7 @@ struct DetectorTuning {
     v("friction_doubt", "1", t.friction_doubt);
     v("friction_quick", "1", t.friction_quick);
     v("friction_stood", "1", t.friction_stood);
+    v("friction_turns", "turns", t.friction_turns);
     v("standing", "rad/s", t.standing);
     v("moving", "rad/s", t.moving);
     v("pause", "s", t.pause);
