@@ -10,8 +10,13 @@ from free_motion import swaying
 import touchline as tl
 from touchline.detector.detector import Detection, Detector
 from touchline.detector.model_drift import WAY, guess_drift
-from touchline.detector.thresholds import expect_drift, make_thresholds, without_limits
-from touchline.localizer.localizer import Localizer
+from touchline.detector.thresholds import (
+    expect_drift,
+    make_thresholds,
+    row_name,
+    without_limits,
+)
+from touchline.localizer.localizer import WRENCH_ERROR, Localizer
 from touchline.localizer.skin import Skin
 from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot
@@ -131,6 +136,29 @@ def test_a_calibrated_robot_brings_its_own():
     thresholds = make_thresholds(told)
     assert {row.drift for row in thresholds.rows} == {row.slow for row in known.values()}
     assert expect_drift(told, thresholds, 0.02) is thresholds
+
+
+def test_errors_of_the_model_do_not_depend_on_the_rate():
+    """Places had believed a calibrated arm at another rate as if nothing were wrong with it."""
+    told, _, _ = told_and_real(OFF, 0)
+    known = told.description.detection.calibration.rows
+    at_another = expect_drift(told, make_thresholds(told, 2e-3), 0.02)
+    assert not at_another.calibrated
+    for row in at_another.rows:
+        of_row = known[row_name(told, row)]
+        assert (row.slow, row.quick, row.drift) == (of_row.slow, of_row.quick, of_row.slow)
+
+
+def test_gains_of_sensors_are_doubted_where_a_calibration_has_taken_all_else_out():
+    told, _, skin = told_and_real(OFF, 0)
+    scene = make_scene(OFF, 0).signals
+    regions = []
+    for error in (None, WRENCH_ERROR, 0.0):
+        pipeline = tl.Pipeline(told, skin=skin, wrench_error=error)
+        pipeline.run(scene.time, scene.q, scene.qd, scene.tau, scene.wrench)
+        (event,) = pipeline.events
+        regions.append(event.position_std)
+    assert regions[0] == regions[1] > 1.1 * regions[2]
 
 
 def judged(cell, run):

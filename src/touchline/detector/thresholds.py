@@ -15,6 +15,7 @@ from touchline.model.description import (
     CalibrationDescription,
     DetectionDescription,
     LevelDescription,
+    RowCalibration,
     Vector,
 )
 from touchline.model.robot import Robot
@@ -126,7 +127,7 @@ def expect_drift(
     error: float,
     guess: Callable[[Robot, float], tuple[Array, Array]] = guess_drift,
 ) -> Thresholds:
-    """The same tests; where they are not calibrated, the localizer reckons with a guess.
+    """The same tests; the localizer reckons with a guess for rows that no calibration knows.
 
     Args:
         robot: the robot.
@@ -137,8 +138,13 @@ def expect_drift(
     if thresholds.calibrated or error == 0.0:
         return thresholds
     torques, wrenches = guess(robot, error)
+    calibration = robot.description.detection.calibration
+    known = {} if calibration is None else calibration.rows
     rows = []
     for row in thresholds.rows:
+        if row_name(robot, row) in known:
+            rows.append(row)
+            continue
         found = torques[row.joint] if row.component < 0 else wrenches[row.segment, row.component]
         constant, speed, acceleration = found.tolist()
         rows.append(replace(row, drift=(constant, speed, acceleration)))
@@ -159,19 +165,20 @@ def row_name(robot: Robot, row: RowThreshold) -> str:
 
 
 def _at_least_calibrated(robot: Robot, row: RowThreshold, share: float) -> RowThreshold:
-    """The row with no lower threshold than a calibration at another rate gives it.
+    """The row with errors and no lower threshold than a calibration at another rate gives it.
 
-    Noise depends on the rate of samples, errors of the model do not, and where these prevail noise
-    alone would see contacts in them.
+    Noise depends on the rate of samples, errors of the model do not. Where these prevail noise
+    alone would see contacts in them, and places would believe them.
     """
     detection = robot.description.detection
     calibration = detection.calibration
-    if calibration is None:
+    known = None if calibration is None else calibration.rows.get(row_name(robot, row))
+    if calibration is None or known is None:
         return row
-    known = calibration.rows.get(row_name(robot, row))
+    row = _with_errors(row, known)
     tail = calibration.tails.get(robot.segment_names[row.segment], {}).get("rows")
     kind, key = _kind(robot, row)
-    if known is None or tail is None or _given(detection.contact, kind, key) is not None:
+    if tail is None or _given(detection.contact, kind, key) is not None:
         return row
     contact = known.typical * threshold(tail, share)
     if contact <= row.contact:
@@ -181,6 +188,10 @@ def _at_least_calibrated(robot: Robot, row: RowThreshold, share: float) -> RowTh
         collision = max(COLLISION_RATIO * contact, _least_collision(robot, row))
     limit = detection.baseline.limit * contact
     return replace(row, contact=contact, collision=collision, baseline_limit=limit)
+
+
+def _with_errors(row: RowThreshold, known: RowCalibration) -> RowThreshold:
+    return replace(row, slow=known.slow, quick=known.quick, drift=known.slow)
 
 
 def _calibrated_row(
@@ -206,13 +217,10 @@ def _calibrated_row(
         collision = max(COLLISION_RATIO * contact, _least_collision(robot, row))
     limit = detection.baseline.limit * contact
     return replace(
-        row,
+        _with_errors(row, known),
         contact=contact,
         collision=collision,
         baseline_limit=limit,
-        slow=known.slow,
-        quick=known.quick,
-        drift=known.slow,
         seen=seen,
     )
 

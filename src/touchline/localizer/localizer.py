@@ -21,6 +21,8 @@ from touchline.result.native import Names
 
 RULES = ("likelihood", "paper")
 TORQUE_ERROR = 0.02  # a joint's torque sensor is no better, and a touch is no point
+# Data sheets of six-axis sensors state about as much. Motion without a touch does not show it.
+WRENCH_ERROR = 0.01
 MODEL_ERROR = 0.02  # masses and inertias of a good model from CAD are no better
 
 

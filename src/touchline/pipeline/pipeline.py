@@ -16,6 +16,7 @@ from touchline.detector.thresholds import Thresholds, expect_drift, make_thresho
 from touchline.localizer.localizer import (
     MODEL_ERROR,
     TORQUE_ERROR,
+    WRENCH_ERROR,
     expected_pushes,
     require_rule,
 )
@@ -69,8 +70,10 @@ class Pipeline:
         period: time between samples [s], for thresholds and weights that follow from the noise.
             Where the stamps of 64 samples differ from it by a fifth, `health` has `Health.PERIOD`.
         rule: of the localizer, "likelihood" or "paper" (the first entry of the line).
-        wrench_error: of gains and model, as a part of the load, and `torque_error`, for the
-            localizer's weights.
+        wrench_error: of the gains of six-axis sensors, as a part of the load, for the localizer's
+            weights; default: `WRENCH_ERROR` where the robot is calibrated. Elsewhere `model_error`
+            allows for more.
+        torque_error: the same of joint torques.
         skin: the robot's surfaces, if already at hand.
         friction: coefficient of the cone in which pushes are looked for; default: that of the
             description's `pushes`.
@@ -101,7 +104,7 @@ class Pipeline:
         method: str = "segment",
         period: float = 1e-3,
         rule: str = "likelihood",
-        wrench_error: float = 0.0,
+        wrench_error: float | None = None,
         torque_error: float = TORQUE_ERROR,
         skin: Skin | None = None,
         friction: float | None = None,
@@ -124,6 +127,9 @@ class Pipeline:
         native = native_tuning(self.tuning, rule)
         native.method = getattr(core.Method, method)
         pushes = expected_pushes(robot, friction)
+        if wrench_error is None:
+            calibrated = robot.description.detection.calibration is not None
+            wrench_error = WRENCH_ERROR if calibrated else 0.0
         self._method = method
         self._weights = period, bandwidth, wrench_error, torque_error, pushes, self.tuning
         self._model_error = model_error

@@ -177,6 +177,7 @@ def make_pipeline(
         robot,
         skin=skin,
         rule=rule,
+        wrench_error=0.0,
         torque_error=0.0,
         friction=FRICTION,
         model_error=model_error,
