@@ -2,6 +2,7 @@
 """Arms that are pushed time and again: how it is counted what is said, and short recordings."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from touchline.bench.pushes.run import Part, play, run
 from touchline.cli import main
 from touchline.result.event import Event
 from touchline.result.kinds import ContactLevel, Status
+from touchline.trials.arms import described_arm
+from touchline.trials.free_motion import random_trajectory
 
 TIME = np.arange(0.0, 10.0, 0.001)
 
@@ -86,6 +89,17 @@ def test_pushes_that_joints_alone_feel_are_not_taken_for_friction():
     tally = run(Part("panda-torques", "bias 2 N", 1000, 9.0))
     assert tally.pushes == tally.found == tally.held == tally.cleared == 3
     assert tally.extra == 0
+
+
+def test_what_a_calibration_knows_counts_at_another_rate_too(monkeypatch):
+    """Places had believed the arm as if nothing were wrong: of such pushes two of 13 were right."""
+    robot = described_arm("panda")
+    time = np.arange(25 * 20) / 20.0
+    motion = random_trajectory(robot, np.random.default_rng(8))(time)[0]
+    monkeypatch.setattr(pushes, "_plan", lambda arm: SimpleNamespace(time=time, q=motion))
+    tally = run(Part("panda", "several", 1, 9.0, rate=200.0))
+    assert tally.pushes == tally.found == tally.right == tally.held == tally.cleared == 3
+    assert tally.sure_wrong == tally.far == 0
 
 
 def test_what_is_wrong_is_so_of_the_arm_or_of_its_readings():

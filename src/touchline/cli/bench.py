@@ -259,7 +259,7 @@ def imperfect(
 
 PushedArm = Literal["sara", "sara-full", "ur5", "panda", "panda-torques", "ur10"]
 PushedFault = Literal[
-    "nothing", "masses 2 %", "masses 5 %", "payload 0.3 kg", "friction 1 Nm", "bias 2 N"
+    "nothing", "masses 2 %", "masses 5 %", "payload 0.3 kg", "friction 1 Nm", "bias 2 N", "several"
 ]
 
 
@@ -271,12 +271,13 @@ def pushes(
     first: int = 0,
     seconds: float = 60.0,
     processes: int = 1,
+    calibrate: float | None = None,
 ) -> int:
     """Arms that move, are not as told, and are pushed every three seconds: what is said of it.
 
     Example: touchline bench pushes --arms sara ur5 --seeds 3 --processes 4
 
-    Nothing is calibrated. What an arm takes for its own doing after one push decides what it makes
+    What an arm takes for its own doing after one push decides what it makes
     of the next. Random pushes of 8 to 40 N last 0.2 to 1.2 s, and one event belongs to one push.
     Each line counts:
 
@@ -299,19 +300,24 @@ def pushes(
     Args:
         arms: Arms of the localization benchmark, or ur5; all but sara and sara-full need the
             package example-robot-data. Only panda-torques has no force-torque sensor.
-        wrong: What is wrong with them.
+        wrong: What is wrong with them. Several: masses 3 %, friction of 0.2 to 1.5 Nm and a
+            ripple of 0.2 Nm in each joint, biases of 0.8 N and gains 1 % of sensors, all at once.
         seeds: Recordings of each line; each takes some ten seconds.
         first: The first of their seeds.
         seconds: Length of each recording [s].
         processes: So many work at a time.
+        calibrate: Calibrates each arm before, on the motion that `touchline calibrate --plan`
+            proposes, recorded at this rate [Hz]: half a minute more for each recording.
     """
     from touchline.bench.pushes.run import main
-    from touchline.numbers import check_least
+    from touchline.numbers import check_least, check_positive
 
+    if calibrate is not None:
+        check_positive(calibrate=calibrate)
     check_least(1, seeds=seeds, processes=processes)
     check_least(0, first=first)
     check_least(3, seconds=seconds)
-    main(arms, wrong, seeds, first, seconds, processes)
+    main(arms, wrong, seeds, first, seconds, processes, calibrate)
     return 0
 
 

@@ -18,6 +18,11 @@ BIAS = 2.0  # N, in a random direction at the first force-torque sensor; Nm on a
 GAIN = 0.01  # relative error of every reading's scale, either sign
 COULOMB = 1.0  # Nm, friction of every joint, of the other sign at once when it turns
 TURN = 0.01  # rad/s, over which it changes its sign
+# Of an arm on which several things are wrong at once:
+MASSES = 0.03  # relative error of masses and inertias, 1 sigma
+FRICTION, VISCOUS = (0.2, 1.5), (0.0, 1.5)  # Nm and Nm s/rad, drawn for each joint
+RIPPLE, STAGES = 0.2, 9.0  # Nm, and per rad of a joint: as its gears have it
+BIASES = 0.8  # N, 1 sigma, along each axis of a force-torque sensor
 
 
 @dataclass(frozen=True)
@@ -115,6 +120,18 @@ def _noisier(factor: float) -> Callable[[Robot, Samples, np.random.Generator], S
     return read
 
 
+def _several(robot: Robot, s: Samples, rng: np.random.Generator) -> Samples:
+    """Friction and ripple of its gears by joint; biases and gains of its sensors."""
+    n, k = s.tau.shape[1], s.wrench.shape[1]
+    dry, viscous = rng.uniform(*FRICTION, n), rng.uniform(*VISCOUS, n)
+    ripple = RIPPLE * np.sin(STAGES * s.q + rng.uniform(0.0, 2 * np.pi, n))
+    tau = s.tau + dry * np.tanh(s.qd / TURN) + viscous * s.qd + ripple
+    biases = np.hstack([BIASES * rng.normal(size=(k, 3)), np.zeros((k, 3))])
+    wrench = (s.wrench + biases) * (1.0 + GAIN * rng.choice([-1.0, 1.0], (k, 6)))
+    return replace(s, tau=tau, wrench=wrench)
+
+
+SEVERAL = Fault("several", _masses(MASSES), _several)
 FAULTS = (
     Fault("nothing", _same, _true),
     Fault("masses 2 %", _masses(0.02), _true),
