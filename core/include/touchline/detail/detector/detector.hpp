@@ -92,7 +92,12 @@ class Detector {
     time_ = now;
     if (dt > 0.0) follow_motion(q, qd, dt);
     for (std::size_t g = 0; g < rows_.segments(); ++g) read_segment(g, qd);
-    if (dt > 0.0 && sound_) friction_.follow(placed_ ? &posture_ : nullptr, loadable_, dt);
+    if (dt > 0.0 && sound_) {
+      const auto untouched = [&](std::size_t g) {
+        return levels_.is_quiet(g) || levels_.is_own_doing(g);
+      };
+      friction_.follow(placed_ ? &posture_ : nullptr, loadable_, untouched, dt);
+    }
     borne_out_.add(rows_.residuals, rows_.known, dt);
     for (std::size_t g = 0; g < rows_.segments(); ++g) {
       if (rows_.any_known(g)) ages_[g] += dt;

@@ -40,8 +40,11 @@ class FrictionSeen {
   }
 
   // Joints that are tested beside a force-torque sensor, which feels none of it; `posture`: null while
-  // it is not known. Of those that no contact can load, as `loadable` says by row, all is friction.
-  void follow(const Posture* posture, const std::vector<char>& loadable, double dt) {
+  // it is not known. Of those that no contact can load, as `loadable` says by row, all is friction. So is,
+  // of a segment whose joints have turned, what they have while `untouched(segment)`.
+  template <class Untouched>
+  void follow(const Posture* posture, const std::vector<char>& loadable, Untouched&& untouched,
+              double dt) {
     for (std::size_t g = 0; g < rows_.segments(); ++g) {
       for (const std::size_t i : torques_of(g)) {
         if (!rows_.samples[i].known) continue;
@@ -51,19 +54,20 @@ class FrictionSeen {
       if (!has_sensor(g)) follow_turns(g, loadable);
       const bool watched = has_sensor(g), silent = watched && posture != nullptr && is_silent(g);
       const Spatial felt = silent ? felt_by_sensor(g, *posture) : Spatial{};
+      const bool told = watched || has_turned(g), free = !watched && told && untouched(g);
       double most = 0.0;
       for (const std::size_t i : torques_of(g)) {
         const bool bare = loadable[i] == 0;
-        if (!shows(i) || !(watched || bare)) continue;
+        if (!shows(i) || !(told || bare)) continue;
         Joint& joint = joints_[i];
         const bool tells = joint.turned() >= tuning_.friction_turned;
-        if ((silent || bare) && offsets_.started(i) && tells)
-          joint.learn(bare ? off(i) : unexplained(i, felt, *posture), dt, tuning_);
+        if ((silent || bare || free) && offsets_.started(i) && tells)
+          joint.learn(silent && !bare ? unexplained(i, felt, *posture) : off(i), dt, tuning_);
         shown_[i] = joint.shown(rows_[i].contact, tuning_);
         most = std::max(most, shown_[i]);
       }
       for (const std::size_t i : torques_of(g))
-        if (shows(i) && (watched || loadable[i] == 0)) expect(i, most);
+        if (shows(i) && (told || loadable[i] == 0)) expect(i, most);
     }
   }
 
