@@ -27,6 +27,7 @@ def test_one_touch_of_a_wrong_model_in_motion_is_one():
         blind = Pipeline(
             robot,
             skin=skin,
+            wrench_error=0.0,
             torque_error=0.0,
             friction=0.5,
             thresholds=thresholds,
