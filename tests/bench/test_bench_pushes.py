@@ -135,6 +135,12 @@ def test_lines_of_arms_are_summed(here, monkeypatch, capsys, processes):
     ]
 
 
+@pytest.mark.parametrize("rate", ["0", "-50", "nan", "inf", "10", "130"])
+def test_a_rate_that_no_recording_can_have_is_told(capsys, rate):
+    assert main(["bench", "pushes", "--calibrate", rate]) == 2
+    assert f"--calibrate {rate}: must be a multiple of 50 Hz" in capsys.readouterr().err
+
+
 def test_a_benchmark_without_recordings_is_told(capsys):
     assert main(["bench", "pushes", "--seeds", "0"]) == 2
     assert "seeds" in capsys.readouterr().err

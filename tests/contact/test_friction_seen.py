@@ -33,20 +33,26 @@ def motion(arm):
 def events(arm, friction, torque=None, push=None):
     """Of the moving arm with friction, and with a torque on one joint or a force on a link."""
     maker, q, qd, loads = motion(arm)
-    n = q.shape[1]
     if torque is not None:
         loads[:, 6] -= torque(maker.time)
     if push is not None:
-        node = next(p.node for p in Skin(arm).patches if p.link == "panda_link6")
-        at = np.array([arm.poses(x)[node][:3, 3] for x in q])
-        force = push(maker.time)
-        contact = contact_loads(arm, q, "panda_link6", np.hstack([force, np.cross(at, force)]))
-        loads[:, :n] -= contact.torque
-        loads[:, n:] -= contact.wrench.reshape(len(q), -1)
-    s = maker.sensed(q, qd, loads, np.random.default_rng(1))
+        press(arm, q, loads, push(maker.time))
+    return felt(arm, maker.sensed(q, qd, loads, np.random.default_rng(1)), friction)
+
+
+def press(arm, q, loads, force):
+    """Adds what a force (N, 3) [N] in world at the origin of the sixth link does to the loads."""
+    n = q.shape[1]
+    node = next(p.node for p in Skin(arm).patches if p.link == "panda_link6")
+    at = np.array([arm.poses(x)[node][:3, 3] for x in q])
+    contact = contact_loads(arm, q, "panda_link6", np.hstack([force, np.cross(at, force)]))
+    loads[:, :n] -= contact.torque
+    loads[:, n:] -= contact.wrench.reshape(len(q), -1)
+
+
+def felt(arm, s, friction):
     pipeline = tl.Pipeline(arm, period=1.0 / RATE)
-    rubbing = friction * np.tanh(s.qd / TURN)
-    pipeline.run(s.time, s.q, s.qd, s.tau + rubbing, s.wrench)
+    pipeline.run(s.time, s.q, s.qd, s.tau + friction * np.tanh(s.qd / TURN), s.wrench)
     return pipeline.events
 
 
@@ -99,13 +105,19 @@ def test_without_a_sensor_friction_shows_by_turns():
     arm = load_arm("panda-torques", 1)
     maker, q, qd, loads = setting_off(arm, 1.0, 20.0)
     s = maker.sensed(q, qd, loads, np.random.default_rng(1))
-    pipeline = tl.Pipeline(arm, period=1.0 / RATE)
-    pipeline.run(s.time, s.q, s.qd, s.tau + FRICTION * np.tanh(s.qd / TURN), s.wrench)
-    spans = [(e.detected, 20.0 if e.cleared is None else e.cleared) for e in pipeline.events]
-    late = sum(end - max(begin, 8.0) for begin, end in spans if end > 8.0)
-    assert late < 0.2 * 12.0
-    assert max(end - begin for begin, end in spans) < 5.0
-    assert all((event.body_probability or 0.0) < 0.9 for event in pipeline.events)
+    (event,) = felt(arm, s, FRICTION)  # of the first turns: then its friction is known
+    assert event.cleared is not None and event.cleared - event.detected < 3.0
+    assert event.body is None
+
+
+def test_a_push_on_friction_that_is_known_is_felt():
+    arm = load_arm("panda-torques", 1)
+    maker, q, qd, loads = setting_off(arm, 1.0, 16.0)
+    press(arm, q, loads, during(10.0, 10.6, [0.0, 20.0, 0.0])(maker.time))
+    s = maker.sensed(q, qd, loads, np.random.default_rng(1))
+    _, event = felt(arm, s, FRICTION)
+    assert 10.0 < event.detected < 10.05
+    assert event.cleared is not None and 10.6 < event.cleared < 10.9
 
 
 def test_pushes_against_an_arm_that_turns_are_no_friction():
@@ -119,9 +131,7 @@ def test_pushes_against_an_arm_that_turns_are_no_friction():
     for i, (begin, end) in zip(begins, spells, strict=True):
         loads[:, 1] += 5.0 * np.sign(qd[i, 1]) * ((maker.time > begin) & (maker.time < end))
     s = maker.sensed(q, qd, loads, np.random.default_rng(1))
-    pipeline = tl.Pipeline(arm, period=1.0 / RATE)
-    pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
-    found = [(e.detected, e.cleared) for e in pipeline.events]
+    found = [(e.detected, e.cleared) for e in felt(arm, s, 0.0)]
     assert len(found) == len(spells)
     for (begin, end), (detected, cleared) in zip(spells, found, strict=True):
         assert begin < detected < begin + 0.05

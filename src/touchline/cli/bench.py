@@ -307,13 +307,12 @@ def pushes(
         seconds: Length of each recording [s].
         processes: So many work at a time.
         calibrate: Calibrates each arm before, on the motion that `touchline calibrate --plan`
-            proposes, recorded at this rate [Hz]: half a minute more for each recording.
+            proposes, recorded at this rate [Hz], a multiple of 50 Hz: half a minute more for each
+            recording.
     """
     from touchline.bench.pushes.run import main
-    from touchline.numbers import check_least, check_positive
+    from touchline.numbers import check_least
 
-    if calibrate is not None:
-        check_positive(calibrate=calibrate)
     check_least(1, seeds=seeds, processes=processes)
     check_least(0, first=first)
     check_least(3, seconds=seconds)

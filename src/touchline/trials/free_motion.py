@@ -10,8 +10,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from touchline.arrays import Array
+from touchline.calibrate.plan import Plan
 from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import inverse_dynamics
@@ -73,6 +75,18 @@ def random_trajectory(robot: Robot, rng: np.random.Generator) -> Trajectory:
     center = rng.uniform(lower + reach, upper - reach)
     pace = 2 * np.pi * rng.uniform(0.08, 0.25), rng.uniform(0, 2 * np.pi)
     return Trajectory(center, amplitude, frequency, rng.uniform(0, 2 * np.pi, (WAVES, n)), pace)
+
+
+def planned(plan: Plan) -> Path:
+    """The planned motion, which rests before and after."""
+    curve = CubicSpline(plan.time, plan.q, bc_type="clamped")
+
+    def at(time: Array) -> tuple[Array, Array, Array]:
+        inside = np.clip(time, 0.0, plan.time[-1])
+        moving = (inside == time)[:, None]
+        return curve(inside), curve(inside, 1) * moving, curve(inside, 2) * moving
+
+    return at
 
 
 def imperfect(robot: Robot, error: float, seed: int) -> Robot:

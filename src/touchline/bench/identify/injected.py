@@ -13,7 +13,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 from tqdm import tqdm
 
@@ -30,8 +29,7 @@ from touchline.model.robot import Robot, load_robot
 from touchline.model.transforms import rotation_rpy
 from touchline.observer.observer import Observer
 from touchline.trials.arms import load_arm
-from touchline.trials.free_motion import Path as Motion
-from touchline.trials.free_motion import random_trajectory
+from touchline.trials.free_motion import planned, random_trajectory
 from touchline.trials.wrong_arm import KINDS, WrongArm, make_wrong_arm, record
 
 NOISE = 1  # tier of the localization benchmark: 0.05 N, 0.01 Nm, 0.05 Nm
@@ -53,18 +51,6 @@ GOALS = {  # unit and what is required
     "gain": ("%", 5.0),
     "delay": ("ms", 0.2),
 }
-
-
-def planned(plan: Plan) -> Motion:
-    """The planned motion, which rests before and after."""
-    curve = CubicSpline(plan.time, plan.q, bc_type="clamped")
-
-    def at(time: Array) -> tuple[Array, Array, Array]:
-        inside = np.clip(time, 0.0, plan.time[-1])
-        moving = (inside == time)[:, None]
-        return curve(inside), curve(inside, 1) * moving, curve(inside, 2) * moving
-
-    return at
 
 
 @dataclass(frozen=True)

@@ -120,7 +120,7 @@ def _noisier(factor: float) -> Callable[[Robot, Samples, np.random.Generator], S
     return read
 
 
-def _several(robot: Robot, s: Samples, rng: np.random.Generator) -> Samples:
+def _several(_robot: Robot, s: Samples, rng: np.random.Generator) -> Samples:
     """Friction and ripple of its gears by joint; biases and gains of its sensors."""
     n, k = s.tau.shape[1], s.wrench.shape[1]
     dry, viscous = rng.uniform(*FRICTION, n), rng.uniform(*VISCOUS, n)

@@ -10,12 +10,12 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from touchline.bench.identify.injected import planned
 from touchline.bench.imperfect.faults import FAULTS, SEVERAL, Fault
 from touchline.bench.pushes.judge import Push, Tally, judge
 from touchline.bench.tables import Row, aligned
 from touchline.calibrate.plan import Plan, make_plan
 from touchline.calibrate.run import calibrate
+from touchline.errors import InputError
 from touchline.logs import write_table
 from touchline.model.robot import Robot, load_robot
 from touchline.observer.samples import Samples
@@ -23,7 +23,7 @@ from touchline.pipeline.pipeline import Pipeline
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scene import Run
 from touchline.trials.arms import described_arm
-from touchline.trials.free_motion import MotionMaker
+from touchline.trials.free_motion import COARSE, MotionMaker, planned
 from touchline.trials.recordings import EVERY, push_often
 from touchline.workers import workers
 
@@ -141,8 +141,13 @@ def main(
         first: the first of their seeds.
         seconds: length of each.
         processes: that work at a time.
-        rate: as of `Part`.
+        rate: as of `Part`, a multiple of `COARSE`.
+
+    Raises:
+        InputError: it is none, or an arm cannot be loaded or calibrated.
     """
+    if rate is not None and not (rate > 0.0 and rate % COARSE == 0.0):
+        raise InputError(f"--calibrate {rate:g}: must be a multiple of {COARSE:g} Hz")
     numbers = range(first, first + seeds)
     parts = [Part(arm, name, k, seconds, rate) for arm in arms for name in wrong for k in numbers]
     found = zip(parts, tallies(parts, processes), strict=True)

@@ -51,8 +51,8 @@ class FrictionSeen {
         const double part = std::min(1.0, dt * rows_.bandwidths[i]);
         joints_[i].follow(rows_.samples[i].speed, part, std::min(1.0, part / tuning_.trend), tuning_);
       }
-      if (!has_sensor(g)) follow_turns(g, loadable);
       const bool watched = has_sensor(g), silent = watched && posture != nullptr && is_silent(g);
+      if (!watched) follow_turns(g, loadable);
       const Spatial felt = silent ? felt_by_sensor(g, *posture) : Spatial{};
       const bool told = watched || has_turned(g), free = !watched && told && untouched(g);
       double most = 0.0;
@@ -176,10 +176,13 @@ class FrictionSeen {
       if (!joint.over || before || std::fabs(rows_.samples[i].speed) >= tuning_.reversal_speed) continue;
       if (joint.turned() < tuning_.friction_turned) continue;
       const double turn = joint.way - joint.base;
-      const bool against = off(i) * turn < 0.0;
-      const int side = against ? (turn > 0.0 ? 1 : -1) : 0;
-      if (!against) turns_[g] = std::max(0, turns_[g] - 1);
-      else if (joint.side == -side) ++turns_[g];
+      const int side = turn > 0.0 ? 1 : -1;
+      if (off(i) * turn > 0.0) {
+        turns_[g] = std::max(0, turns_[g] - 1);
+        joint.side = 0;
+        continue;
+      }
+      turns_[g] += joint.side == -side ? 1 : 0;
       joint.side = side;
     }
   }
