@@ -30,6 +30,9 @@ FLAGS = (
     "--disable-dev-shm-usage",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",  # draws in software
+    # A picture that crosses from process to process by software may come after minutes or never.
+    "--in-process-gpu",
+    "--disable-gpu-compositing",
     "--remote-debugging-port=0",
     "--remote-allow-origins=*",
     "about:blank",
