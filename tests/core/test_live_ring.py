@@ -4,11 +4,11 @@
 from pathlib import Path
 
 import pytest
-from program import COMPILER, compile_program, run_program
+from program import COMPILER, THREADED, compile_program, run_program
 
 
 @pytest.mark.skipif(COMPILER is None, reason="no C++ compiler on this machine")
-@pytest.mark.parametrize("flags", [("-O2",), ("-O1", "-g", "-fsanitize=thread")])
+@pytest.mark.parametrize("flags", [("-O2",), (*THREADED, "-g")])
 def test_what_goes_from_thread_to_thread_arrives_in_order_and_whole(tmp_path, flags):
     source, program = Path(__file__).parent / "live_ring.cpp", tmp_path / "ring"
     complaint = compile_program(source, program, *flags, "-pthread")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from program import COMPILER, compile_program, run_program
+from program import COMPILER, SANITIZED, THREADED, compile_program, run_program
 
 import touchline as tl
 from touchline.identify.rest import with_rest
@@ -17,7 +17,6 @@ ROOT = Path(__file__).parents[2]
 REST = LearnedRest(
     (-9.0, 1.0, 9.0), (-9.0, 0.0, 9.0), (0.0,) * 4 + (0.02,) + (0.0,) * 4, (0.0,) * 9
 )
-SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C++ compiler on this machine")
 
@@ -50,7 +49,7 @@ def program_lines(source, folder, *flags):
     return [line.split() for line in output.splitlines()]
 
 
-@pytest.mark.parametrize("flags", [("-O2",), ("-O1", *SANITIZERS)], ids=["plain", "sanitized"])
+@pytest.mark.parametrize("flags", [("-O2",), SANITIZED], ids=["plain", "sanitized"])
 def test_a_program_says_the_same_to_the_last_bit(replayed, flags):
     folder, robot, s = replayed
     pipeline = tl.Pipeline(robot)
@@ -67,7 +66,7 @@ def test_a_program_says_the_same_to_the_last_bit(replayed, flags):
     assert sorted(theirs, key=lambda event: event.id) == pipeline.events
 
 
-@pytest.mark.parametrize("flags", [("-O1",), ("-O1", *SANITIZERS)], ids=["plain", "sanitized"])
+@pytest.mark.parametrize("flags", [("-O1",), SANITIZED], ids=["plain", "sanitized"])
 def test_no_allocation_per_sample_and_the_same_bits_in_any_parts(replayed, flags):
     folder, _, _ = replayed
     source = Path(__file__).parent / "pipeline_no_allocation.cpp"
@@ -82,7 +81,7 @@ def test_no_allocation_per_sample_and_the_same_bits_in_any_parts(replayed, flags
 def test_one_pipeline_per_thread_is_enough(replayed):
     folder, _, _ = replayed
     source = Path(__file__).parent / "pipeline_threads.cpp"
-    complaint = compile_program(source, folder / "threads", "-O1", "-fsanitize=thread")
+    complaint = compile_program(source, folder / "threads", *THREADED)
     if "ltsan" in complaint:
         pytest.skip("the compiler has no thread sanitizer")
     assert complaint == ""

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from program import COMPILER, compile_program, run_program
+from program import COMPILER, SANITIZED, compile_program, run_program
 from robots import load_example
 
 import touchline as tl
@@ -81,8 +81,7 @@ def test_export_makes_the_folder_of_its_file(tmp_path):
 @pytest.mark.skipif(COMPILER is None, reason="no C++ compiler on this machine")
 def test_no_damage_goes_unnoticed_or_breaks_the_reader(exported, tmp_path):
     source, program = Path(__file__).parent / "robot_file.cpp", tmp_path / "program"
-    flags = ("-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
-    complaint = compile_program(source, program, *flags)
+    complaint = compile_program(source, program, *SANITIZED)
     if "lasan" in complaint or "lubsan" in complaint:
         pytest.skip("the compiler has no sanitizers")
     assert complaint == ""
