@@ -12,7 +12,6 @@ Where no six-axis sensor checks joint torques, dry friction of one joint looks l
 torque. So no such error is told: real arms have that friction.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,7 +63,7 @@ def parity_of(robot: Robot) -> Parity:
         projection, rank = _left_null(matrix)
         projections.append(projection)
         ranks.append(rank)
-        pushes.append(_pushed(robot, q))
+        pushes.append(_pushed(robot, q, matrix))
     rank = int(np.median(ranks))
     once = np.median([np.linalg.norm(p, axis=0) for p in projections], axis=0)
     always = np.max([np.linalg.norm(p, axis=0) for p in projections], axis=0)
@@ -85,44 +84,57 @@ def signal_names(robot: Robot) -> list[str]:
     return names + [f"{s.name}.{axis}" for s in robot.description.sensors for axis in s.axes]
 
 
-def response(robot: Robot, q: Array, ends: Sequence[int] | None = None) -> Array:
+def response(robot: Robot, q: Array) -> Array:
     """A(q) (measured signals, 6 segments): residuals by wrenches in world, about its origin.
 
-    Numbers in N and Nm stand side by side: a metre is the scale of an arm. `ends`: the node that is
-    touched in each segment; None: its outboard end.
+    Numbers in N and Nm stand side by side: a metre is the scale of an arm. Each segment is touched
+    at its outboard end.
     """
-    poses = robot.poses(q)
-    starts = {node.sensor: i for i, node in enumerate(robot.nodes) if node.sensor}
-    if ends is None:
-        ends = [_end(robot, name) for name in robot.segment_names]
-    rows = []
-    for j in _measured(robot):
-        node = next(i for i, n in enumerate(robot.nodes) if n.joint == robot.joint_names[j])
-        row = _joint_row(robot, poses, node)
-        felt = [node in _path(robot, end) for end in ends]
-        rows.append(np.hstack([row * f for f in felt]))
-    for name, sensor in zip(robot.sensor_names, robot.description.sensors, strict=True):
-        node = starts[name]
-        block = _wrench_to_sensor(poses[node])[[AXES.index(axis) for axis in sensor.axes]]
-        felt = [node in _path(robot, end) for end in ends]
-        rows.extend(np.hstack([block * f for f in felt]))
-    return np.array(rows).reshape(len(rows), 6 * len(ends))
+    signals = _Signals(robot, q)
+    blocks = [signals.of(_end(robot, name)) for name in robot.segment_names]
+    return np.hstack([np.zeros((len(signals.nodes), 0)), *blocks])
 
 
-def _pushed(robot: Robot, q: Array) -> Mask:
-    """Signals (measured signals,) whose error a contact shows, too, on a body that loads few."""
-    names = robot.segment_names
-    ends = [_end(robot, name) for name in names]
-    found = np.zeros(len(signal_names(robot)), dtype=bool)
+class _Signals:
+    """What each measured signal shows of a wrench, and at which node it is measured."""
+
+    def __init__(self, robot: Robot, q: Array) -> None:
+        self._robot, poses = robot, robot.poses(q)
+        starts = {node.sensor: i for i, node in enumerate(robot.nodes) if node.sensor}
+        rows, self.nodes = [np.zeros((0, 6))], []
+        for j in _measured(robot):
+            node = next(i for i, n in enumerate(robot.nodes) if n.joint == robot.joint_names[j])
+            rows.append(_joint_row(robot, poses, node)[None, :])
+            self.nodes.append(node)
+        for name, sensor in zip(robot.sensor_names, robot.description.sensors, strict=True):
+            node = starts[name]
+            rows.append(_wrench_to_sensor(poses[node])[[AXES.index(axis) for axis in sensor.axes]])
+            self.nodes += [node] * len(sensor.axes)
+        self._rows = np.vstack(rows)
+
+    def of(self, touched: int) -> Array:
+        """(signals, 6): of a wrench on a node, which those outboard of it do not feel."""
+        path = _path(self._robot, touched)
+        return self._rows * np.array([node in path for node in self.nodes])[:, None]
+
+
+def _pushed(robot: Robot, q: Array, matrix: Array) -> Mask:
+    """Signals (measured signals,) whose error a contact shows, too, on a body that loads few.
+
+    `matrix` is the response at q.
+    """
+    names, signals = robot.segment_names, _Signals(robot, q)
+    found = np.zeros(len(signals.nodes), dtype=bool)
     for body in robot.bodies:
         if body.segment not in names:
             continue
         g = names.index(body.segment)
-        matrix = response(robot, q, [*ends[:g], body.node, *ends[g + 1 :]])
-        sizes = np.linalg.svd(matrix[:, 6 * g : 6 * g + 6], compute_uv=False)
+        touched, block = matrix.copy(), signals.of(body.node)
+        touched[:, 6 * g : 6 * g + 6] = block
+        sizes = np.linalg.svd(block, compute_uv=False)
         if (sizes > VISIBLE * max(sizes.max(initial=0.0), 1e-12)).sum() >= PUSH:
             continue
-        projection, _ = _left_null(matrix)
+        projection, _ = _left_null(touched)
         found |= np.linalg.norm(projection, axis=0) < VISIBLE
     return found
 

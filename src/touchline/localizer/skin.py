@@ -2,6 +2,7 @@
 """The surfaces of all links of a robot, ready for lines and points."""
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -69,15 +70,7 @@ class Skin:
 
     def __init__(self, robot: Robot, kind: str = "collision") -> None:
         self.robot = robot
-        surfaces = mechanism_surfaces(robot.mechanism, kind)
-        self.lost, self.doubts = surfaces.lost, surfaces.doubts
-        names = set(robot.segment_names)
-        bodies = {link: body for body in robot.bodies for link in body.links}
-        self.patches = tuple(
-            _patch(robot, link, surface, bodies[link], names)
-            for link, surface in surfaces.by_link.items()
-            if link in bodies
-        )
+        self.patches, self.lost, self.doubts = _worn(robot, kind)
 
     def on(self, robot: Robot) -> "Skin":
         """The same surfaces on a robot of the same links with other sensors."""
@@ -151,6 +144,20 @@ class Skin:
         local = T[:3, :3].T @ (np.asarray(point, float) - T[:3, 3])
         row = patch.mesh.nearest_to_point(local)[0]
         return float(row[0]), T[:3, :3] @ row[2:5] + T[:3, 3]
+
+
+@lru_cache(maxsize=4)  # pipelines on one robot search the same surfaces
+def _worn(robot: Robot, kind: str) -> tuple[tuple[Patch, ...], tuple[str, ...], tuple[str, ...]]:
+    """Patches of a robot, and what is lost and doubtful of its surfaces."""
+    surfaces = mechanism_surfaces(robot.mechanism, kind)
+    names = set(robot.segment_names)
+    bodies = {link: body for body in robot.bodies for link in body.links}
+    patches = tuple(
+        _patch(robot, link, surface, bodies[link], names)
+        for link, surface in surfaces.by_link.items()
+        if link in bodies
+    )
+    return patches, surfaces.lost, surfaces.doubts
 
 
 def _patch(robot: Robot, link: str, surface: Surface, body: Body, segments: set[str]) -> Patch:
