@@ -4,8 +4,6 @@
 Nothing moves on these pages, so that the browser has time for axe-core.
 """
 
-from itertools import product
-
 import pytest
 from accessible import SCHEMES, WIDTHS, look, need_axe, serious
 from browser import until
@@ -30,17 +28,19 @@ BELOW = """(() => {
 
 
 def check(browser, server, words):
-    """The page as it opens, in the system's colours."""
+    """The page as it opens, in the system's colours, and once its window has another width."""
     need_axe()
-    for width, scheme in product(WIDTHS, SCHEMES):
-        look(browser, width, scheme)
+    for opened, scheme in zip(WIDTHS, SCHEMES, strict=True):
+        look(browser, opened, scheme)
         browser.open(server.url)
         browser.wait_for(words)
         scheme_is = "document.documentElement.dataset.mantineColorScheme"
         assert browser.run(scheme_is) == scheme
-        if width < 576:
-            until(lambda: browser.run(BELOW), pause=browser.rest, what="the panel below the view")
-        until(lambda: serious(browser) == [], pause=browser.rest, what="no finding of axe-core")
+        for width in sorted(WIDTHS, key=lambda width: width != opened):
+            look(browser, width, scheme)
+            if width < 576:
+                until(lambda: browser.run(BELOW), pause=browser.rest, what="the panel below")
+            until(lambda: serious(browser) == [], pause=browser.rest, what="no finding of axe-core")
 
 
 @pytest.mark.parametrize("kind", [InterfacePage, LivePage])
