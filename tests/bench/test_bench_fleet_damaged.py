@@ -13,8 +13,8 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks for proce
 
 
 def test_every_recording_is_accounted_for_once(tmp_path, monkeypatch):
-    monkeypatch.setattr(bench, "DAMAGED", 0.2)
-    told = bench.chaos(tmp_path, 40, kills=4, stops=2, workers=2, seed=0)
+    monkeypatch.setattr(bench, "DAMAGED", 1 / 3)
+    told = bench.chaos(tmp_path, 24, kills=4, stops=2, workers=2, seed=0)
     assert sorted(way for way in told.damages.values() if way) == sorted(DAMAGES)
     assert told.killed >= 2 and told.stopped == 2
     assert told.wrong() == []

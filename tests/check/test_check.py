@@ -4,6 +4,7 @@
 import os
 import re
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -152,19 +153,29 @@ MISTAKES = {
 }
 
 
+@pytest.fixture(scope="module")
+def told(robot, recording, tmp_path_factory):
+    """What is found where a mistake is made, by its name."""
+
+    def findings(mistake):
+        changes, _ = MISTAKES[mistake]
+        return findings_of(tmp_path_factory.mktemp("told"), robot, changed(recording, **changes))
+
+    return cache(findings)
+
+
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_a_mistake_is_named(tmp_path, robot, recording, mistake):
-    changes, words = MISTAKES[mistake]
-    findings = findings_of(tmp_path, robot, changed(recording, **changes))
+def test_a_mistake_is_named(told, mistake):
+    _, words = MISTAKES[mistake]
+    findings = told(mistake)
     assert any(all(word in line for word in words) for line in findings), findings
 
 
 @pytest.mark.parametrize(
     "mistake", ["wrist polarity", "axes swapped", "torque sign", "torques swapped", "force bias"]
 )
-def test_a_mistake_is_named_alone(tmp_path, robot, recording, mistake):
-    changes, _ = MISTAKES[mistake]
-    assert len(findings_of(tmp_path, robot, changed(recording, **changes))) == 1
+def test_a_mistake_is_named_alone(told, mistake):
+    assert len(told(mistake)) == 1
 
 
 def in_world_axes(robot, samples):

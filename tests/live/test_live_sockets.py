@@ -34,7 +34,7 @@ def opened(command, env=None, word="live;"):
 def test_reading_a_robot_listens_nowhere(tmp_path):
     assert opened(["touchline", "live", "--robot", "sara", "--source", "sim://"]) == []
     arm = make_arm(tmp_path, 6)
-    with FakeController(pushed(arm, seconds=10.0, begin=1e3)) as controller:
+    with FakeController(pushed(arm, seconds=1.0, begin=1e3)) as controller:
         source = ["--source", controller.address, "--robot", str(tmp_path / "robot.yaml")]
         assert opened(["touchline", "live", *source]) == []
 

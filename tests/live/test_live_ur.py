@@ -31,7 +31,7 @@ def arm(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def samples(arm):
-    return pushed(arm, seconds=60.0, begin=2.0)
+    return pushed(arm, seconds=20.0, begin=2.0)
 
 
 def test_no_sample_is_lost_and_all_are_as_they_were_sent(arm, samples):
