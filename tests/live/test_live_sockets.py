@@ -26,6 +26,7 @@ def opened(command, env=None, word="live;"):
                 if word in line:
                     break
             time.sleep(0.5)
+            assert process.poll() is None, "it has ended, and listens nowhere for that reason"
             return [entry for pid in family(process.pid) for entry in listening(pid)]
         finally:
             process.kill()
