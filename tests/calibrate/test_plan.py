@@ -39,6 +39,18 @@ def test_the_motion_is_its_own_derivative_and_rests_at_both_ends(plan):
     assert np.abs(plan.qd[[0, -1]]).max() < 1e-9 and np.abs(plan.qdd[[0, -1]]).max() < 1e-9
 
 
+def test_what_is_held_out_of_the_motion_is_not_what_was_fitted(plan):
+    """Most postures of the last third, which ends where the motion began, are apart from others."""
+    before, last = np.split(plan.q[::20], [2 * len(plan.q[::20]) // 3])
+    apart = np.linalg.norm(last[:, None] - before, axis=2).min(axis=1)
+    assert np.median(apart) > 0.5
+
+
+def test_the_motion_shows_many_postures(plan):
+    low, high = plan.robot.ranges
+    assert (np.ptp(plan.q, axis=0) > 0.4 * np.minimum(high - low, 4.0)).all()
+
+
 def test_every_file_holds_the_same_motion(plan, tmp_path):
     write_plan(plan, tmp_path)
     table = np.loadtxt(tmp_path / "motion.csv", delimiter=",", skiprows=1)

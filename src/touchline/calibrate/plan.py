@@ -2,8 +2,9 @@
 """A short motion that excites what shall be identified, within the limits of the arm.
 
 Each joint follows a Fourier series (Swevers et al., IEEE T-RA 13(5), 1997) whose phase starts and
-ends at rest. Of many random series that keep the limits, the one is taken whose equations tell
-most. The same equations foretell the standard errors.
+ends at rest. It runs once: a path that repeats shows no more postures, and what is held out of it
+is as what was fitted. Of many random series that keep the limits, the one is taken whose equations
+tell most. The same equations foretell the standard errors.
 """
 
 import json
@@ -25,7 +26,10 @@ from touchline.observer.samples import Samples
 
 SECONDS = 60.0
 RATE = 100.0  # samples a second
-HARMONICS, CYCLES = 5, 3  # of the series, and how often it runs
+HARMONICS = 15  # of the series: joints turn up to some 20 times
+# Amplitudes fall with the square of the harmonic's number, from about this one on: at the same speed
+# larger ones of high harmonics would reach fewer postures, smaller ones turn the joints less often.
+SLOWER = 3
 MARGIN = 0.1  # of a joint's range that stays free at either end
 SPEED_SHARE, EFFORT_SHARE = 0.5, 0.6  # of the limits
 SPEED, TIP_SPEED = 1.0, 1.0  # a joint: rad/s at most, or faster where it moves no point faster: m/s
@@ -33,7 +37,7 @@ SPREAD = 2.0  # rad; of a joint that could turn for ever
 CLEARANCE = 0.03  # m between the surfaces of bodies that are no neighbours
 POINTS = 120  # on each body, for clearances
 TRIES, WANTED = 400, 24  # random motions, and how many of those that keep the limits are compared
-LEAST = 60  # positions at which limits of torque and clearance are looked at
+LEAST = 180  # positions at which limits of torque and clearance are looked at
 ERROR_SHARE, ERROR = 0.02, 0.2  # 1 sigma left in a row: of its largest load, and Nm or N
 LINK_SIGMA = 0.1  # prior of inertias
 POSES, CANDIDATES = 12, 400
@@ -182,7 +186,8 @@ class _Space:
         poses = self.robot.poses(q)
         placed = {i: p @ poses[i][:3, :3].T + poses[i][:3, 3] for i, p in self._points.items()}
         trees = {i: KDTree(p) for i, p in placed.items()}
-        return all(float(trees[a].query(placed[b])[0].min()) > CLEARANCE for a, b in self._pairs)
+        near = (trees[a].query(placed[b], distance_upper_bound=CLEARANCE) for a, b in self._pairs)
+        return all(np.isinf(distances).all() for distances, _ in near)
 
     def _sampled(self, rng: np.random.Generator) -> dict[int, Array]:
         """Points on the surfaces of the nodes, in their frames."""
@@ -246,11 +251,11 @@ def _series(
     n = len(space.low)
     x = time / time[-1]
     # The phase rises from rest to rest, smoothly: a quintic.
-    phase = 2.0 * np.pi * CYCLES * (10 * x**3 - 15 * x**4 + 6 * x**5)
-    rate = 2.0 * np.pi * CYCLES * (30 * x**2 - 60 * x**3 + 30 * x**4) / time[-1]
-    bend = 2.0 * np.pi * CYCLES * (60 * x - 180 * x**2 + 120 * x**3) / time[-1] ** 2
+    phase = 2.0 * np.pi * (10 * x**3 - 15 * x**4 + 6 * x**5)
+    rate = 2.0 * np.pi * (30 * x**2 - 60 * x**3 + 30 * x**4) / time[-1]
+    bend = 2.0 * np.pi * (60 * x - 180 * x**2 + 120 * x**3) / time[-1] ** 2
     k = np.arange(1, HARMONICS + 1)
-    a, b = rng.normal(size=(2, HARMONICS, n)) / k[:, None]
+    a, b = rng.normal(size=(2, HARMONICS, n)) / (SLOWER + k[:, None]) ** 2
     sine, cosine = np.sin(np.outer(phase, k)), np.cos(np.outer(phase, k))
     q = sine @ a + cosine @ b
     dq = (cosine * k) @ a - (sine * k) @ b  # per rad of phase
