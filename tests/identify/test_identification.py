@@ -235,3 +235,20 @@ def test_every_step_is_that_of_a_possible_body(seed):
         away = np.eye(10)[i] * h
         slope = (body.change(step + away) - body.change(step - away)) / (2 * h)
         np.testing.assert_allclose(J[:, i], slope, atol=1e-5 * max(1.0, np.abs(J).max()))
+
+
+def test_parameters_that_are_drawn_by_what_they_cannot_explain_err_elsewhere():
+    robot = arm()
+
+    def growth(ripple):
+        s = recorded(robot)
+        s.tau[:, 1] += ripple * np.sin(4.0 * s.q[:, 1])
+        evidence = gather(robot, [[s]])
+        chooser = Chooser(evidence, np.ones(len(evidence), dtype=bool))
+        return chooser.growth_elsewhere(chooser.richest(0.03))
+
+    assert growth(0.0).max() < 1.1
+    assert growth(0.5).max() > 1.5
+    found = identify(gather(robot, [[recorded(robot)]]))
+    left = np.sqrt(np.mean(found.left() ** 2, axis=0))
+    assert (found.growth >= found.after / left - 1e-9).all()

@@ -8,9 +8,10 @@ import numpy as np
 from free_motion import free_motion
 from robots import random_robot
 
+from touchline.identify.choice import regions_of
 from touchline.identify.evidence import filtered, gather
 from touchline.identify.identification import identify, rms
-from touchline.identify.rest import grids_of, inner, learn, regions_of, with_rest
+from touchline.identify.rest import grids_of, inner, learn, with_rest
 from touchline.model.robot import Robot
 
 RIPPLE, TEETH = 0.6, 4.0  # Nm, rad/rad

@@ -27,8 +27,8 @@ from touchline.observer.samples import Samples
 SECONDS = 60.0
 RATE = 100.0  # samples a second
 HARMONICS = 15  # of the series: joints turn up to some 20 times
-# Amplitudes fall with the square of the harmonic's number, from about this one on: at the same speed
-# larger ones of high harmonics would reach fewer postures, smaller ones turn the joints less often.
+# Amplitudes fall with the square of the harmonic's number, from about this one on. At the same
+# speed larger ones of high harmonics reach fewer postures, smaller ones turn joints less often.
 SLOWER = 3
 MARGIN = 0.1  # of a joint's range that stays free at either end
 SPEED_SHARE, EFFORT_SHARE = 0.5, 0.6  # of the limits

@@ -35,7 +35,7 @@ from touchline.identify.described import description_changes, identified_robot
 from touchline.identify.evidence import filtered, gather
 from touchline.identify.frame import FrameError, find_frames, joined, with_frames
 from touchline.identify.gain import Gain, find_gains, motor_joints, multiplied, with_gains
-from touchline.identify.identification import Identification, identify, rms
+from touchline.identify.identification import Identification, identify
 from touchline.identify.rest import Rest, grids_of, with_rest
 from touchline.identify.rest import learn as learn_rest
 from touchline.model.description import CalibrationDescription, Noise, RowCalibration
@@ -284,8 +284,7 @@ def calibrate(
 
 def growth(found: Identification, rest: Rest | None = None) -> dict[str, float]:
     """By row, how much larger residuals are on data that played no part in the fit, at least 1."""
-    whole = rms(found.left()[~found.touched])
-    ratios = np.maximum(found.after / np.maximum(whole, 1e-9), 1.0)
+    ratios = found.growth.copy()
     names = found.evidence.rows.names
     for j, name in enumerate(names[: found.evidence.joints]):
         if rest is not None and name in rest.tables:

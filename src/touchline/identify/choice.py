@@ -25,6 +25,7 @@ from touchline.identify.regressor import PARAMETERS
 from touchline.identify.touches import usual_scatter
 
 FOLDS = 5  # parts of each recording, one after the other
+REGIONS = 4  # of the workspace, along each of its two widest directions
 BLOCK = 1.0  # s; residuals farther apart are taken as independent
 MOVED = 0.01  # rad/s RMS; a slower joint shows no friction
 SIGMAS = (0.01, 0.03, 0.1, 0.3)  # of inertias about the model's, from hardly free to free
@@ -61,6 +62,20 @@ def folds_of(evidence: Evidence, use: Mask, count: int = FOLDS) -> Iterator[Fold
         train = use & (part != k)
         if test.any() and train.any():
             yield Fold(train, test)
+
+
+def regions_of(evidence: Evidence, use: Mask) -> Iterator[Fold]:
+    """Parts of the workspace, each judged by what was seen of the others."""
+    centred = evidence.q - evidence.q[use].mean(axis=0)
+    directions = np.linalg.svd(centred[use], full_matrices=False)[2][:2]
+    for direction in directions:
+        along = centred @ direction
+        limits = np.quantile(along[use], np.linspace(0.0, 1.0, REGIONS + 1))
+        part = np.clip(np.searchsorted(limits, along, "right") - 1, 0, REGIONS - 1)
+        for k in range(REGIONS):
+            test, train = use & (part == k), use & (part != k)
+            if test.any() and train.any():
+                yield Fold(train, test)
 
 
 def blocks_of(evidence: Evidence) -> Index:
@@ -206,6 +221,25 @@ class Chooser:
             problems.append(tried[best])
             costs.append(told[best])
         return self.with_errors(self.fit(problems[self._simplest(costs)]))
+
+    def growth_elsewhere(self, problem: Problem) -> Array:
+        """By row (R,), how much larger residuals are where the arm was not while it was fitted.
+
+        Each part of the workspace is left out in turn. What is constant there counts for nothing:
+        a baseline takes that.
+
+        Returns:
+            The ratio to what a fit of all leaves there, at least 1.
+        """
+        whole = self._equations(problem, self.use)
+        every = whole.solve()
+        inside, outside = np.zeros((2, len(self.evidence.used)))
+        for fold in regions_of(self.evidence, self.use):
+            part, start = self.evidence.part(fold.test), self.start[fold.test]
+            others = (whole - self._equations(problem, fold.test)).solve()
+            inside += len(part) * np.var(start + applied(part, every), axis=0)
+            outside += len(part) * np.var(start + applied(part, others), axis=0)
+        return np.sqrt(np.maximum(outside / np.maximum(inside, 1e-18), 1.0))
 
     def _guessed(self) -> tuple[BodyChange, ...]:
         """First guesses at payloads that the model lacks."""

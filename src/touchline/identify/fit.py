@@ -173,6 +173,10 @@ class Equations:
         normal, gradient = self.normal + other.normal, self.gradient + other.gradient
         return Equations(self.evidence, self.problem, normal, gradient)
 
+    def __sub__(self, other: "Equations") -> "Equations":
+        normal, gradient = self.normal - other.normal, self.gradient - other.gradient
+        return Equations(self.evidence, self.problem, normal, gradient)
+
     def only(self, problem: Problem) -> "Equations":
         """The same instants with less that is free, or with other priors."""
         linear = len(self.problem.columns)

@@ -34,6 +34,8 @@ class Identification:
         train, test: (N,) the other data, and those held out.
         trained: the solution from `train` alone.
         ambiguous: rows whose bias a mass could be as well, with 1 sigma [N or Nm] of the bias then.
+        growth: (R,) how much larger residuals are than `solution` leaves them, at least 1: on data
+            held out, or where the arm was not while it was fitted.
     """
 
     evidence: Evidence
@@ -46,6 +48,7 @@ class Identification:
     test: Mask
     trained: Solution
     ambiguous: dict[int, float]
+    growth: Array
 
     @property
     def problem(self) -> Problem:
@@ -111,6 +114,8 @@ def identify(evidence: Evidence, trust: bool = False) -> Identification:
         trained = chooser.fit(problem)
     whole = Chooser(evidence, ~touched)
     solution = whole.with_errors(whole.fit(problem))
+    left = rms((evidence.residual() + applied(evidence, solution))[~touched])
+    later = after / np.maximum(left, 1e-9)
     return Identification(
         evidence,
         solution,
@@ -122,6 +127,7 @@ def identify(evidence: Evidence, trust: bool = False) -> Identification:
         test,
         trained,
         whole.ambiguous(),
+        np.maximum(later, whole.growth_elsewhere(problem)),
     )
 
 

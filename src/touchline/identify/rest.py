@@ -12,14 +12,14 @@ seen. What it learned counts only as much as suits each of these parts: where a 
 joints as well, a table may foretell nine parts and harm the tenth.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from touchline.arrays import Array, Mask
-from touchline.identify.choice import Fold, folds_of
+from touchline.identify.choice import Fold, folds_of, regions_of
 from touchline.identify.evidence import Evidence
 from touchline.identify.fit import applied
 from touchline.identify.identification import Identification, rms
@@ -34,7 +34,6 @@ SLOW = 0.05  # rad/s; below it nodes stand as closely as that, beyond ever farth
 KNOWN, UNKNOWN = 0.5, 0.9  # of the prior variance: from there on a node counts less, and not at all
 CORRELATED = 0.2  # equations closer than the filter's memory repeat each other
 LEAST = 0.05  # of the residual's usual scatter is taken as noise at least
-REGIONS = 4  # of the workspace, along each of its two widest directions
 HELPS = 0.99  # of the RMS: what a table must leave at most, in time and space it has not seen
 HUBER = 3.0  # usual sigmas beyond which an equation loses weight
 
@@ -175,20 +174,6 @@ def inner(table: LearnedRest) -> Array:
     """The torques at the nodes of a table (nodes,) without its edges."""
     whole = np.array(table.torque).reshape(len(table.q), len(table.qd))
     return whole[1:-1, 1:-1].ravel()
-
-
-def regions_of(evidence: Evidence, use: Mask) -> Iterator[Fold]:
-    """Parts of the workspace, each judged by what was seen of the others."""
-    centred = evidence.q - evidence.q[use].mean(axis=0)
-    directions = np.linalg.svd(centred[use], full_matrices=False)[2][:2]
-    for direction in directions:
-        along = centred @ direction
-        limits = np.quantile(along[use], np.linspace(0.0, 1.0, REGIONS + 1))
-        part = np.clip(np.searchsorted(limits, along, "right") - 1, 0, REGIONS - 1)
-        for k in range(REGIONS):
-            test, train = use & (part == k), use & (part != k)
-            if test.any() and train.any():
-                yield Fold(train, test)
 
 
 def with_rest(robot: Robot, tables: dict[str, LearnedRest]) -> Robot:

@@ -15,10 +15,11 @@ from touchline.arrays import Array, Mask
 from touchline.bench.identify.arms import ARMS, KINOVA, Arm
 from touchline.bench.identify.pushes import FORCE, detect
 from touchline.errors import InputError
+from touchline.identify.choice import regions_of
 from touchline.identify.evidence import Evidence, filtered, gather
 from touchline.identify.identification import identify, identify_all, rms
 from touchline.identify.payload import payload_mass
-from touchline.identify.rest import grids_of, learn, regions_of
+from touchline.identify.rest import grids_of, learn
 from touchline.logs import open_log
 from touchline.model.robot import Robot, load_robot
 from touchline.observer.samples import Samples
