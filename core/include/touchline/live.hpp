@@ -154,18 +154,17 @@ class Runner {
     return made;
   }
 
-  // Only a runner that sleeps, or is about to, has to be woken.
+  // Only a runner that sleeps, or is about to, has to be woken. Exchanges have one order: of this one and
+  // that of `sleep` the later sees the earlier, so that either the runner sees the sample or this its sleep.
   void wake() {
-    std::atomic_thread_fence(std::memory_order_seq_cst);
-    if (!asleep_.load(std::memory_order_relaxed)) return;
+    if (!asleep_.exchange(false, std::memory_order_acq_rel)) return;
     { const std::lock_guard<std::mutex> nobody_between_look_and_wait(napping_); }
     wake_.notify_one();
   }
 
   void sleep() {
     std::unique_lock<std::mutex> lock(napping_);
-    asleep_.store(true, std::memory_order_relaxed);
-    std::atomic_thread_fence(std::memory_order_seq_cst);
+    asleep_.exchange(true, std::memory_order_acq_rel);
     wake_.wait(lock, [this] { return !ring_.empty() || stopping_.load(); });
     asleep_.store(false, std::memory_order_relaxed);
   }
