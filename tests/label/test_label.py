@@ -3,6 +3,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 
@@ -223,10 +224,18 @@ def test_what_cannot_be_used_is_told(lerobot, tmp_path, capsys):
     assert "no such file" in told(tmp_path / "none")
     (tmp_path / "a.txt").write_text("x")
     assert "must be a LeRobot data set" in told(tmp_path / "a.txt")
-    one = next((lerobot / "data").rglob("*.parquet"))
+    one = shutil.copy(next((lerobot / "data").rglob("*.parquet")), tmp_path)
     assert "name the folder that holds meta/info.json" in told(one)
     (tmp_path / "empty").mkdir()
     assert "neither a LeRobot data set" in told(tmp_path / "empty")
+
+
+@pytest.mark.parametrize("part", ["meta", "data", "data/chunk-000/file-000.parquet"])
+def test_a_part_of_a_data_set_names_the_whole(lerobot, robot, part):
+    before = {path: path.read_bytes() for path in lerobot.rglob("*") if path.is_file()}
+    with pytest.raises(InputError, match=f"a part of the LeRobot data set {lerobot}; name that"):
+        label(lerobot / part, robot, None, Given())
+    assert before == {path: path.read_bytes() for path in before}
 
 
 def test_plain_parquet(robot, episodes, tmp_path):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Labels a data set of any supported kind, and tells what its sample rate costs."""
 
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -37,6 +38,9 @@ def label(
     given.check()
     if not dataset.exists():
         raise InputError(f"{dataset}: no such file")
+    whole = next((p for p in Path(os.path.abspath(dataset)).parents if is_lerobot(p)), None)
+    if whole is not None:  # features of one part would be unknown to the others
+        raise InputError(f"{dataset}: a part of the LeRobot data set {whole}; name that")
     robot = robot if isinstance(robot, Robot) else load_robot(robot)
     if out is None:
         return _in_place(dataset, robot, given, workers)
