@@ -169,6 +169,19 @@ def test_the_report_tells_what_every_row_is_like(result):
     assert {h.rate for h in result.thresholds.held_out} == {most, 10.0}
 
 
+def test_the_report_tells_how_much_of_the_postures_was_seen(result):
+    from touchline.calibrate.summary import summary_text
+
+    found, joints = result.identification, result.robot.mechanism.joints
+    ways = np.ptp(found.evidence.q[~found.touched], axis=0)
+    limits = [joints[name] for name in result.robot.joint_names]
+    turns = np.array([min(j.upper, np.pi) - max(j.lower, -np.pi) for j in limits])
+    text, shares = summary_text(result), 100.0 * ways / turns
+    assert f"joints moved over {shares.min():.0f} to {shares.max():.0f} % of their ranges" in text
+    assert f"least {result.robot.joint_names[shares.argmin()]};" in text
+    assert f"{found.growth[found.evidence.used][0]:.2f} times" in text
+
+
 def test_a_figure_shows_what_was_seen(result, tmp_path):
     pytest.importorskip("matplotlib")
     from touchline.calibrate.figure import check_figure, draw_calibration

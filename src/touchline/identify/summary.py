@@ -136,15 +136,30 @@ def _residual_lines(found: Identification) -> list[str]:
     lines = [
         f"residuals at K = {found.evidence.bandwidth:g} rad/s on data that played no part "
         f"({found.parted}), RMS",
-        f"  {'row':20} {'before':>8} {'after':>8}",
+        f"  {'row':20} {'before':>8} {'after':>8}         elsewhere",
     ]
     for row in used:
         name, is_joint = found.evidence.rows.names[row], row < found.evidence.joints
         unit = "N" if not is_joint and name.endswith(("fx", "fy", "fz")) else "Nm"
-        lines.append(f"  {name:20} {found.before[row]:8.3g} {found.after[row]:8.3g} {unit}")
+        told = f"{found.before[row]:8.3g} {found.after[row]:8.3g} {unit:2}"
+        lines.append(f"  {name:20} {told} {found.growth[row]:8.2f} times")
     joints = used[used < found.evidence.joints]
     if len(joints):
         before, after = float(found.before[joints].sum()), float(found.after[joints].sum())
         share = f" ({100 * after / before:.0f} %)" if before > 0 else ""
         lines.append(f"  {'sum over joints':20} {before:8.3g} {after:8.3g} Nm{share}")
-    return lines
+    return [*lines, *_posture_lines(found)]
+
+
+def _posture_lines(found: Identification) -> list[str]:
+    """What of its postures the arm has shown."""
+    robot = found.evidence.robot
+    low, high = robot.ranges
+    seen = np.ptp(found.evidence.q[~found.touched], axis=0)
+    shares = 100.0 * seen / np.maximum(high - low, 1e-9)
+    least = int(np.argmin(shares))
+    return [
+        "  elsewhere: how much larger they are later, or in postures that a fit left out",
+        f"  joints moved over {shares.min():.0f} to {shares.max():.0f} % of their ranges, least "
+        f"{robot.joint_names[least]}; beyond that the model may err more",
+    ]
