@@ -245,7 +245,7 @@ def test_parameters_that_are_drawn_by_what_they_cannot_explain_err_elsewhere():
         s.tau[:, 1] += ripple * np.sin(4.0 * s.q[:, 1])
         evidence = gather(robot, [[s]])
         chooser = Chooser(evidence, np.ones(len(evidence), dtype=bool))
-        return chooser.growth_elsewhere(chooser.richest(0.03))
+        return chooser.growth_elsewhere(chooser.fit(chooser.richest(0.03)))
 
     assert growth(0.0).max() < 1.1
     assert growth(0.5).max() > 1.5

@@ -29,7 +29,7 @@ RATE = 100.0  # samples a second
 HARMONICS = 15  # of the series: joints turn up to some 20 times
 # Amplitudes fall with the square of the harmonic's number, from about this one on. At the same
 # speed larger ones of high harmonics reach fewer postures, smaller ones turn joints less often.
-SLOWER = 3
+CORNER = 3
 MARGIN = 0.1  # of a joint's range that stays free at either end
 SPEED_SHARE, EFFORT_SHARE = 0.5, 0.6  # of the limits
 SPEED, TIP_SPEED = 1.0, 1.0  # a joint: rad/s at most, or faster where it moves no point faster: m/s
@@ -255,7 +255,7 @@ def _series(
     rate = 2.0 * np.pi * (30 * x**2 - 60 * x**3 + 30 * x**4) / time[-1]
     bend = 2.0 * np.pi * (60 * x - 180 * x**2 + 120 * x**3) / time[-1] ** 2
     k = np.arange(1, HARMONICS + 1)
-    a, b = rng.normal(size=(2, HARMONICS, n)) / (SLOWER + k[:, None]) ** 2
+    a, b = rng.normal(size=(2, HARMONICS, n)) / (CORNER + k[:, None]) ** 2
     sine, cosine = np.sin(np.outer(phase, k)), np.cos(np.outer(phase, k))
     q = sine @ a + cosine @ b
     dq = (cosine * k) @ a - (sine * k) @ b  # per rad of phase

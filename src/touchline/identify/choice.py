@@ -222,22 +222,24 @@ class Chooser:
             costs.append(told[best])
         return self.with_errors(self.fit(problems[self._simplest(costs)]))
 
-    def growth_elsewhere(self, problem: Problem) -> Array:
+    def growth_elsewhere(self, found: Solution) -> Array:
         """By row (R,), how much larger residuals are where the arm was not while it was fitted.
 
         Each part of the workspace is left out in turn. What is constant there counts for nothing:
         a baseline takes that.
 
+        Args:
+            found: a fit of all instants that may be used.
+
         Returns:
-            The ratio to what a fit of all leaves there, at least 1.
+            The ratio to what that leaves there, at least 1.
         """
-        whole = self._equations(problem, self.use)
-        every = whole.solve()
+        whole = self._equations(found.problem, self.use)
         inside, outside = np.zeros((2, len(self.evidence.used)))
         for fold in regions_of(self.evidence, self.use):
             part, start = self.evidence.part(fold.test), self.start[fold.test]
-            others = (whole - self._equations(problem, fold.test)).solve()
-            inside += len(part) * np.var(start + applied(part, every), axis=0)
+            others = (whole - self._equations(found.problem, fold.test)).solve()
+            inside += len(part) * np.var(start + applied(part, found), axis=0)
             outside += len(part) * np.var(start + applied(part, others), axis=0)
         return np.sqrt(np.maximum(outside / np.maximum(inside, 1e-18), 1.0))
 

@@ -114,7 +114,7 @@ def identify(evidence: Evidence, trust: bool = False) -> Identification:
         trained = chooser.fit(problem)
     whole = Chooser(evidence, ~touched)
     solution = whole.with_errors(whole.fit(problem))
-    left = rms((evidence.residual() + applied(evidence, solution))[~touched])
+    left = rms((whole.start + applied(evidence, solution))[~touched])
     later = after / np.maximum(left, 1e-9)
     return Identification(
         evidence,
@@ -127,7 +127,7 @@ def identify(evidence: Evidence, trust: bool = False) -> Identification:
         test,
         trained,
         whole.ambiguous(),
-        np.maximum(later, whole.growth_elsewhere(problem)),
+        np.maximum(later, whole.growth_elsewhere(solution)),
     )
 
 
