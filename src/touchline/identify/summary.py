@@ -154,12 +154,15 @@ def _residual_lines(found: Identification) -> list[str]:
 def _posture_lines(found: Identification) -> list[str]:
     """What of its postures the arm has shown."""
     robot = found.evidence.robot
+    lines = ["  elsewhere: how much larger they are later, or in postures that a fit left out"]
+    if not robot.joint_names:
+        return lines
     low, high = robot.ranges
     seen = np.ptp(found.evidence.q[~found.touched], axis=0)
     shares = 100.0 * seen / np.maximum(high - low, 1e-9)
     least = int(np.argmin(shares))
     return [
-        "  elsewhere: how much larger they are later, or in postures that a fit left out",
+        *lines,
         f"  joints moved over {shares.min():.0f} to {shares.max():.0f} % of their ranges, least "
         f"{robot.joint_names[least]}; beyond that the model may err more",
     ]
