@@ -60,13 +60,8 @@ class ToldEvents {
     handed_over_ = whole_.time();
     pipeline_of(from).visit_lasting([&](Event event) {
       rename(from, event);
-      if (event.doubted || is_doubted(event)) {  // the next one does not go on with it
-        doubt(event);
-        event.cleared = handed_over_;
-        tell(Happened::ended, event);
-      } else if (waiting_.size() < waiting_.capacity()) {
-        waiting_.push_back(event);
-      }
+      if (is_doubted(event)) doubt(event);
+      if (waiting_.size() < waiting_.capacity()) waiting_.push_back(event);
     });
     numbers_.count_from(next());
     numbers_.forget_all();
