@@ -115,6 +115,11 @@ class Pipeline {
   void go_on_from(const Pipeline& other, int of, int row, double baseline) {
     detector_.go_on_from(other.detector_, of, row, baseline);
   }
+  // The estimates go on with those of another pipeline; see `Observer::go_on_from`.
+  void go_on_from(const Pipeline& other, const std::vector<int>& sensors,
+                  const std::vector<std::vector<int>>& parts) {
+    observer_.go_on_from(other.observer_, sensors, parts);
+  }
   // In which state the contacts of segment g are, and which transitions there were: for tests.
   const TrackingState& tracking(int g) const { return localizer_.state(g); }
   const Observer& observer() const { return observer_; }

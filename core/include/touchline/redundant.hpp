@@ -8,9 +8,10 @@
 // out, told in `Result::faults`, and has no part in what is estimated. So is one that the others
 // contradict in what the whole robot makes of a sample, from the next sample on, for a while.
 //
-// A stand-in is warmed up from the first sample without the sensor on, and speaks as soon as it has
-// settled, 5 / K later. The whole robot speaks again 5 / K after the sensor is back. What stands on
-// the arm while nothing touches it, the one tells the other. An event that both feel is one event.
+// A stand-in begins with the last sample of the whole robot, and goes on with what that has filtered.
+// It speaks as soon as it feels something, or the whole robot has nothing to say. The whole robot
+// speaks again 5 / K after the sensor is back. What stands on the arm while nothing touches it, the one
+// tells the other. An event that both feel is one event.
 #pragma once
 
 #include <algorithm>
@@ -22,6 +23,7 @@
 #include "touchline/detail/gates/parity_watch.hpp"
 #include "touchline/detail/redundant/absent_sensors.hpp"
 #include "touchline/detail/redundant/channel_doubts.hpp"
+#include "touchline/detail/redundant/kept_sample.hpp"
 #include "touchline/detail/redundant/left_out.hpp"
 #include "touchline/detail/redundant/spoken_resets.hpp"
 #include "touchline/detail/redundant/stand_in.hpp"
@@ -47,6 +49,7 @@ class RedundantPipeline {
         resets_(whole_.row_layout(), whole_.robot().joints.size(),
                 whole_.robot().segment_names.size()),
         absent_(whole_.robot().sensors.size()),
+        last_(gates_.layout().joints, gates_.layout().sensors),
         sound_(gates_.layout().count(), Fault::none),
         faults_(sound_),
         ratios_(kAhead * sound_.size()) {
@@ -95,6 +98,7 @@ class RedundantPipeline {
           ++i;
           return !left_out_.any();
         });
+        keep(at(i - 1));
         for (; i < end; ++i, ratios += sound_.size()) {  // judged, but not taken any more
           const Result result = take(at(i), sound_, ratios);
           std::copy(result.estimate.row().begin(), result.estimate.row().end(), rows + i * width);
@@ -160,7 +164,13 @@ class RedundantPipeline {
     const Result result = whole ? whole_.update(believed) : step(believed);
     if (whole) watch_parity(result, believed.time);
     else parity_.forget();
+    keep(believed);
     return with_faults(result, faults, ratios);
+  }
+
+  // For a stand-in to begin with, if the whole robot took it.
+  void keep(const Sample& sample) {
+    if (sample.time == whole_.time()) last_.keep(sample);
   }
 
   // Of channels that pass again while they are still told nothing goes on from what they had.
@@ -222,14 +232,17 @@ class RedundantPipeline {
   Result step(const Sample& sample) {
     events_.begin();
     Deputy* const needed = absent_.any() ? deputies_.without(absent_.all()) : nullptr;
+    Deputy* const before = std::exchange(warming_, needed != now_ ? needed : nullptr);
+    if (warming_ != nullptr && warming_ != before) {
+      warming_->begin(whole_, last_.sample());
+      since_ = sample.time;
+    }
     const Result of_whole = whole_.update(sample);  // it settles anew as soon as all are back
     Result of_now = now_ != nullptr ? now_->update(sample) : of_whole;
-    Deputy* const before = std::exchange(warming_, needed != now_ ? needed : nullptr);
-    if (warming_ != nullptr && warming_ != before) warming_->learn(whole_);
     events_.end_those_that_waited();
     if (warming_ != nullptr) {
       const Result of_warming = warming_->update(sample);
-      if (settled(of_warming)) {
+      if (settled(of_warming) && is_time(of_now, of_warming)) {
         hand_over(std::exchange(warming_, nullptr));
         of_now = of_warming;
       }
@@ -243,6 +256,13 @@ class RedundantPipeline {
     return said_by_stand_in(of_now);
   }
 
+  // Does the one that warms up speak from now on? A lost packet or two are nothing. What was felt before
+  // a loss the next one feels a little later: until then nothing says that it is gone.
+  bool is_time(const Result& of_now, const Result& of_warming) const {
+    const bool feels = !of_warming.contacts.empty(), quiet = of_now.contacts.empty();
+    const bool lost = (of_now.health & kSensorExcluded) != 0;
+    return feels || (quiet && lost) || of_warming.time >= since_ + tuning().gates.continues;
+  }
   static bool settled(const Result& result) { return (result.health & kSettling) == 0; }
 
   // From now on `to` speaks; null: the whole robot.
@@ -274,6 +294,8 @@ class RedundantPipeline {
   WholeWords words_;
   SpokenResets resets_;
   AbsentSensors absent_;  // at the last sample
+  KeptSample last_;       // that the whole robot has taken
+  double since_ = kUnknown;  // when `warming_` began [s]
   std::vector<Fault> sound_, faults_;  // of channels that are all believed; of all that tell, together
   std::vector<double> ratios_;         // (kAhead, channels)
   Deputy *now_ = nullptr, *warming_ = nullptr;  // who speaks, if not the whole; who shall

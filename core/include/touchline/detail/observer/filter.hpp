@@ -83,6 +83,7 @@ class Filters {
   const double* half_change(std::size_t g) const { return half_change_.data() + groups_[g].first; }
   const double* surprise(std::size_t g) const { return surprise_.data() + groups_[g].first; }
 
+  double bandwidth(std::size_t g) const { return bandwidths_[groups_[g].bandwidth]; }
   std::size_t size() const { return value_.size(); }
   double* values() { return value_.data(); }
   // Has every row the same pole? It is for a step of `dt` [s]:
@@ -172,6 +173,12 @@ class Filters {
 
   void run() { step(keep_.data(), input_.data(), value_.data(), value_.size()); }
 
+  // Group g has filtered this since then [s], all of its rows.
+  void go_on_from(std::size_t g, const double* value, double since) {
+    std::copy_n(value, groups_[g].count, value_.begin() + groups_[g].first);
+    groups_[g].since = since;
+  }
+
   // Group g does not go on from its last value.
   void forget(std::size_t g) { groups_[g].time = kNaN; }
   void forget() {
@@ -184,7 +191,6 @@ class Filters {
   static constexpr std::size_t kMostRows = 6;  // of a group
   static constexpr double kRounding = 1e-6;    // [s] of stamps: four units of a Unix time in doubles
 
-  double bandwidth(std::size_t g) const { return bandwidths_[groups_[g].bandwidth]; }
   double pole_of(std::size_t handle, double dt) const {
     return pole(bandwidths_[handle], dt, rule_, tuning_.tustin_steps);
   }

@@ -129,6 +129,30 @@ class Observer {
   void begin_torque_anew(std::size_t j) { channels_.begin_torque_anew(j); }
   void begin_sensor_anew(std::size_t s) { channels_.begin_sensor_anew(s); }
 
+  // Goes on with what `whole` has filtered, instead of beginning anew. This is the same robot without
+  // some sensors: `sensors[s]` is sensor s in `whole`, and `parts[g]` are the segments there which are
+  // segment g here. Both have taken the same sample last, this one as its first. Filters are linear,
+  // so a segment has the sum of its parts. A joint that loses a sensor outboard has what its torque
+  // leaves over the filtered wrenches of those that are left, projected at this instant: a ghost of
+  // order |w| |F| / K for 1 / K. What `whole` does not know begins anew. No allocation.
+  void go_on_from(const Observer& whole, const std::vector<int>& sensors,
+                  const std::vector<std::vector<int>>& parts) {
+    const Filters &from = whole.channels_.filters, &to = channels_.filters;
+    const bool one_pole = from.alike() && to.alike() && from.bandwidth(0) == to.bandwidth(0);
+    if (!(now_.time == whole.now_.time) || !one_pole || from.doubtful()) return;
+    for (std::size_t g = 0; g < parts.size(); ++g) add_up(whole, g, parts[g]);
+    for (std::size_t s = 0; s < sensors_.size(); ++s) {
+      const auto t = static_cast<std::size_t>(sensors[s]);
+      if (channels_.kind(s) == whole.channels_.kind(t) && channels_.kind(s) != Channels::SensorFilter::none)
+        copy(whole, whole.channels_.sensor_filter(t), channels_.sensor_filter(s));
+    }
+    for (std::size_t j = 0; j < joints_.size(); ++j) {
+      copy(whole, whole.channels_.external(j), channels_.external(j));
+      compare_anew(whole, channels_.own(j), j, layout_.outboard_sensors[j], whole.layout_.outboard_sensors[j], sensors);
+      compare_anew(whole, channels_.parity(j), j, layout_.inboard_sensors[j], whole.layout_.inboard_sensors[j], sensors);
+    }
+  }
+
   const RowLayout& row_layout() const { return row_; }
   const Layout& layout() const { return layout_; }
   const Tree& tree() const { return tree_; }
@@ -407,6 +431,59 @@ class Observer {
       std::copy_n(e + balances.group(balance).first, 6,
                   inputs + filters.group(channels_.sensor_filter(s)).first);
     }
+  }
+
+  // Takes the value of a filter of another one.
+  void copy(const Observer& whole, std::size_t from, std::size_t to) {
+    const Filters& filters = whole.channels_.filters;
+    if (!filters.group(from).present || !channels_.filters.group(to).present) return;
+    channels_.filters.go_on_from(to, filters.value(from), filters.group(from).since);
+  }
+
+  // The filter of segment g takes the sum of those of its parts.
+  void add_up(const Observer& whole, std::size_t g, const std::vector<int>& parts) {
+    const Filters& filters = whole.channels_.filters;
+    double sum[6] = {}, since = -std::numeric_limits<double>::infinity();
+    bool known = channels_.filters.group(channels_.segment_filter(g)).present;
+    for (const int part : parts) {
+      const std::size_t filter = whole.channels_.segment_filter(static_cast<std::size_t>(part));
+      known = known && filters.group(filter).present;
+      since = std::max(since, filters.group(filter).since);
+      for (int i = 0; i < 6; ++i) sum[i] += filters.value(filter)[i];
+    }
+    if (known && !parts.empty()) channels_.filters.go_on_from(channels_.segment_filter(g), sum, since);
+  }
+
+  // A filter of what torque j leaves over the loads of `pairs`; `before`: of `whole` (with other numbers
+  // of sensors), which has the same filter at the same place among those of its joints.
+  void compare_anew(const Observer& whole, std::size_t filter, std::size_t j,
+                    const std::vector<Projection>& pairs, const std::vector<Projection>& before,
+                    const std::vector<int>& sensors) {
+    Filters& filters = channels_.filters;
+    const auto same = [&](const Projection& a, const Projection& b) {
+      return a.line == b.line && sensors[static_cast<std::size_t>(a.sensor)] == b.sensor;
+    };
+    if (std::equal(pairs.begin(), pairs.end(), before.begin(), before.end(), same)) {
+      copy(whole, filter, filter);
+      return;
+    }
+    const Filters::Group& external = filters.group(channels_.external(j));
+    if (!external.present || !filters.group(filter).present) return;
+    double value = *filters.value(channels_.external(j)), since = external.since;
+    const double* lines = before_ + terms_.at().subspaces();
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      const bool branch = filter == channels_.parity(j) && k > 0;  // it loads the sensor, but not the joint
+      for (const int g : layout_.segments_outboard[static_cast<std::size_t>(pairs[k].sensor)]) {
+        const std::size_t segment = channels_.segment_filter(static_cast<std::size_t>(g));
+        if (!filters.group(segment).present) return;
+        since = std::max(since, filters.group(segment).since);
+        double load = 0.0;
+        for (std::size_t i = 0; i < 6; ++i)
+          load += lines[i * terms_.at().lines + static_cast<std::size_t>(pairs[k].line)] * filters.value(segment)[i];
+        value -= branch ? -load : load;
+      }
+    }
+    filters.go_on_from(filter, &value, since);
   }
 
   const Tree tree_;

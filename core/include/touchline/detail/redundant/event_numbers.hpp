@@ -5,6 +5,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -41,13 +42,13 @@ class EventNumbers {
   int of(const Pipeline& pipeline, int own, bool keeps) {
     if (const Numbered* n = find(pipeline, own)) return n->told;
     if (keeps && own >= next_) return own;
-    if (!full()) numbered_.push_back({&pipeline, own, next_});
+    if (!full()) numbered_.push_back({&pipeline, own, next_, false, {}});
     return next_++;
   }
 
   // It goes on with an event.
   void go_on(const Pipeline& of, int own, const Event& with) {
-    numbered_.push_back({&of, own, with.id, true, with.detected, with.decided, with.level});
+    numbered_.push_back({&of, own, with.id, true, with});
   }
 
   void forget(const Pipeline& of, int own) {
@@ -58,27 +59,60 @@ class EventNumbers {
   }
   void forget_all() { numbered_.clear(); }
 
-  // What an event, or a contact of one, takes over of the one that it goes on with.
-  void take_over(const Pipeline& of, int own, Event& event) const {
+  // What an event, or a contact of one, takes over of the one that it goes on with. `segment`: who
+  // speaks knows no better than the one before on which segment it is.
+  void take_over(const Pipeline& of, int own, bool segment, Event& event) const {
     const Numbered* n = find(of, own);
     if (n == nullptr || !n->continues) return;
-    event.detected = n->detected;
-    event.level = std::max(event.level, n->level);
-    if (n->decided == n->decided) event.decided = n->decided;
+    const Event& before = n->before;
+    if (segment) event.segment = before.segment;
+    event.detected = before.detected;
+    event.level = std::max(event.level, before.level);
+    if (before.decided == before.decided) event.decided = before.decided;
+    if (before.status == Status::located && event.status != Status::located)
+      take_place(before, event);
+    event.doubted = event.doubted && before.doubted;
+    if (event.clamped != Clamped::yes) event.clamped = before.clamped;
+    event.rate = std::fmax(event.rate, before.rate);
+    take_forces(before, event);
   }
   void take_over(const Pipeline& of, int own, Contact& contact) const {
     const Numbered* n = find(of, own);
-    if (n != nullptr && n->continues) contact.level = std::max(contact.level, n->level);
+    if (n != nullptr && n->continues) contact.level = std::max(contact.level, n->before.level);
   }
 
  private:
   struct Numbered {
     const Pipeline* of;
     int own, told;
-    bool continues = false;  // with an event that had been detected then:
-    double detected = kUnknown, decided = kUnknown;  // [s]
-    ContactLevel level = ContactLevel::contact;
+    bool continues = false;  // with an event, as that was told last:
+    Event before;
   };
+
+  // It was located when there were more sensors.
+  static void take_place(const Event& before, Event& event) {
+    event.status = before.status;
+    event.link = before.link;
+    event.body_probability = before.body_probability;
+    event.position = before.position;
+    event.position_link = before.position_link;
+    event.time_of_position = before.time_of_position;
+    event.position_std = before.position_std;
+    event.candidates = before.candidates;
+    event.zone = before.zone;
+    event.rank = before.rank;
+    event.unknowns = before.unknowns;
+  }
+
+  // Of a segment whose sensor is lost no force is known. The largest ones are those of the whole event.
+  static void take_forces(const Event& before, Event& event) {
+    if (std::isnan(event.force.x)) event.force = before.force;
+    event.force_peak = std::fmax(event.force_peak, before.force_peak);
+    if (event.joint < 0 || before.torque_peak > event.torque_peak) {
+      event.joint = before.joint;
+      event.torque_peak = before.torque_peak;
+    }
+  }
 
   const Numbered* find(const Pipeline& of, int own) const {
     for (const Numbered& n : numbered_) {

@@ -57,9 +57,16 @@ class Deputy {
         pipeline_(std::move(of.robot), whole.tuning()),
         wrench_(6 * given_.sensors.size()),
         without_(whole.robot().sensors.size(), 0),
-        told_as_(whole.robot().segment_names.size(), -1) {
+        told_as_(whole.robot().segment_names.size(), -1),
+        parts_(given_.segments.size()) {
     for (const int s : given_.lost) without_[s] = 1;
     find_parts(whole.observer().layout());
+    for (std::size_t g = 0; g < parts_.size(); ++g) {
+      if (pipeline_.observer().layout().segments[g].sensor < 0) continue;
+      for (std::size_t part = 0; part < told_as_.size(); ++part) {
+        if (told_as_[part] == given_.segments[g]) parts_[g].push_back(static_cast<int>(part));
+      }
+    }
   }
 
   // Without its robot, which the pipeline has.
@@ -96,6 +103,14 @@ class Deputy {
     }
   }
 
+  // Begins with the last sample that `whole` has taken: what that has learned and filtered goes on.
+  void begin(const Pipeline& whole, const Sample& last) {
+    learn(whole);
+    update(last);
+    pipeline_.go_on_from(whole, given_.sensors, parts_);
+  }
+
+ private:
   // Tells it what stands on the arm while nothing touches it, as `whole` has learned that.
   void learn(const Pipeline& whole) {
     used_ = true;
@@ -108,7 +123,6 @@ class Deputy {
     }
   }
 
- private:
   // Which segments of the whole robot are one here.
   void find_parts(const Layout& whole) {
     const Layout& own = pipeline_.observer().layout();
@@ -162,6 +176,7 @@ class Deputy {
   std::vector<double> wrench_;
   std::vector<char> without_;  // per sensor of the whole robot
   std::vector<int> told_as_;   // per segment of the whole robot
+  std::vector<std::vector<int>> parts_;  // per segment of its own: those of the whole robot; the root: none
   bool used_ = false;          // has it been told anything?
 };
 

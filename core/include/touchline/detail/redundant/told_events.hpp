@@ -125,8 +125,8 @@ class ToldEvents {
     const Pipeline& of = pipeline_of(speaker);
     const int own = event.id;
     event.id = numbers_.of(of, own, speaker == nullptr);
-    numbers_.take_over(of, own, event);
     event.segment = told_segment(speaker, event.segment);
+    numbers_.take_over(of, own, speaker != nullptr, event);
   }
 
   // An event has begun: is it one of those that wait?
