@@ -243,11 +243,11 @@ class RedundantPipeline {
     if (warming_ != nullptr) {
       const Result of_warming = warming_->update(sample);
       if (settled(of_warming) && is_time(of_now, of_warming)) {
-        hand_over(std::exchange(warming_, nullptr));
+        hand_over(of_now, std::exchange(warming_, nullptr));
         of_now = of_warming;
       }
     } else if (now_ != nullptr && !absent_.any() && settled(of_whole)) {
-      hand_over(nullptr);
+      hand_over(of_now, nullptr);
       of_now = of_whole;
     }
     if (now_ == nullptr) return said_by_whole(of_now);
@@ -265,8 +265,11 @@ class RedundantPipeline {
   }
   static bool settled(const Result& result) { return (result.health & kSettling) == 0; }
 
-  // From now on `to` speaks; null: the whole robot.
-  void hand_over(Deputy* to) { events_.hand_over(std::exchange(now_, to), to); }
+  // From now on `to` speaks; null: the whole robot. `last`: what the one before makes of this sample.
+  void hand_over(const Result& last, Deputy* to) {
+    events_.take(now_, last.events);
+    events_.hand_over(std::exchange(now_, to), to);
+  }
 
   Result said_by_stand_in(const Result& r) {
     events_.find_continued(now_, r.events);
