@@ -15,7 +15,7 @@ SIGNALS = ("q", "qd", "tau", "wrench")
 SPIKE = {"q": 3.0, "qd": 2.0, "tau": 80.0, "fx": 300.0, "mx": 80.0}  # rad, rad/s, Nm, N, Nm
 BIAS = {"q": 0.05, "qd": 0.2, "tau": 5.0, "fx": 15.0, "mx": 3.0}
 DRIFT = {"q": 0.05, "qd": 0.2, "tau": 5.0, "fx": 15.0, "mx": 3.0}  # per second
-SHORT, LONG = 0.3, 1.4  # s that a fault lasts
+SHORT, LONG, LONGEST = 0.3, 1.4, 2.2  # s that a fault lasts
 DELAY = 0.02  # s
 AT_ONCE, SOON, SLOW, SLOWEST = 0.0015, 0.05, 1.0, 2.0  # s within which a fault is to be told
 
@@ -195,8 +195,8 @@ FAULTS = (
     FaultType("delay", _delay, LOADS, SLOW, SIGN_TO_DELAY, LONG),
     FaultType("swapped axes", _swap, ("sensor",), SLOW, SIGN_TO_DELAY, LONG),
     FaultType("coarse", _coarse, LOADS, SLOW, SIGN_TO_DELAY, LONG),
-    FaultType("bias", _bias, LOADS, SLOWEST, WANDERS, LONG),
-    FaultType("drift", _drift, LOADS, SLOWEST, WANDERS, LONG),
+    FaultType("bias", _bias, LOADS, SLOWEST, WANDERS, LONGEST),
+    FaultType("drift", _drift, LOADS, SLOWEST, WANDERS, LONGEST),
     FaultType("NaN", _nan, ALL, AT_ONCE, ABSENT),
     FaultType("infinite", _infinite, ALL, AT_ONCE, ABSENT),
     FaultType("absurd", _absurd, ALL, AT_ONCE, ABSENT),

@@ -18,10 +18,11 @@ from touchline.errors import InputError
 from touchline.model.robot import Robot
 from touchline.native import core
 from touchline.pipeline.pipeline import Pipeline
-from touchline.trials.faults import FAULTS, Channel, FaultType, cases_of, channels_of
+from touchline.trials.faults import FAULTS, LONGEST, Channel, FaultType, cases_of, channels_of
 from touchline.trials.recordings import PHASES, record, robot_named
 from touchline.workers import workers
 
+SECONDS = max(PHASES.values()) + LONGEST + 0.1  # of a recording: each fault ends in it
 _P = TypeVar("_P")
 _R = TypeVar("_R")
 NUMBERS = tuple(
@@ -120,7 +121,8 @@ def run_part(part: Part, folder: Path | None) -> list[Outcome]:
         outcome = done.get((fault.name, channel.name, phase[0]))
         if outcome is None:
             if pipeline is None:
-                pipeline, recording = Pipeline(robot), record(robot, part.seed)
+                pipeline = Pipeline(robot)
+                recording = record(robot, part.seed, seconds=SECONDS)
                 healthy = listen(pipeline, recording.samples)
             assert recording is not None and healthy is not None
             outcome = judge(pipeline, recording, healthy, fault, channel, phase)

@@ -45,8 +45,9 @@ class Outcome:
         told: after how long the fault was told [s]; inf: never.
         named: the channel itself was named, or the sample was told as absent.
         harmless: events are those of the healthy recording.
-        phantoms: events that the healthy recording does not have.
-        again: of those, events that began during the push: it was told twice, late or otherwise.
+        phantoms: events that the healthy recording does not have, at no level.
+        again: of those, events that began during the push: it was told twice or late.
+        weaker: events of the healthy recording that are told as a contact, not as a collision.
         collisions: of the phantoms, those that became a collision while nothing touched the arm, or
             where the healthy recording has no collision.
         wrong: events with a sure body that is neither the touched one nor what the healthy
@@ -67,6 +68,7 @@ class Outcome:
     harmless: bool = False
     phantoms: int = 0
     again: int = 0
+    weaker: int = 0
     collisions: int = 0
     wrong: int = 0
     lost: int = 0
@@ -113,11 +115,14 @@ def judge(
     seconds = perf_counter() - clock
     first = int(np.searchsorted(recording.samples.time, begin - 1e-9))
     time = recording.samples.time
-    news = (said.estimate.health & ~healthy.estimate.health & TELLS) != 0
-    told = np.flatnonzero(news[first:])
-    phantoms = [e for e in said.events if not any(_same(e, other) for other in healthy.events)]
+    tells = (said.estimate.health & ~healthy.estimate.health & TELLS) != 0
+    told = np.flatnonzero(tells[first:])
+    news = [e for e in said.events if not any(_same(e, other) for other in healthy.events)]
     lost = [e for e in healthy.events if not any(_same(other, e) for other in said.events)]
-    sure = [e for e in phantoms if _sure(e)]
+    weaker = [e for e in news if any(_weaker(e, other) for other in lost)]
+    phantoms = [e for e in news if e not in weaker]
+    lost = [e for e in lost if not any(_weaker(other, e) for other in weaker)]
+    sure = [e for e in news if _sure(e)]
     bodies = {recording.body, *(e.body for e in healthy.events if _sure(e))}
     hard = any(e.level == ContactLevel.COLLISION for e in healthy.events)
     return Outcome(
@@ -128,9 +133,10 @@ def judge(
         finite=_finite(said.estimate),
         told=float(time[first + told[0]] - time[first]) if len(told) else np.inf,
         named=any(c.startswith(channel.name) for c in said.named) or fault.group.startswith("abs"),
-        harmless=not phantoms and not lost,
+        harmless=not news and not lost,
         phantoms=len(phantoms),
         again=sum(map(_in_push, phantoms)),
+        weaker=len(weaker),
         collisions=sum(
             e.level == ContactLevel.COLLISION and not (hard and _hits_in_push(e)) for e in phantoms
         ),
@@ -163,9 +169,15 @@ def _hits_in_push(event: Event) -> bool:
 
 
 def _same(event: Event, other: Event) -> bool:
-    if event.segment != other.segment or event.level != other.level:
-        return False
-    return abs(event.detected - other.detected) <= SAME
+    return event.level == other.level and _at_once(event, other)
+
+
+def _weaker(event: Event, other: Event) -> bool:
+    return other.level == ContactLevel.COLLISION != event.level and _at_once(event, other)
+
+
+def _at_once(event: Event, other: Event) -> bool:
+    return event.segment == other.segment and abs(event.detected - other.detected) <= SAME
 
 
 def _finite(estimate: Estimate) -> bool:

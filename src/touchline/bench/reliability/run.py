@@ -180,7 +180,7 @@ def _by_fault(found: list[Outcome]) -> list[Row]:
     rows: list[Row] = [
         (
             *("fault", "runs", "told in time", "harmless", "median"),
-            *("phantoms", "again", "collisions", "wrong"),
+            *("phantoms", "again", "weaker", "collisions", "wrong"),
         )
     ]
     groups: dict[str, list[Outcome]] = defaultdict(list)
@@ -197,6 +197,7 @@ def _by_fault(found: list[Outcome]) -> list[Row]:
                 f"{1e3 * np.median(told):.0f} ms" if told else "never",
                 str(sum(o.phantoms > 0 for o in part)),
                 str(sum(o.again > 0 for o in part)),
+                str(sum(o.weaker > 0 for o in part)),
                 str(sum(o.collisions > 0 for o in part)),
                 str(sum(o.wrong > 0 for o in part)),
             )
@@ -253,7 +254,7 @@ types, channels and phases {count} were drawn at random.
 *In time* is the same sample for spikes and what is absent, 50 ms for what is stuck or wild, 1 s for
 signs, scales and delays, 2 s for biases. *Harmless*: events are those without the fault. A
 *phantom* is an event that is not among those. *Again*: phantoms that began during the push, which
-was told twice, late or otherwise. A phantom *collision* became one while nothing touched the arm,
+was told twice or late. *Weaker*: a collision is told in time, but as a contact. A phantom *collision* became one while nothing touched the arm,
 or where the healthy recording has no collision. A *wrong* link is one that is at least 90 % sure,
 is not the touched one, and is not what the healthy recording says either. In *healthy motion* each
 arm is pushed every {every:g} s with 8 to 40 N, for 0.2 to 1.2 s; each channel that is told counts.
@@ -279,7 +280,7 @@ what is estimated where a sensor inboard contradicts it.
 
 A push does so where it passes near a sensor's axis. But a wrong sign, scale or delay is wrong by no
 more than a few times what the channel carries. An axis that is wrong by more, where a contact
-explains all as well, is told after a second; two axes that do not differ as swapped ones do, too.
+explains all as well, is told after 1.8 s; two axes that do not differ as swapped ones do, too.
 So a push that is told as a fault is one along an axis that carries about as much. Where a push lets
 go errors of the model alone are left. There a channel is told only if it is wrong by more than the
 threshold of a contact. For two seconds a channel that is told does not count.

@@ -111,8 +111,9 @@ class SuspectWatch {
   static constexpr double kOut = 2.0;     // [s] for which it tells nothing after that
   static constexpr double kDwell = 0.02;  // [s] for which it explains all: a contact rises to more
   // [s] of what may be a push, too. Biases and drifts are all that is wrong by more than a multiple: of
-  // the two seconds in which these are to be told it takes half.
-  static constexpr double kLasts = 1.0;
+  // the two seconds in which these are to be told it leaves a tenth. Half: leaning on the first link for
+  // a second is told as a fault.
+  static constexpr double kLasts = 1.8;
   // Times what a channel carries: a wrong sign is wrong by twice of it, and filters and noise by the rest.
   static constexpr double kMultiple = 3.0;
   // Of the error: a fault that comes at once brings this part within one sample. A push that rises in
