@@ -11,7 +11,7 @@ import touchline as tl
 from touchline.model.description import SensorDescription
 from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
-from touchline.trials.recordings import PUSHED, record
+from touchline.trials.recordings import PUSHED, RELEASED, record
 
 RATE = 1000.0
 DEAD = 0.3  # s at which the sensor dies
@@ -305,3 +305,72 @@ def test_a_push_whose_sensor_is_lost_meanwhile_does_not_rest_there(held):
     assert (
         np.abs(detection.normalized[-200:]).mean(axis=0).max() < 0.7
     )  # nothing has become an offset
+
+
+@pytest.mark.parametrize(("name", "dead"), CASES)
+def test_a_push_in_the_very_sample_that_loses_a_sensor_is_felt_at_once(name, dead):
+    robot = robot_named(name)
+    q = np.linspace(0.3, 0.9, len(robot.joint_names))
+    link = "forearm_link" if name == "ur5" else "link4"
+    samples = pushed(robot, q, link, np.array([5.0, 15.0, -20.0]))
+    whole, pipeline = tl.Pipeline(robot), tl.Pipeline(robot)
+    run(whole, samples)
+    run(pipeline, without(samples, dead, PUSH))
+    (clean,), (event,) = whole.events, pipeline.events
+    assert event.detected <= clean.detected + 0.005
+
+
+@pytest.mark.parametrize("dead", [1, 2])
+@pytest.mark.parametrize("lost", [PUSHED - 0.2, PUSHED + 0.2])
+def test_who_steps_in_goes_on_with_what_was_filtered(held, dead, lost):
+    """The oracle: the robot without the sensor, which has listened from the beginning."""
+    from touchline.pipeline.stand_ins import robot_without
+
+    s, rest = held.samples, robot_without(held.robot, [dead])
+    alone = tl.Observer(rest)
+    oracle = alone.run(s.time, s.q, s.qd, s.tau, np.delete(s.wrench, dead, axis=1))
+    pipeline = tl.Pipeline(held.robot)
+    estimate, _ = run(pipeline, without(s, dead, lost, np.inf))
+    merged = dead - 1  # the segment inboard
+    told = s.time >= lost + 0.01  # ten samples later it speaks, or soon after that
+    told &= estimate.segment_settled[:, merged].astype(bool)
+    assert told.sum() > 0.9 * np.sum(s.time >= lost + 0.01)
+    same = rest.segment_names.index(held.robot.segment_names[merged])
+    np.testing.assert_allclose(
+        estimate.segment_wrench[told, merged], oracle.segment_wrench[told, same], atol=1e-9
+    )
+    np.testing.assert_allclose(estimate.tau_ext[told], oracle.tau_ext[told], atol=1e-9)
+    # A sensor's wrench turns with the arm: projected at one instant, a ghost of |w| |F| / K is left.
+    ghost = 0.5 * 25.0 / 100.0 * 1.0  # rad/s, N, rad/s, a lever of 1 m: [Nm]
+    away = np.abs(estimate.segment_torque[told] - oracle.segment_torque[told])
+    known = [joint.measured for joint in rest.description.joints]
+    assert away[:, known].max() < ghost
+    np.testing.assert_allclose(away[-500:, known], 0.0, atol=1e-9)
+
+
+def test_an_event_keeps_the_place_that_it_had_when_there_were_more_sensors(held):
+    whole, pipeline = tl.Pipeline(held.robot), tl.Pipeline(held.robot)
+    run(whole, held.samples)
+    run(pipeline, without(held.samples, 0, RELEASED - 0.05, np.inf))
+    (healthy,), (event,) = whole.events, pipeline.events
+    assert healthy.status == event.status == "located" and healthy.level == event.level
+    assert (event.segment, event.body) == (healthy.segment, healthy.body)
+    assert event.detected == healthy.detected and event.force_peak == healthy.force_peak
+    np.testing.assert_allclose(event.position_link, healthy.position_link, atol=0.001)
+
+
+@pytest.mark.parametrize("dead", [0, 1, 2])
+def test_single_lost_packets_take_no_contact_away(held, dead):
+    s = held.samples
+    wrench = s.wrench.copy()
+    wrench[::10, dead] = np.nan
+    pipeline = tl.Pipeline(held.robot)
+    told, felt = [], []
+    for x in zip(s.time, s.q, s.qd, s.tau, wrench, strict=True):
+        result = pipeline.update(*x)
+        told += [str(change.happened) for change in result.events]
+        felt.append(len(result.contacts) > 0)
+    (event,) = pipeline.events
+    assert told.count("began") == told.count("ended") == 1
+    lasts = (s.time >= event.detected) & (s.time < RELEASED)
+    assert np.all(np.array(felt)[lasts])

@@ -61,11 +61,11 @@ def faulty(robot, samples, name, channel, begin):
 
 @pytest.mark.parametrize(
     ("name", "within"),  # a push along a base sensor's axis rises as its force drifts, but is brief
-    [("base.fx", 1.2), ("base.fz", 1.2), ("tau.joint4", 0.2)],
+    [("base.fx", 2.0), ("base.fz", 2.0), ("tau.joint4", 0.2)],
 )
 def test_a_channel_that_alone_explains_what_is_felt_is_named(arm, name, within):
     robot, pipeline, _ = arm
-    samples = record(robot, 1, pushed=False, seconds=2.0).samples
+    samples = record(robot, 1, pushed=False, seconds=3.0).samples
     wrong = drifting(robot, samples, name)
     _, told, events = heard(pipeline, wrong)
     assert told[0].channel == name and told[0].fault == Fault.SUSPECT
@@ -126,16 +126,16 @@ def test_a_push_along_an_axis_that_turns_stays_one_event(more):
     assert events[0].cleared > BEGIN + 0.9
 
 
-def test_what_a_push_might_be_is_told_after_a_second():
+def test_what_a_push_might_be_is_told_when_most_pushes_are_over():
     """A force axis drifts beyond all that it carries, as slowly as a hand may push."""
     robot = robot_named("ur5")
     settings = Run(seed=3, noise=SensorNoise(), model_error=0.02, physics=2000.0)
-    samples = scripted(robot, [], 2.4, 0.5, settings).samples
+    samples = scripted(robot, [], 3.0, 0.5, settings).samples
     first = int(np.searchsorted(samples.time, BEGIN))
     samples.wrench[first:, 0, 0] -= np.minimum(150.0 * (samples.time[first:] - BEGIN), 12.0)
     _, told, events = heard(tl.Pipeline(robot), samples)
     assert {change.channel for change in told} == {"base.fx"}
-    assert BEGIN + 0.95 < samples.time[told[0].sample] < BEGIN + 1.3
+    assert BEGIN + 1.75 < samples.time[told[0].sample] < BEGIN + 2.0
     assert all(event.level == "contact" for event in events)
 
 

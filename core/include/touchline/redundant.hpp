@@ -9,9 +9,10 @@
 // contradict in what the whole robot makes of a sample, from the next sample on, for a while.
 //
 // A stand-in begins with the last sample of the whole robot, and goes on with what that has filtered.
-// It speaks as soon as it feels something, or the whole robot has nothing to say. The whole robot
-// speaks again 5 / K after the sensor is back. What stands on the arm while nothing touches it, the one
-// tells the other. An event that both feel is one event.
+// It speaks once a few samples are lost, as soon as it feels something or nothing was felt before. The
+// whole robot speaks again 5 / K after the sensor is back; the stand-in listens until what it felt has
+// ended. What stands on the arm while nothing touches it, the one tells the other. An event that both
+// feel is one event.
 #pragma once
 
 #include <algorithm>
@@ -151,7 +152,7 @@ class RedundantPipeline {
   // Does the whole robot speak for itself, with all sensors and its own numbers of events?
   bool healthy() const {
     return now_ == nullptr && warming_ == nullptr && !absent_.any() && !left_out_.any() &&
-           events_.plain();
+           events_.plain() && !listening_;
   }
 
   // A sample of which the gates believe `judged`.
@@ -250,18 +251,29 @@ class RedundantPipeline {
       hand_over(of_now, nullptr);
       of_now = of_whole;
     }
+    listen(sample);
     if (now_ == nullptr) return said_by_whole(of_now);
     // What is wrong with the sample itself, the whole robot tells.
     of_now.health |= (of_whole.health & ~kSettling) | kSensorExcluded;
     return said_by_stand_in(of_now);
   }
 
+  // Those who spoke before listen until nothing that they felt lasts: they may speak again.
+  void listen(const Sample& sample) {
+    listening_ = false;
+    deputies_.visit([&](Deputy& deputy) {
+      if (!deputy.feels() || &deputy == now_ || &deputy == warming_) return;
+      deputy.update(sample);
+      listening_ = true;
+    });
+  }
+
   // Does the one that warms up speak from now on? A lost packet or two are nothing. What was felt before
   // a loss the next one feels a little later: until then nothing says that it is gone.
   bool is_time(const Result& of_now, const Result& of_warming) const {
-    const bool feels = !of_warming.contacts.empty(), quiet = of_now.contacts.empty();
     const bool lost = (of_now.health & kSensorExcluded) != 0;
-    return feels || (quiet && lost) || of_warming.time >= since_ + tuning().gates.continues;
+    const bool feels = !of_warming.contacts.empty(), quiet = of_now.contacts.empty();
+    return lost && (feels || quiet || of_warming.time >= since_ + tuning().gates.continues);
   }
   static bool settled(const Result& result) { return (result.health & kSettling) == 0; }
 
@@ -299,6 +311,7 @@ class RedundantPipeline {
   AbsentSensors absent_;  // at the last sample
   KeptSample last_;       // that the whole robot has taken
   double since_ = kUnknown;  // when `warming_` began [s]
+  bool listening_ = false;   // does any that has spoken before?
   std::vector<Fault> sound_, faults_;  // of channels that are all believed; of all that tell, together
   std::vector<double> ratios_;         // (kAhead, channels)
   Deputy *now_ = nullptr, *warming_ = nullptr;  // who speaks, if not the whole; who shall

@@ -254,10 +254,11 @@ types, channels and phases {count} were drawn at random.
 *In time* is the same sample for spikes and what is absent, 50 ms for what is stuck or wild, 1 s for
 signs, scales and delays, 2 s for biases. *Harmless*: events are those without the fault. A
 *phantom* is an event that is not among those. *Again*: phantoms that began during the push, which
-was told twice or late. *Weaker*: a collision is told in time, but as a contact. A phantom *collision* became one while nothing touched the arm,
-or where the healthy recording has no collision. A *wrong* link is one that is at least 90 % sure,
-is not the touched one, and is not what the healthy recording says either. In *healthy motion* each
-arm is pushed every {every:g} s with 8 to 40 N, for 0.2 to 1.2 s; each channel that is told counts.
+was told twice or late. *Weaker*: a collision is told in time, but as a contact. A phantom
+*collision* became one while nothing touched the arm, or where the healthy recording has no
+collision. A *wrong* link is one that is at least 90 % sure, is not the touched one, and is not what
+the healthy recording says either. In *healthy motion* each arm is pushed every {every:g} s with
+8 to 40 N, for 0.2 to 1.2 s; each channel that is told counts.
 
 ```
 {text}

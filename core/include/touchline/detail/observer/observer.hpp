@@ -148,8 +148,10 @@ class Observer {
     }
     for (std::size_t j = 0; j < joints_.size(); ++j) {
       copy(whole, whole.channels_.external(j), channels_.external(j));
-      compare_anew(whole, channels_.own(j), j, layout_.outboard_sensors[j], whole.layout_.outboard_sensors[j], sensors);
-      compare_anew(whole, channels_.parity(j), j, layout_.inboard_sensors[j], whole.layout_.inboard_sensors[j], sensors);
+      compare_anew(whole, channels_.own(j), j, layout_.outboard_sensors[j],
+                   whole.layout_.outboard_sensors[j], sensors);
+      compare_anew(whole, channels_.parity(j), j, layout_.inboard_sensors[j],
+                   whole.layout_.inboard_sensors[j], sensors);
     }
   }
 
@@ -479,7 +481,8 @@ class Observer {
         since = std::max(since, filters.group(segment).since);
         double load = 0.0;
         for (std::size_t i = 0; i < 6; ++i)
-          load += lines[i * terms_.at().lines + static_cast<std::size_t>(pairs[k].line)] * filters.value(segment)[i];
+          load += lines[i * terms_.at().lines + static_cast<std::size_t>(pairs[k].line)] *
+                  filters.value(segment)[i];
         value -= branch ? -load : load;
       }
     }

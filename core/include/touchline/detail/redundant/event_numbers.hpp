@@ -69,7 +69,8 @@ class EventNumbers {
     event.detected = before.detected;
     event.level = std::max(event.level, before.level);
     if (before.decided == before.decided) event.decided = before.decided;
-    if (before.status == Status::located && event.status != Status::located)
+    const bool worse = event.link == before.link && event.position_std > kWorse * before.position_std;
+    if (before.status == Status::located && (event.status != Status::located || worse))
       take_place(before, event);
     event.doubted = event.doubted && before.doubted;
     if (event.clamped != Clamped::yes) event.clamped = before.clamped;
@@ -89,7 +90,11 @@ class EventNumbers {
     Event before;
   };
 
-  // It was located when there were more sensors.
+  // The later of two places on a link counts unless its error is so many times as large. Half: the
+  // place is from before the loss, where the arm has moved on. Double: joint torques have the last word.
+  static constexpr double kWorse = 2.0;
+
+  // It was located better, as when there were more sensors.
   static void take_place(const Event& before, Event& event) {
     event.status = before.status;
     event.link = before.link;

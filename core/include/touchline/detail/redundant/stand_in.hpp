@@ -78,13 +78,18 @@ class Deputy {
   int told_as(std::size_t g) const { return told_as_[g]; }
   // Has it been told nothing yet?
   bool fresh() const { return !used_; }
+  // Did it feel anything in the last sample that it took?
+  bool feels() const { return feels_; }
 
   // Takes a sample of the whole robot; see `Pipeline::update`.
   Result update(const Sample& sample) {
     used_ = true;
     for (std::size_t s = 0; s < given_.sensors.size(); ++s)
       std::copy_n(sample.wrench + 6 * given_.sensors[s], 6, wrench_.data() + 6 * s);
-    return pipeline_.update({sample.time, sample.q, sample.qd, sample.tau, wrench_.data()});
+    const Result result =
+        pipeline_.update({sample.time, sample.q, sample.qd, sample.tau, wrench_.data()});
+    feels_ = !result.contacts.empty();
+    return result;
   }
 
   // See `Pipeline`; sensors and segments are those of the whole robot.
@@ -178,6 +183,7 @@ class Deputy {
   std::vector<int> told_as_;   // per segment of the whole robot
   std::vector<std::vector<int>> parts_;  // per segment of its own: those of the whole robot; the root: none
   bool used_ = false;          // has it been told anything?
+  bool feels_ = false;
 };
 
 // All that may step in.
