@@ -47,10 +47,16 @@ if [ "${1:-all}" = demo ]; then
   exit
 fi
 
-obtain chromium sh -c 'command -v chromium || command -v google-chrome' || echo \
-  "touchline: no Chromium, so pages are not tested; on Debian: apt-get install chromium" >&2
-obtain npm command -v npm && npm install --silent --no-audit --no-fund --prefix .venv/npm \
-  axe-core@4 >/dev/null 2>&1 || echo \
-  "touchline: no axe-core, so the accessibility of pages is not tested; it needs npm" >&2
+# What only tests of pages need: it is fetched and unpacked while the rest is compiled.
+pages() {
+  obtain chromium sh -c 'command -v chromium || command -v google-chrome' || echo \
+    "touchline: no Chromium, so pages are not tested; on Debian: apt-get install chromium" >&2
+  obtain npm command -v npm && npm install --silent --no-audit --no-fund --prefix .venv/npm \
+    axe-core@4 >/dev/null 2>&1 || echo \
+    "touchline: no axe-core, so the accessibility of pages is not tested; it needs npm" >&2
+}
+
+pages &
 pip --editable ".[all]" --group test --group check --group docs
+wait
 touch .venv/demo .venv/ready

@@ -73,6 +73,25 @@ def test_a_recording_without_any_value_is_refused(robot, command, tmp_path, caps
     assert command.out.read_text() == OLD
 
 
+@pytest.mark.parametrize("rests", [False, True], ids=["moving", "at rest"])
+def test_samples_that_are_no_numbers_are_counted_before_what_the_others_lack(
+    robot, tmp_path, capsys, rests
+):
+    log = tmp_path / "ends.parquet"
+    s = free_motion(robot, 20.0, RATE)
+    if rests:
+        s.q[:], s.qd[:] = s.q[0], 0.0
+    s.q[300:-100] = np.nan
+    write_table(log, s if rests else s.where(np.arange(len(s)) >= 200), robot.description)
+    assert main(["calibrate", str(log), "--robot", "sara", "--out", str(tmp_path / "o.yaml")]) == 2
+    first, second, *_ = capsys.readouterr().err.splitlines()
+    count = 2000 if rests else 1800
+    assert first.startswith(
+        f"touchline: {log}: 1600 of {count} samples have a position or velocity"
+    )
+    assert ("one pose alone" if rests else "2 s of contact-free data") in second
+
+
 def test_a_single_sample_is_refused(robot, command, tmp_path, capsys):
     log = tmp_path / "one.parquet"
     s = free_motion(robot, 1.0, RATE)

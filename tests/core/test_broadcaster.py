@@ -2,18 +2,14 @@
 """The ros2_control broadcaster, against headers with the interfaces' signatures and no ROS."""
 
 import xml.etree.ElementTree as ET
-from pathlib import Path
 
 import numpy as np
 import pytest
-from program import COMPILER, compile_program, run_program
+from program import BROADCASTER, COMPILER, PLAIN, compile_program
 
 import touchline as tl
 from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scenario import Run, three_touches
-
-HERE = Path(__file__).parent
-PACKAGE = HERE.parents[1] / "ros" / "touchline_broadcaster"
 
 compiles = pytest.mark.skipif(COMPILER is None, reason="no C++ compiler on this machine")
 
@@ -33,16 +29,10 @@ def logged(tmp_path_factory):
 
 
 @compiles
-def test_it_gives_what_the_pipeline_feels_to_the_last_bit(logged):
+def test_it_gives_what_the_pipeline_feels_to_the_last_bit(logged, run_whole):
     folder, robot, s = logged
-    program = folder / "broadcaster"
-    includes = [f"-I{HERE / 'ros_signatures'}", f"-I{PACKAGE / 'include'}"]
-    source = HERE / "broadcaster.cpp"
-    # Both files as one: the core is compiled once.
-    plugin = ("-include", PACKAGE / "src" / "touch_broadcaster.cpp")
-    complaint = compile_program(source, program, "-O1", *includes, *plugin)
-    assert complaint == ""
-    lines = run_program(program, folder / "sara.touchline", folder / "log.csv").stdout.splitlines()
+    given = (folder / "sara.touchline", folder / "log.csv")
+    lines = run_whole("broadcaster", PLAIN, *given, counting=True)
     assert [line for line in lines if line.startswith("FAILED")] == []
     given = np.array([line.split() for line in lines], dtype=float)
     estimate, _ = tl.Pipeline(robot).run(s.time, s.q, s.qd, s.tau, s.wrench)
@@ -52,17 +42,23 @@ def test_it_gives_what_the_pipeline_feels_to_the_last_bit(logged):
     assert np.nanmax(np.abs(felt)) > 5.0
 
 
+@compiles
+def test_the_plugin_includes_all_that_it_needs(tmp_path):
+    source = BROADCASTER / "src" / "touch_broadcaster.cpp"
+    assert compile_program(source, tmp_path / "none", "-fsyntax-only") == ""
+
+
 def test_the_plugin_is_described_as_it_is_written():
-    library = ET.parse(PACKAGE / "touchline_broadcaster.xml").getroot()
+    library = ET.parse(BROADCASTER / "touchline_broadcaster.xml").getroot()
     plugin = library.find("class")
     assert plugin is not None
-    source = (PACKAGE / "src" / "touch_broadcaster.cpp").read_text()
+    source = (BROADCASTER / "src" / "touch_broadcaster.cpp").read_text()
     exported = source[source.index("PLUGINLIB_EXPORT_CLASS(") :]
     assert plugin.get("type") in exported and plugin.get("base_class_type") in exported
-    cmake = (PACKAGE / "CMakeLists.txt").read_text()
+    cmake = (BROADCASTER / "CMakeLists.txt").read_text()
     assert f"add_library({library.get('path')} SHARED" in cmake
     assert "touchline_broadcaster.xml)" in cmake
-    package = ET.parse(PACKAGE / "package.xml").getroot()
+    package = ET.parse(BROADCASTER / "package.xml").getroot()
     named = {element.text for element in package.findall("depend")}
     words = cmake[cmake.index("set(ros_packages") :].split(")")[0].split()[1:]
     assert named == set(words)

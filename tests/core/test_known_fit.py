@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where another place explains more than another force a contact may have begun to slide."""
 
-from pathlib import Path
-
 import pytest
-from program import COMPILER, compile_program, run_program
+from program import COMPILER, PLAIN
 
 import touchline as tl
 
@@ -12,14 +10,11 @@ pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C++ compiler on thi
 
 
 @pytest.fixture(scope="module")
-def said(tmp_path_factory):
+def said(tmp_path_factory, run_whole):
     """Of changes of a place [m], and of a force [N]: their size, and what is said of each."""
     folder = tmp_path_factory.mktemp("known")
     tl.Pipeline(tl.load_robot("sara")).export(folder / "sara.touchline")
-    source = Path(__file__).parent / "known_fit.cpp"
-    assert compile_program(source, folder / "program", "-O1") == ""
-    output = run_program(folder / "program", folder / "sara.touchline").stdout
-    lines = [line.split() for line in output.splitlines()]
+    lines = [line.split() for line in run_whole("known_fit", PLAIN, folder / "sara.touchline")]
     return {
         what: [
             (float(size), *(word == "1" for word in words))

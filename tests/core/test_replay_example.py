@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from program import COMPILER, SANITIZED, THREADED, compile_program, run_program
+from program import COMPILER, PLAIN, SANITIZED, THREADED, compile_program, run_program
 
 import touchline as tl
 from touchline.identify.rest import with_rest
@@ -40,20 +40,15 @@ def replayed(tmp_path_factory):
     return folder, robot, s
 
 
-def program_lines(source, folder, *flags):
-    complaint = compile_program(source, folder / "program", *flags)
-    if flags and ("lasan" in complaint or "lubsan" in complaint):
-        pytest.skip("the compiler has no sanitizers")
-    assert complaint == ""
-    output = run_program(folder / "program", folder / "sara.touchline", folder / "log.csv").stdout
-    return [line.split() for line in output.splitlines()]
+builds = pytest.mark.parametrize("flags", [PLAIN, SANITIZED], ids=["plain", "sanitized"])
 
 
-@pytest.mark.parametrize("flags", [("-O2",), SANITIZED], ids=["plain", "sanitized"])
-def test_a_program_says_the_same_to_the_last_bit(replayed, flags):
+@builds
+def test_a_program_says_the_same_to_the_last_bit(replayed, run_whole, flags):
     folder, robot, s = replayed
     pipeline = tl.Pipeline(robot)
-    lines = program_lines(ROOT / "core" / "example" / "replay.cpp", folder, *flags)
+    said = run_whole("replay", flags, folder / "sara.touchline", folder / "log.csv")
+    lines = [line.split() for line in said]
     contacts = np.array([line[1:] for line in lines if line[0] == "contact"], dtype=float)
     events = np.array([line[2:] for line in lines if line[0] == "event"], dtype=float)
     pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
@@ -66,11 +61,13 @@ def test_a_program_says_the_same_to_the_last_bit(replayed, flags):
     assert sorted(theirs, key=lambda event: event.id) == pipeline.events
 
 
-@pytest.mark.parametrize("flags", [("-O1",), SANITIZED], ids=["plain", "sanitized"])
-def test_no_allocation_per_sample_and_the_same_bits_in_any_parts(replayed, flags):
+@builds
+def test_no_allocation_per_sample_and_the_same_bits_in_any_parts(replayed, run_whole, flags):
     folder, _, _ = replayed
-    source = Path(__file__).parent / "pipeline_no_allocation.cpp"
-    lines = program_lines(source, folder, *flags)
+    given = (folder / "sara.touchline", folder / "log.csv")
+    lines = [
+        line.split() for line in run_whole("pipeline_no_allocation", flags, *given, counting=True)
+    ]
     assert len(lines) == 4
     for allocations, contacts, ended, _ in lines:
         assert allocations == "0"

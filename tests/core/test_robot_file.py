@@ -4,10 +4,9 @@
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
-from program import COMPILER, SANITIZED, compile_program, run_program
+from program import COMPILER, SANITIZED
 from robots import load_example
 
 import touchline as tl
@@ -79,16 +78,9 @@ def test_export_makes_the_folder_of_its_file(tmp_path):
 
 
 @pytest.mark.skipif(COMPILER is None, reason="no C++ compiler on this machine")
-def test_no_damage_goes_unnoticed_or_breaks_the_reader(exported, tmp_path):
-    source, program = Path(__file__).parent / "robot_file.cpp", tmp_path / "program"
-    complaint = compile_program(source, program, *SANITIZED)
-    if "lasan" in complaint or "lubsan" in complaint:
-        pytest.skip("the compiler has no sanitizers")
-    assert complaint == ""
-    outcomes = dict(
-        reversed(line.split(maxsplit=1))
-        for line in run_program(program, exported).stdout.splitlines()
-    )
+def test_no_damage_goes_unnoticed_or_breaks_the_reader(exported, run_whole):
+    lines = run_whole("robot_file", SANITIZED, exported)
+    outcomes = dict(reversed(line.split(maxsplit=1)) for line in lines)
     counts = {what: int(count) for what, count in outcomes.items()}
     assert sum(counts.values()) > 1500
     assert counts["it is damaged: its check"] > 200

@@ -16,6 +16,8 @@ from touchline.identify.choice import POSES
 from touchline.identify.evidence import Evidence
 from touchline.model.robot import Robot
 
+MOST_LACKING = 0.5  # of the samples: where more lack a value, that is told first
+
 
 def named(logs: list[Path]) -> str:
     """The recordings, as a message begins."""
@@ -23,12 +25,17 @@ def named(logs: list[Path]) -> str:
 
 
 @contextmanager
-def naming(logs: list[Path]) -> Iterator[None]:
-    """Has messages that name no recording begin with all of them."""
+def naming(logs: list[Path], recordings: Recordings) -> Iterator[None]:
+    """Has messages begin with all recordings, or with what most of their samples lack."""
     try:
         yield
     except InputError as error:
         first, *more = error.problems
+        lacking = recordings.samples - recordings.moving
+        if lacking > MOST_LACKING * recordings.samples:
+            what = "a position or velocity that is not a number, and show nothing"
+            told = f"{lacking} of {recordings.samples} samples have {what}"
+            raise InputError([f"{named(logs)}: {told}", *error.problems]) from None
         if any(str(log) in first for log in logs):
             raise
         raise InputError([f"{named(logs)}: {first}", *more]) from None

@@ -25,6 +25,8 @@ class Recordings:
     Attributes:
         seconds: of samples that are not left out.
         period: of the samples [s].
+        samples: that the logs hold.
+        moving: of them with the positions and velocities of all joints.
         losses: what is said of parts of the logs that cannot be read.
     """
 
@@ -33,6 +35,7 @@ class Recordings:
         self._left_out: list[tuple[int, float, float]] = []
         self.losses: list[str] = []
         self.seconds = 0.0
+        self.samples = self.moving = 0
         self.period = float("nan")
         seconds = 0.0
         for log in logs:
@@ -61,6 +64,8 @@ class Recordings:
                 present.add(part)
             self.losses += recording.losses
         present.refuse_void(log)
+        self.samples += present.samples
+        self.moving += present.moving
         return period, present.samples * period
 
     def all(self, what: str) -> Iterator[Iterator[Samples]]:

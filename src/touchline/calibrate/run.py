@@ -183,9 +183,9 @@ def calibrate(
     if identification:
         with threadpool_limits(1, "blas"):  # of small matrices: threads would wait for each other
             described = model
-            with naming(logs):
+            with naming(logs, recordings):
                 evidence = gather(model, recordings.all("equations"))
-            refuse_one_pose(evidence, logs)
+                refuse_one_pose(evidence, logs)
             for _ in range(TURNS if gains else 0):
                 wrong = find_gains(evidence)
                 factors = multiplied(factors, wrong)
@@ -210,7 +210,7 @@ def calibrate(
                 model = with_frames(model, off)
                 recordings = Recordings(model, logs)
                 evidence = gather(model, recordings.all("equations"))
-            with naming(logs):
+            with naming(logs, recordings):
                 found = identify(evidence, trust)
             if not trust:
                 refuse_two_robots(found, logs)
@@ -240,7 +240,7 @@ def calibrate(
         left_out += more
     except NoThresholds as error:
         if found is None or not found.problem.columns + found.problem.bodies:
-            with naming(logs):
+            with naming(logs, recordings):
                 raise
         lacking = str(error)
         if chosen == (METHOD,):

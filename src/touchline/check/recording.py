@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from touchline.arrays import Mask
 from touchline.check.coarse import is_off, next_step
@@ -30,6 +31,7 @@ MOMENT = 0.2  # s before and after what was felt: a touch begins unfelt, and fil
 LEAST_UNTOUCHED = 0.2  # of the samples: a recording of touches has pauses
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")  # small matrices: threads would wait
 def check_recording(robot: Robot, path: Path, findings: Findings) -> None:
     """Judges a log.
 

@@ -18,11 +18,12 @@ class Presence:
         samples: that were read.
         stamped: of them with a time that is a number.
         placed: with some joint's position; all of a robot without joints.
+        moving: with the positions and velocities of all joints.
         felt: with some torque or force-torque reading.
     """
 
     def __init__(self) -> None:
-        self.samples = self.stamped = self.placed = self.felt = 0
+        self.samples = self.stamped = self.placed = self.moving = self.felt = 0
 
     def add(self, part: Samples) -> None:
         """Take N samples."""
@@ -30,6 +31,7 @@ class Presence:
         self.stamped += int(np.isfinite(part.time).sum())
         joints = part.q.shape[1]
         self.placed += int(np.isfinite(part.q).any(axis=1).sum()) if joints else len(part)
+        self.moving += int(np.isfinite(np.concatenate([part.q, part.qd], axis=1)).all(axis=1).sum())
         felt = np.isfinite(part.tau).any(axis=1) | np.isfinite(part.wrench).any(axis=(1, 2))
         self.felt += int(felt.sum())
 
