@@ -340,7 +340,7 @@ def test_who_steps_in_goes_on_with_what_was_filtered(held, dead, lost):
         estimate.segment_wrench[told, merged], oracle.segment_wrench[told, same], atol=1e-9
     )
     np.testing.assert_allclose(estimate.tau_ext[told], oracle.tau_ext[told], atol=1e-9)
-    # A sensor's wrench turns with the arm: projected at one instant it leaves a ghost of |w| |F| / K.
+    # A wrench turns with the arm: projected at one instant it leaves a ghost of |w| |F| / K.
     ghost = 0.5 * 25.0 / 100.0 * 1.0  # rad/s, N, rad/s, a lever of 1 m: [Nm]
     away = np.abs(estimate.segment_torque[told] - oracle.segment_torque[told])
     known = [joint.measured for joint in rest.description.joints]

@@ -132,8 +132,8 @@ class Observer {
   // Goes on with what `whole` has filtered, instead of beginning anew. This is the same robot without
   // some sensors: `sensors[s]` is sensor s in `whole`, and `parts[g]` are the segments there which are
   // segment g here. Both have taken the same sample last, this one as its first. Filters are linear,
-  // so a segment has the sum of its parts. A joint that loses a sensor outboard has what its torque
-  // leaves over the filtered wrenches of those that are left, projected at this instant: a ghost of
+  // so a segment has the sum of its parts. A joint that loses a sensor outboard has its torque less
+  // the filtered wrenches of those that are left, projected at this instant. That leaves a ghost of
   // order |w| |F| / K for 1 / K. What `whole` does not know begins anew. No allocation.
   void go_on_from(const Observer& whole, const std::vector<int>& sensors,
                   const std::vector<std::vector<int>>& parts) {
