@@ -9,8 +9,8 @@
 // contradict in what the whole robot makes of a sample, from the next sample on, for a while.
 //
 // A stand-in begins with the last sample of the whole robot, and goes on with what that has filtered.
-// It speaks once a few samples are lost, as soon as it feels something or nothing was felt before. The
-// whole robot speaks again 5 / K after the sensor is back; the stand-in listens until what it felt has
+// It speaks once a few samples are lost: at once where it alone feels something, else as soon as the
+// whole robot's estimates could not go on any more. The whole robot speaks again 5 / K after the sensor is back; the stand-in listens until what it felt has
 // ended. What stands on the arm while nothing touches it, the one tells the other. An event that both
 // feel is one event.
 #pragma once
@@ -271,9 +271,10 @@ class RedundantPipeline {
   // Does the one that warms up speak from now on? A lost packet or two are nothing. What was felt before
   // a loss the next one feels a little later: until then nothing says that it is gone.
   bool is_time(const Result& of_now, const Result& of_warming) const {
-    const bool lost = (of_now.health & kSensorExcluded) != 0;
+    if ((of_now.health & kSensorExcluded) == 0) return false;
     const bool feels = !of_warming.contacts.empty(), quiet = of_now.contacts.empty();
-    return lost && (feels || quiet || of_warming.time >= since_ + tuning().gates.continues);
+    const double lost = of_warming.time - since_, bridge = whole_.observer().bridge(0);
+    return (quiet && feels) || (lost > bridge && (quiet || feels)) || lost > tuning().gates.continues;
   }
   static bool settled(const Result& result) { return (result.health & kSettling) == 0; }
 

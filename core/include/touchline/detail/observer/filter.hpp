@@ -73,8 +73,11 @@ class Filters {
 
   // Does group g go on after a gap since `earlier`?
   bool reaches(std::size_t g, double earlier, const Instant& now) const {
-    return now.reaches(earlier,
-                       std::min(tuning_.bridged_steps / bandwidth(g), tuning_.longest_bridge));
+    return now.reaches(earlier, bridge(g));
+  }
+  // The most time that may be lost before group g begins anew [s].
+  double bridge(std::size_t g) const {
+    return std::min(tuning_.bridged_steps / bandwidth(g), tuning_.longest_bridge);
   }
 
   // Is any value in doubt because of a gap?

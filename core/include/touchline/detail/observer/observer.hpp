@@ -164,6 +164,8 @@ class Observer {
   double time() const { return now_.time; }  // of the last accepted sample
   // Steps in time beyond this [s] are gaps.
   double max_gap() const { return clock_.usual_step(); }
+  // The most time that a sensor may be lost before the wrench of segment g begins anew [s].
+  double bridge(std::size_t g) const { return channels_.filters.bridge(channels_.segment_filter(g)); }
   // Of sensor s in world, at the last accepted sample.
   Pose sensor_pose(int s) const {
     return load_pose(before_ + terms_.at().sensor(s) + TermsLayout::kPose);
