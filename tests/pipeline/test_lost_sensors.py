@@ -220,11 +220,15 @@ def test_numbers_and_changes_of_events_are_one_story():
         assert own.count("ended") == 1
 
 
+@pytest.mark.parametrize("stamp", [None, 0.298, 0.2, np.nan], ids=["fine", "twice", "back", "none"])
 @pytest.mark.parametrize("chunks", [1, 7, 64])
-def test_a_recording_in_parts_gives_the_bits_of_single_samples(chunks):
+def test_a_recording_in_parts_gives_the_bits_of_single_samples(chunks, stamp):
+    """Also where the whole robot has refused the sample before the loss."""
     robot = robot_named("sara")
     q = np.linspace(0.3, 0.9, 7)
     samples = without(pushed(robot, q, "link5", np.array([0.0, 15.0, -20.0])), 1, 0.3, 0.8)
+    if stamp is not None:
+        samples.time[299] = stamp
     live = tl.Pipeline(robot)
     single = [live.update(*x) for x in zip(*_columns(samples), strict=True)]
     parts = tl.Pipeline(robot)

@@ -92,14 +92,16 @@ class RedundantPipeline {
       }
       if (end > i) {
         const double* ratios = ratios_.data();
+        std::size_t taken = end;  // the last sample that the whole robot took
         whole_.run(end - i, time + i, at(i), rows + i * width, [&](const Result& result) {
           watch_parity(result, time[i]);
+          if (takes(result)) taken = i;
           each(with_faults(result, sound_, ratios));
           ratios += sound_.size();
           ++i;
           return !left_out_.any();
         });
-        keep(at(i - 1));
+        if (taken < end) last_.keep(at(taken));
         for (; i < end; ++i, ratios += sound_.size()) {  // judged, but not taken any more
           const Result result = take(at(i), sound_, ratios);
           std::copy(result.estimate.row().begin(), result.estimate.row().end(), rows + i * width);
@@ -165,13 +167,13 @@ class RedundantPipeline {
     const Result result = whole ? whole_.update(believed) : step(believed);
     if (whole) watch_parity(result, believed.time);
     else parity_.forget();
-    keep(believed);
+    if (takes(result)) last_.keep(believed);
     return with_faults(result, faults, ratios);
   }
 
-  // For a stand-in to begin with, if the whole robot took it.
-  void keep(const Sample& sample) {
-    if (sample.time == whole_.time()) last_.keep(sample);
+  // Has the whole robot taken the sample of a result? A stand-in may begin with that.
+  bool takes(const Result& result) const {
+    return (result.health & kBadTime) == 0 && result.time == whole_.time();
   }
 
   // Of channels that pass again while they are still told nothing goes on from what they had.
