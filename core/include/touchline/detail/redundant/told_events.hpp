@@ -138,17 +138,24 @@ class ToldEvents {
     tell(continues ? Happened::changed : Happened::began, event);
   }
 
-  // The event of `waiting_` that an event goes on with, if any.
+  // The event of `waiting_` that an event goes on with, if any: one on the same link, else one that was
+  // told of the same segment, else one of a part of it.
   void go_on(Deputy* speaker, const Event& own) {
     const int segment = told_segment(speaker, own.segment);
+    Event* best = nullptr;
+    int most = -1;
     for (Event& event : waiting_) {
-      const bool one = event.segment == segment || same_part(event.segment, segment);
-      if (!one || numbers_.full()) continue;
-      numbers_.go_on(pipeline_of(speaker), own.id, event);
-      event = waiting_.back();
-      waiting_.pop_back();
-      return;
+      if (event.segment != segment && !same_part(event.segment, segment)) continue;
+      const bool link = own.link >= 0 && event.link == own.link;
+      const int fits = 2 * static_cast<int>(link) + static_cast<int>(event.segment == segment);
+      if (fits <= most) continue;
+      most = fits;
+      best = &event;
     }
+    if (best == nullptr || numbers_.full()) return;
+    numbers_.go_on(pipeline_of(speaker), own.id, *best);
+    *best = waiting_.back();
+    waiting_.pop_back();
   }
 
   // Has this sample's hand-over told of an event?
