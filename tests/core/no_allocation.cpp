@@ -2,22 +2,12 @@
 // Counts the allocations of `step` and `run` on good and bad samples: prints them, and their sum
 // of outputs so that nothing is optimized away.
 #include <cstdio>
-#include <cstdlib>
 #include <limits>
-#include <new>
 #include <vector>
 
 #include "touchline/detail/observer/observer.hpp"
 
-static long allocations = 0;
-
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* p = std::malloc(size)) return p;
-  throw std::bad_alloc();
-}
-void operator delete(void* p) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+long allocations = 0;  // counting.cpp counts them
 
 namespace {
 
@@ -98,6 +88,7 @@ int main() {
     std::vector<double> rows(static_cast<std::size_t>(kSamples * width));
     double stepped = 0.0, ran = 0.0;
     const long before = allocations;
+    if (before == 0) return 1;  // nothing is counted
     for (int i = 0; i < kSamples; ++i) {
       stepped += add_up(single.step(r.time[i], &r.q[i * kJoints], &r.qd[i * kJoints],
                                     &r.tau[i * kJoints], &r.wrench[i * 18]),

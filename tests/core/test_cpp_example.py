@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from program import COMPILER, SANITIZED, compile_program, run_program
+from program import COMPILER, HERE, SANITIZED, compile_program, run_program
 
 ROOT = Path(__file__).parents[2]
 
@@ -37,7 +37,8 @@ def test_example_prints_the_push(tmp_path):
 @pytest.mark.parametrize("flags", [("-O2",), SANITIZED], ids=["plain", "sanitized"])
 def test_no_allocation_per_step(tmp_path, flags):
     program = tmp_path / "program"
-    complaint = compile_program(Path(__file__).parent / "no_allocation.cpp", program, *flags)
+    source, counting = HERE / "no_allocation.cpp", HERE / "counting.cpp"
+    complaint = compile_program(source, program, *flags, counting)
     if flags == SANITIZED and ("lasan" in complaint or "lubsan" in complaint):
         pytest.skip("the compiler has no sanitizers")
     assert complaint == ""
