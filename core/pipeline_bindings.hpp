@@ -72,9 +72,8 @@ inline nb::list transitions(const tl::RedundantPipeline& p) {
 
 // The pipeline, and what a user of Python may ask for later: the events that have ended.
 struct Pipeline {
-  Pipeline(tl::Robot robot, const tl::Tuning& tuning, std::vector<tl::StandIn> stand_ins)
-      : value(std::make_unique<tl::RedundantPipeline>(std::move(robot), tuning,
-                                                      std::move(stand_ins))),
+  Pipeline(tl::Robot robot, const tl::Tuning& tuning)
+      : value(std::make_unique<tl::RedundantPipeline>(std::move(robot), tuning)),
         unmeasured(value->robot().joints.size() + 6 * value->robot().sensors.size(), tl::kUnknown) {}
 
   std::unique_ptr<tl::RedundantPipeline> value;
@@ -278,16 +277,14 @@ inline nb::tuple events(Pipeline& p, std::size_t from) {
 }
 
 // Begins anew with the same robot but other figures, of its biases or loads. Events that last end
-// with the last sample; the numbers of events go on. `same`: robot and stand-ins are those of before.
-inline void restart(Pipeline& p, const tl::Robot& robot, std::vector<tl::StandIn> stand_ins,
-                    bool same) {
+// with the last sample; the numbers of events go on. `same`: the robot is that of before.
+inline void restart(Pipeline& p, tl::Robot robot, bool same) {
   std::vector<tl::StandIn> kept;
-  if (same) kept.swap(stand_ins);
-  auto fresh = std::make_unique<tl::RedundantPipeline>(robot, p.value->tuning(),
-                                                       std::move(stand_ins));
-  const tl::Robot& before = p.value->robot();
-  if (robot.joint_names != before.joint_names || robot.sensor_names != before.sensor_names ||
-      robot.links.size() != before.links.size() || robot.rows.size() != before.rows.size())
+  if (same) kept.swap(robot.stand_ins);
+  auto fresh = std::make_unique<tl::RedundantPipeline>(std::move(robot), p.value->tuning());
+  const tl::Robot &before = p.value->robot(), &now = fresh->robot();
+  if (now.joint_names != before.joint_names || now.sensor_names != before.sensor_names ||
+      now.links.size() != before.links.size() || now.rows.size() != before.rows.size())
     throw std::invalid_argument("a pipeline goes on with the same joints, sensors and links");
   const guard::Turn turn(p.turn);
   p.value->visit_lasting([&p](tl::Event event) {
@@ -398,6 +395,7 @@ inline void bind(nb::module_& m) {
       .def_rw("surfaces", &tl::Robot::surfaces)
       .def_rw("links", &tl::Robot::links)
       .def_rw("pushes", &tl::Robot::pushes)
+      .def_rw("stand_ins", &tl::Robot::stand_ins)
       .def("set_gravity",
            [](tl::Robot& robot, double x, double y, double z) { robot.gravity = {x, y, z}; })
       .def("check", [](const tl::Robot& robot) { tl::check(robot); })
@@ -430,16 +428,14 @@ inline void bind(nb::module_& m) {
   nb::class_<Pipeline>(m, "Pipeline")
       .def(
           "__init__",
-          [](Pipeline* self, const tl::Robot& robot, const tl::Tuning& tuning,
-             std::vector<tl::StandIn> stand_ins) {
-            new (self) Pipeline(robot, tuning, std::move(stand_ins));
+          [](Pipeline* self, const tl::Robot& robot, const tl::Tuning& tuning) {
+            new (self) Pipeline(robot, tuning);
           },
-          "robot"_a, "tuning"_a, "stand_ins"_a = std::vector<tl::StandIn>{})
+          "robot"_a, "tuning"_a)
       .def("update", &update, "time"_a, "q"_a, "qd"_a, "tau"_a.none(), "wrench"_a.none())
       .def("run", &run, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a)
       .def("events", &events, "since"_a)
-      .def("restart", &restart, "robot"_a, "stand_ins"_a = std::vector<tl::StandIn>{},
-           "same"_a = false)
+      .def("restart", &restart, "robot"_a, "same"_a = false)
       .def("keep", [](Pipeline& p, std::size_t most) {
              const guard::Turn turn(p.turn);
              p.most = most;

@@ -26,6 +26,7 @@ def test_what_is_read_is_what_was_written(exported):
     assert robot.to_bytes() == exported.read_bytes()
     assert tuple(robot.joint_names) == tl.load_robot("sara").joint_names
     assert len(robot.surfaces) == len(robot.links) > 5
+    assert len(robot.stand_ins) == 7  # after losses of any of its three sensors
 
 
 def refused(path, content):

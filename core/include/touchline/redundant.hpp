@@ -27,7 +27,7 @@
 #include "touchline/detail/redundant/kept_sample.hpp"
 #include "touchline/detail/redundant/left_out.hpp"
 #include "touchline/detail/redundant/spoken_resets.hpp"
-#include "touchline/detail/redundant/stand_in.hpp"
+#include "touchline/detail/redundant/deputy.hpp"
 #include "touchline/detail/redundant/told_events.hpp"
 #include "touchline/detail/redundant/whole_words.hpp"
 #include "touchline/pipeline.hpp"
@@ -36,26 +36,10 @@ namespace touchline {
 
 class RedundantPipeline {
  public:
-  // `stand_ins`: for the losses of sensors that it carries on after. Where several do, the one that
-  // does without the fewest sensors. Throws std::invalid_argument where one does not fit the robot.
-  explicit RedundantPipeline(Robot robot, const Tuning& tuning = {},
-                             std::vector<StandIn> stand_ins = {})
-      : whole_(std::move(robot), tuning),
-        gates_(whole_.robot(), tuning.gates),
-        parity_(whole_.robot(), whole_.observer(), whole_.loadable(), tuning.gates),
-        left_out_(gates_.layout()),
-        doubts_(whole_, deputies_, gates_),
-        events_(whole_, doubts_, tuning.gates.continues),
-        words_(whole_),
-        resets_(whole_.row_layout(), whole_.robot().joints.size(),
-                whole_.robot().segment_names.size()),
-        absent_(whole_.robot().sensors.size()),
-        last_(gates_.layout().joints, gates_.layout().sensors),
-        sound_(gates_.layout().count(), Fault::none),
-        faults_(sound_),
-        ratios_(kAhead * sound_.size()) {
-    for (StandIn& given : stand_ins) deputies_.add(std::move(given), whole_);
-  }
+  // Where several of the robot's stand-ins do, the one steps in that does without the fewest sensors.
+  // Throws std::invalid_argument where the robot's parts do not fit together.
+  explicit RedundantPipeline(Robot robot, const Tuning& tuning = {})
+      : RedundantPipeline(std::move(robot.stand_ins), std::move(robot), tuning) {}
 
   const RowLayout& row_layout() const { return whole_.row_layout(); }
   const Robot& robot() const { return whole_.robot(); }
@@ -149,6 +133,24 @@ class RedundantPipeline {
   Standing standing(int row) const { return whole_.standing(row); }
 
  private:
+  RedundantPipeline(std::vector<StandIn> stand_ins, Robot&& robot, const Tuning& tuning)
+      : whole_(std::move(robot), tuning),
+        gates_(whole_.robot(), tuning.gates),
+        parity_(whole_.robot(), whole_.observer(), whole_.loadable(), tuning.gates),
+        left_out_(gates_.layout()),
+        doubts_(whole_, deputies_, gates_),
+        events_(whole_, doubts_, tuning.gates.continues),
+        words_(whole_),
+        resets_(whole_.row_layout(), whole_.robot().joints.size(),
+                whole_.robot().segment_names.size()),
+        absent_(whole_.robot().sensors.size()),
+        last_(gates_.layout().joints, gates_.layout().sensors),
+        sound_(gates_.layout().count(), Fault::none),
+        faults_(sound_),
+        ratios_(kAhead * sound_.size()) {
+    for (StandIn& given : stand_ins) deputies_.add(std::move(given), whole_);
+  }
+
   static constexpr std::size_t kAhead = 64;  // samples that are judged before they are taken
 
   // Does the whole robot speak for itself, with all sensors and its own numbers of events?

@@ -152,9 +152,6 @@ struct EventChange {
   Event event;
 };
 
-// Can a touch of a segment be felt? `degraded`: with fewer signals than the robot has.
-enum class Watch { watched, degraded, blind };
-
 // After one sample. Views stay valid until the pipeline's next call.
 struct Result {
   double time;    // [s] of the sample

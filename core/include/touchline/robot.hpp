@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // All that the pipeline has to know of a robot. That is the tree of its bodies, what its channels
 // report and how noisy they are, when a residual counts, and its surfaces. Part of them may be meant
-// to be touched.
+// to be touched. Where it may lose sensors it has stand-ins: what it is without them.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <stdexcept>
@@ -31,6 +32,11 @@ struct Link {
   Pose placement;
 };
 
+// Can a touch of a segment be felt? `degraded`: with fewer signals than the robot has.
+enum class Watch { watched, degraded, blind };
+
+struct StandIn;
+
 // Arrays follow `joints` (n), `sensors` (k) and the segments (m): one per six-axis sensor in their
 // order, then the root's if the robot's root is not on such a sensor.
 struct Robot {
@@ -48,7 +54,39 @@ struct Robot {
   std::vector<LinkSurface> surfaces;
   std::vector<Link> links;  // one per surface
   Pushes pushes;
+  std::vector<StandIn> stand_ins;  // for losses of sensors that `RedundantPipeline` carries on after
 };
+
+// A robot without some of its sensors, and where its parts stand in the whole robot. It has no
+// stand-ins of its own.
+struct StandIn {
+  std::vector<int> lost;      // sensors of the whole robot that it does without
+  Robot robot;
+  std::vector<int> sensors;   // of the whole robot, for each of its own
+  std::vector<int> segments;  // of the whole robot, for each of its own
+  std::vector<int> rows;      // of the whole robot's detector, for each of its own; -1: none
+  std::vector<Watch> watch;   // of each segment of the whole robot
+};
+
+// Does a stand-in fit the whole robot? Throws std::invalid_argument where not.
+inline void check(const StandIn& s, const Robot& whole) {
+  const auto within = [](const std::vector<int>& values, int least, std::size_t end) {
+    return std::all_of(values.begin(), values.end(),
+                       [&](int i) { return i >= least && i < static_cast<int>(end); });
+  };
+  const bool fits = s.robot.joints.size() == whole.joints.size() &&
+                    s.robot.links.size() == whole.links.size() &&
+                    s.sensors.size() == s.robot.sensors.size() &&
+                    s.segments.size() == s.robot.segment_names.size() &&
+                    s.rows.size() == s.robot.rows.size() &&
+                    s.watch.size() == whole.segment_names.size() &&
+                    s.sensors.size() + s.lost.size() == whole.sensors.size() &&
+                    within(s.lost, 0, whole.sensors.size()) &&
+                    within(s.sensors, 0, whole.sensors.size()) &&
+                    within(s.segments, 0, whole.segment_names.size()) &&
+                    within(s.rows, -1, whole.rows.size()) && s.robot.stand_ins.empty();
+  if (!fits) throw std::invalid_argument("robot: a stand-in does not fit it");
+}
 
 // Do the parts of a robot fit together? Throws std::invalid_argument that names what does not.
 inline void check(const Robot& robot) {
@@ -126,6 +164,10 @@ inline void check(const Robot& robot) {
     for (const Triangle& t : surface.mesh.triangles())
       require(finite(t.a) && finite(t.ab) && finite(t.ac) && finite(t.normal),
               "a surface has a number that is not finite");
+  }
+  for (const StandIn& stand_in : robot.stand_ins) {
+    check(stand_in, robot);
+    check(stand_in.robot);
   }
 }
 

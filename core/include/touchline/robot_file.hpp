@@ -3,7 +3,8 @@
 //
 //   8 bytes "TLROBOT\n", format (u32), length of what follows the header (u64), its checksum (u64,
 //   FNV-1a), then the parts of `Robot` one after the other. Numbers are little endian, real ones
-//   IEEE 754 doubles; lists begin with their length (u64).
+//   IEEE 754 doubles; lists begin with their length (u64). Meshes that a stand-in shares with the
+//   whole robot stand once.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +23,7 @@
 namespace touchline {
 
 // Of the file; another one is refused. It changes with every part of `Robot`.
-constexpr std::uint32_t kRobotFormat = 6;
+constexpr std::uint32_t kRobotFormat = 7;
 
 // A file that cannot be read or written: it says which, and why.
 struct RobotFileError : std::runtime_error {
@@ -127,6 +128,7 @@ template <class A> void store(A& file, Compensated& x) { store_enum(file, x, Com
 template <class A> void store(A& file, NodeKind& x) { store_enum(file, x, NodeKind::prismatic); }
 template <class A> void store(A& file, Test& x) { store_enum(file, x, Test::cusum); }
 template <class A> void store(A& file, Zone& x) { store_enum(file, x, Zone::open); }
+template <class A> void store(A& file, Watch& x) { store_enum(file, x, Watch::blind); }
 template <class A> void store(A& file, Vec3& v);
 template <class A> void store(A& file, Mat3& m);
 template <class A> void store(A& file, Pose& X);
@@ -143,6 +145,8 @@ template <class A> void store(A& file, DetectionSettings& settings);
 template <class A> void store(A& file, BlowLimits& limits);
 template <class A> void store(A& file, LinkSurface& surface);
 template <class A> void store(A& file, Link& link);
+template <class A> void store(A& file, Robot& robot);
+template <class A> void store(A& file, StandIn& stand_in);
 
 template <class A, class T, std::size_t N>
 void store(A& file, T (&values)[N]) {
@@ -245,26 +249,68 @@ void store(A& file, Triangle& triangle) {
   auto& [a, ab, ac, normal, face] = triangle;
   store_all(file, a, ab, ac, normal, face);
 }
+// Without its mesh.
 template <class A>
 void store(A& file, LinkSurface& surface) {
   auto& [node, mesh, graspable, touchable] = surface;
+  static_cast<void>(mesh);
   store_all(file, node, graspable, touchable);
-  std::vector<Triangle> triangles = mesh.triangles();
-  store(file, triangles);
-  if constexpr (A::kReads) mesh = Mesh(std::move(triangles));
 }
 template <class A>
 void store(A& file, Link& link) {
   auto& [name, body, zone, placement] = link;
   store_all(file, name, body, zone, placement);
 }
+// Without meshes and stand-ins.
 template <class A>
 void store(A& file, Robot& robot) {
   auto& [name, nodes, gravity, joints, sensors, joint_names, sensor_names, segment_names, rows,
-         detection, noise, blows, segment_zones, surfaces, links, pushes] = robot;
+         detection, noise, blows, segment_zones, surfaces, links, pushes, stand_ins] = robot;
+  static_cast<void>(stand_ins);
   store_all(file, name, nodes, gravity, joints, sensors, joint_names, sensor_names, segment_names,
             rows, detection, noise, blows, segment_zones, surfaces, links,
             pushes.friction, pushes.reach);
+}
+template <class A>
+void store(A& file, StandIn& stand_in) {
+  auto& [lost, robot, sensors, segments, rows, watch] = stand_in;
+  store_all(file, lost, robot, sensors, segments, rows, watch);
+}
+
+inline std::string bytes_of(const Mesh& mesh) {
+  Writer triangles;
+  std::vector<Triangle> all = mesh.triangles();
+  store(triangles, all);
+  return triangles.data;
+}
+template <class A>
+void store_mesh(A& file, Mesh& mesh) {
+  std::vector<Triangle> triangles = mesh.triangles();
+  store(file, triangles);
+  if constexpr (A::kReads) mesh = Mesh(std::move(triangles));
+}
+// The meshes of the robot and of what stands in for it.
+template <class A>
+void store_meshes(A& file, Robot& robot) {
+  for (LinkSurface& surface : robot.surfaces) store_mesh(file, surface.mesh);
+  for (StandIn& stand_in : robot.stand_ins) {
+    std::vector<LinkSurface>& surfaces = stand_in.robot.surfaces;
+    for (std::size_t i = 0; i < surfaces.size(); ++i) {
+      const bool paired = i < robot.surfaces.size();
+      bool shared = false;
+      if constexpr (!A::kReads)
+        shared = paired && bytes_of(surfaces[i].mesh) == bytes_of(robot.surfaces[i].mesh);
+      store(file, shared);
+      if (shared && !paired) throw std::invalid_argument("a stand-in shares a mesh that is not there");
+      if (!shared) store_mesh(file, surfaces[i].mesh);
+      else if constexpr (A::kReads) surfaces[i].mesh = robot.surfaces[i].mesh;
+    }
+  }
+}
+template <class A>
+void store_whole(A& file, Robot& robot) {
+  store_all(file, robot, robot.stand_ins);
+  store_meshes(file, robot);
 }
 
 inline std::uint64_t checksum(const char* begin, const char* end) {
@@ -293,7 +339,7 @@ inline Robot parse(const std::string& content) {
     throw std::invalid_argument("it is damaged: its checksum differs");
   Robot robot;
   Reader body(begin + kHeader, end);
-  store(body, robot);
+  store_whole(body, robot);
   if (!body.done()) throw std::invalid_argument("it goes on after its end");
   check(robot);
   return robot;
@@ -317,7 +363,7 @@ inline Robot read_robot(const std::string& path) {
 // The content of such a file.
 inline std::string robot_bytes(Robot robot) {
   robot_file::Writer body;
-  robot_file::store(body, robot);
+  robot_file::store_whole(body, robot);
   robot_file::Writer header;
   header.data.assign(robot_file::kMagic, sizeof robot_file::kMagic);
   header.bytes(kRobotFormat, 4);

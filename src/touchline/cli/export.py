@@ -18,9 +18,10 @@ def export(
 
     Example: touchline export sara --out sara.touchline
 
-    The file holds tree, channels, noise, thresholds, zones and surfaces, with a format number and a
-    checksum. `touchline::read_robot` in core/include/touchline/robot_file.hpp reads it without
-    Python, URDF or MuJoCo; core/example/replay.cpp shows how.
+    The file holds tree, channels, noise, thresholds, zones and surfaces, and what steps in for lost
+    sensors, with a format number and a checksum. `touchline::read_robot` in
+    core/include/touchline/robot_file.hpp reads it without Python, URDF or MuJoCo;
+    core/example/replay.cpp shows how.
 
     Args:
         robot: A robot.yaml, a URDF or MJCF, or the name of a robot.

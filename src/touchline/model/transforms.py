@@ -126,7 +126,7 @@ def move_inertia(body: Inertia, T: Array) -> Inertia:
 
 
 def _steiner(mass: float, r: Array) -> Array:
-    return mass * (r @ r * np.eye(3) - np.outer(r, r))
+    return mass * ((r * r).sum() * np.eye(3) - np.outer(r, r))  # in one order, as `move_points`
 
 
 def move_wrench(T: Array) -> Array:

@@ -133,13 +133,13 @@ class Pipeline:
         self._method = method
         self._weights = period, bandwidth, wrench_error, torque_error, pushes, self.tuning
         self._model_error = model_error
-        self._made, self._stand_ins = self._native(), self._make_stand_ins()
+        self._made = self._native()
         self._native_tuning = native
         self._begin()
 
     def _begin(self) -> None:
         robot = self.robot
-        self._core = core.Pipeline(self._made, self._native_tuning, self._stand_ins)
+        self._core = core.Pipeline(self._made, self._native_tuning)
         self._update = self._core.update
         names = Names.of(
             robot.segment_names,
@@ -241,7 +241,7 @@ class Pipeline:
             InputError: another kind of file is there.
             OSError: the file cannot be written.
         """
-        write_robot(Path(path), self._native())
+        write_robot(Path(path), self._made)
 
     def afresh(self) -> "Pipeline":
         """Another pipeline that begins with what this one knows of the robot, and has felt nothing.
@@ -255,7 +255,7 @@ class Pipeline:
 
     def reset(self) -> None:
         """Forgets the past, as after a long gap; events that last end, their numbers go on."""
-        self._core.restart(self._made, self._stand_ins, same=True)
+        self._core.restart(self._made, same=True)
 
     def tare(self) -> Tare:
         """Takes what is felt now for the sensors' and joints' offsets: nothing may touch the arm.
@@ -317,24 +317,23 @@ class Pipeline:
     def _go_on_with(self, robot: Robot) -> None:
         before, self.robot = self.robot, robot
         try:
-            made, stand_ins = self._native(), self._make_stand_ins()
-            self._core.restart(made, stand_ins)
-            self._made, self._stand_ins = made, stand_ins
+            made = self._native()
+            self._core.restart(made)
+            self._made = made
         except BaseException:
             self.robot = before
             raise
 
-    def _make_stand_ins(self) -> list[core.StandIn]:
-        """What carries on where sensors are lost: made beforehand, so that no sample is late."""
+    def _native(self) -> core.Robot:
+        """All that the core knows of the robot, and what carries on where its sensors are lost."""
 
         def make(robot: Robot, thresholds: Thresholds, skin: Skin) -> core.Robot:
             return native_robot(robot, thresholds, skin, *self._weights)
 
-        period, error = self._weights[0], self._model_error
-        return StandIns(self.robot, self.thresholds, self.skin, period, error, make).all()
-
-    def _native(self) -> core.Robot:
-        return native_robot(self.robot, self.thresholds, self.skin, *self._weights)
+        whole = self.robot, self.thresholds, self.skin
+        made = make(*whole)
+        made.stand_ins = StandIns(*whole, self._weights[0], self._model_error, make).all()
+        return made
 
     @property
     def lost(self) -> list[str]:

@@ -13,7 +13,7 @@
 #include "touchline/detail/gates/channel_gates.hpp"
 #include "touchline/detail/gates/fault.hpp"
 #include "touchline/detail/redundant/left_out.hpp"
-#include "touchline/detail/redundant/stand_in.hpp"
+#include "touchline/detail/redundant/deputy.hpp"
 #include "touchline/pipeline.hpp"
 
 namespace touchline {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "touchline/detail/observer/reset_watch.hpp"
-#include "touchline/detail/redundant/stand_in.hpp"
+#include "touchline/detail/redundant/deputy.hpp"
 #include "touchline/result.hpp"
 
 namespace touchline {

@@ -11,7 +11,7 @@
 #include "touchline/detail/events/describe.hpp"
 #include "touchline/detail/redundant/channel_doubts.hpp"
 #include "touchline/detail/redundant/event_numbers.hpp"
-#include "touchline/detail/redundant/stand_in.hpp"
+#include "touchline/detail/redundant/deputy.hpp"
 #include "touchline/pipeline.hpp"
 #include "touchline/result.hpp"
 

@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "touchline/detail/redundant/stand_in.hpp"
+#include "touchline/detail/redundant/deputy.hpp"
 #include "touchline/detail/redundant/told_events.hpp"
 #include "touchline/pipeline.hpp"
 #include "touchline/result.hpp"

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// A robot without some of its sensors, which steps in where these are lost, and its pipeline.
+// Stand-ins at work: pipelines of a robot without some of its sensors, for when these are lost.
 // Theory: docs/theory.md, section 3.6.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
 #include <memory>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -16,36 +15,6 @@
 #include "touchline/robot.hpp"
 
 namespace touchline {
-
-// A robot without some of its sensors, and where its parts stand in the whole robot.
-struct StandIn {
-  std::vector<int> lost;      // sensors of the whole robot that it does without
-  Robot robot;
-  std::vector<int> sensors;   // of the whole robot, for each of its own
-  std::vector<int> segments;  // of the whole robot, for each of its own
-  std::vector<int> rows;      // of the whole robot's detector, for each of its own; -1: none
-  std::vector<Watch> watch;   // of each segment of the whole robot
-};
-
-// Throws std::invalid_argument where a stand-in does not fit the whole robot.
-inline void check(const StandIn& s, const Robot& whole) {
-  const auto within = [](const std::vector<int>& values, int least, std::size_t end) {
-    return std::all_of(values.begin(), values.end(),
-                       [&](int i) { return i >= least && i < static_cast<int>(end); });
-  };
-  const bool fits = s.robot.joints.size() == whole.joints.size() &&
-                    s.robot.links.size() == whole.links.size() &&
-                    s.sensors.size() == s.robot.sensors.size() &&
-                    s.segments.size() == s.robot.segment_names.size() &&
-                    s.rows.size() == s.robot.rows.size() &&
-                    s.watch.size() == whole.segment_names.size() &&
-                    s.sensors.size() + s.lost.size() == whole.sensors.size() &&
-                    within(s.lost, 0, whole.sensors.size()) &&
-                    within(s.sensors, 0, whole.sensors.size()) &&
-                    within(s.segments, 0, whole.segment_names.size()) &&
-                    within(s.rows, -1, whole.rows.size());
-  if (!fits) throw std::invalid_argument("a stand-in does not fit the robot");
-}
 
 // A stand-in at work.
 class Deputy {
