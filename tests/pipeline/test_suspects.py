@@ -212,6 +212,22 @@ def test_a_fault_elsewhere_is_no_reason_for_doubt(arm):
     assert event.body_probability == pytest.approx(healthy.body_probability, abs=0.05)
 
 
+@pytest.mark.parametrize(
+    ("name", "channel"),
+    [("spikes", "tau.joint4"), ("garbage", "wrist.fx"), ("stuck", "wrist.my"), ("rail", "base.fz")],
+)
+def test_a_blow_that_shows_without_a_faulty_channel_is_a_collision(arm, name, channel):
+    """A wrench does without joint torques, and who steps in for a sensor does without that."""
+    robot, pipeline, _ = arm
+    samples = pushed(robot, "link5", (9.0, 0.0, -30.0), 0.3, 1.2)
+    _, _, (healthy, *_) = heard(pipeline, samples)
+    assert healthy.level == "collision"
+    _, told, events = heard(pipeline, faulty(robot, samples, name, channel, BEGIN - 0.2))
+    assert channel in {change.channel for change in told}
+    found = [event for event in events if event.level == "collision"]
+    assert found != [] and found[0].detected == pytest.approx(healthy.detected, abs=0.02)
+
+
 @pytest.mark.parametrize("part", [-1.0, -0.5, 3.0])
 def test_a_joint_torque_that_steps_alone_is_no_collision_then_or_later(torques_alone, part):
     """Of joint torques alone a push may load one, but no blow does so within one sample."""

@@ -45,6 +45,7 @@ class Pipeline {
         rest_(observer_.row_layout(), tuning_.observer),
         suspects_(robot_, observer_.layout()),
         suspicions_(robot_.segment_names.size()),
+        blow_suspicions_(suspicions_.size()),
         resets_(observer_.row_layout()),
         period_(robot_.noise.period, tuning_.events),
         levels_(robot_.segment_names.size(), 0.0),
@@ -84,9 +85,12 @@ class Pipeline {
 
   // Events of segment g that have begun at `since` or later are doubted until `until` [s]: a channel
   // that it feels is not what it was. What is doubted is no collision, and its link is not sure. No
-  // contact becomes a collision then, however long ago it is.
-  void doubt(std::size_t g, double since, double until) {
+  // contact becomes a collision then, however long ago it is. But a blow that shows in the wrench of a
+  // segment does without torques of joints.
+  void doubt(std::size_t g, Doubtful channel, double since, double until) {
     suspicions_[g].extend(observer_.time(), since, until);
+    if (channel == Doubtful::torque && robot_.blows[g].joints.empty()) return;
+    blow_suspicions_[g].extend(observer_.time(), since, until);
     classifier_.forget_blows(g, since);
   }
 
@@ -154,7 +158,7 @@ class Pipeline {
     detector_.step(row, sample.q, sample.qd);
     std::copy(detector_.levels().begin(), detector_.levels().end(), levels_.begin());
     classifier_.step(sample.time, row, levels_.data(),
-                     [&](std::size_t g) { return suspicions_[g].lasts(sample.time); });
+                     [&](std::size_t g) { return blow_suspicions_[g].lasts(sample.time); });
     recorder_.begin();
     suspects_.begin(sample);
     count_ = 0;
@@ -199,13 +203,15 @@ class Pipeline {
           Contact& contact = contacts_[count_++];
           const LastingEvent* event = recorder_.of(reports[k].serial);
           const double began = event != nullptr ? event->detected : sample.time;
-          const bool unsure = suspicions_[segment].lasts(sample.time);
+          const bool unsure = blow_suspicions_[segment].lasts(sample.time);
+          const bool no_blow =
+              reports[k].doubted || blow_suspicions_[segment].meets(sample.time, began);
           const bool since_begun = suspicions_[segment].meets(sample.time, began);
           const bool doubted = reports[k].doubted || since_begun;
           const bool known = event != nullptr && event->level == ContactLevel::collision;
           const bool later = began > classifier_.blow(g) + tuning_.classifier.decide_within;
           fill(contact, g, k, estimate);
-          if (doubted || later || (unsure && !known)) contact.level = ContactLevel::contact;
+          if (no_blow || later || (unsure && !known)) contact.level = ContactLevel::contact;
           if (!known && classifier_.by_one_joint(g)) ask_place(contact, sample.time);
           const bool own = detector_.is_own_doing(segment);
           const bool may_be_none = doubted || own || detector_.may_be_own_doing(segment);
@@ -300,7 +306,8 @@ class Pipeline {
   EventRecorder recorder_;
   RestMeter rest_;
   SuspectWatch suspects_;
-  std::vector<Suspicion> suspicions_;  // of the segments
+  std::vector<Suspicion> suspicions_;       // of the segments: of what begins there
+  std::vector<Suspicion> blow_suspicions_;  // and of how its force grows
   ResetWatch resets_;
   PeriodWatch period_;
   std::vector<double> levels_;  // of the segments, as the classifier takes them

@@ -76,14 +76,22 @@ class ChannelDoubts {
            fault == Fault::disagrees;
   }
 
-  // What has begun since then [s] where a channel is felt.
+  // What has begun since then [s] where a channel is felt. Who does without its sensor doubts nothing.
   void doubt(std::size_t channel, double time, double since, double lasts = kDoubtful) {
+    const ChannelLayout& at = gates_.layout();
+    const bool torque = at.tau() <= channel && channel < at.wrench();
+    const Doubtful kind = torque ? Doubtful::torque : Doubtful::reading;
+    const auto has = [&](const Deputy& deputy) {
+      return channel < at.wrench() || !deputy.is_without((channel - at.wrench()) / 6);
+    };
     for (std::size_t g = 0; g < suspicions_.size(); ++g) {
       if (!feels(g, channel)) continue;
       const double until = time + lasts;
       suspicions_[g].extend(time, since, until);
-      whole_.doubt(g, since, until);
-      deputies_.visit([&](Deputy& deputy) { deputy.doubt(g, since, until); });
+      whole_.doubt(g, kind, since, until);
+      deputies_.visit([&](Deputy& deputy) {
+        if (has(deputy)) deputy.doubt(g, kind, since, until);
+      });
     }
   }
 

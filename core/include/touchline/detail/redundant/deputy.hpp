@@ -69,11 +69,11 @@ class Deputy {
         std::find(given_.sensors.begin(), given_.sensors.end(), static_cast<int>(s));
     pipeline_.begin_sensor_anew(static_cast<std::size_t>(found - given_.sensors.begin()));
   }
-  void doubt(std::size_t g, double since, double until) {
+  void doubt(std::size_t g, Doubtful channel, double since, double until) {
     for (std::size_t i = 0; i < given_.segments.size(); ++i) {
       if (told_as_[g] != given_.segments[i]) continue;
       used_ = true;
-      pipeline_.doubt(i, since, until);
+      pipeline_.doubt(i, channel, since, until);
     }
   }
 
