@@ -6,6 +6,7 @@ inertias are 1.5 % off the model. Noise is that of the description.
 """
 
 import re
+import sys
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -15,6 +16,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from tqdm import tqdm
 
 from touchline.arrays import Array
 from touchline.check.findings import Findings
@@ -560,7 +562,8 @@ def trial(cases: int, seed: int) -> Tally:
         singly = [(error,) for error in ERRORS]
         pairs = [p for p in combinations(ERRORS, 2) if p[0].group != p[1].group]
         tally = Tally()
-        for number in range(cases + round(CLEAN * cases)):
+        count = cases + round(CLEAN * cases)
+        for number in tqdm(range(count), file=sys.stderr, leave=False, disable=None):
             if number >= cases:
                 errors: tuple[Error, ...] = ()
             elif number % 3 == 2:
