@@ -13,6 +13,7 @@ from touchline.check import injected
 from touchline.identify.delay import Delay, find_delays, refined, with_delays
 from touchline.identify.evidence import gather
 from touchline.trials.arms import load_arm
+from touchline.trials.free_motion import random_trajectory
 from touchline.trials.wrong_arm import make_wrong_arm, record
 
 
@@ -63,6 +64,17 @@ def test_what_is_left_of_a_delay_is_found_as_closely(robot, samples):
     base, wrist = refined(found, gather(robot, [[replace(samples, wrench=wrench)]]))
     assert base.value == pytest.approx(0.010, abs=5e-5)
     assert wrist == found[1]
+
+
+def test_a_late_base_is_known_as_closely_as_its_noise_allows():
+    """It reads some 200 N: a model that errs by 0.2 % of that would tell a tenth as much."""
+    robot, rng = load_arm("sara-full", 1), np.random.default_rng(5)
+    case = replace(make_wrong_arm(robot, "payload alone", rng), late={"base": 6e-4})
+    samples = record(case, random_trajectory(robot, rng), 40.0, 200.0, rng)
+    first = [Delay("base", 0.0044, 6e-5)]  # what is left of 5 ms
+    (found,) = refined(first, gather(robot, [[samples]]))
+    assert found.error < 2e-5
+    assert abs(found.value - 0.005) < 4.0 * found.error
 
 
 def test_delays_add_to_those_of_the_description(robot):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from touchline.identify.described import description_changes
 from touchline.identify.evidence import gather
 from touchline.identify.fit import Column, column_of
-from touchline.identify.frame import FrameError, find_frames, joined, with_frames
+from touchline.identify.frame import FrameError, find_frames, frames_left, joined, with_frames
 from touchline.model.robot import Robot
 from touchline.model.transforms import rotation_rpy, rpy_of
 from touchline.trials.arms import load_arm
@@ -87,6 +87,25 @@ def test_what_is_left_of_a_frame_that_was_told_is_taken_out_however_little_it_is
         for r in (once, twice)
     ]
     assert left[1] < left[0]
+
+
+def test_frames_are_refined_by_what_the_model_leaves_of_each_row(robot):
+    """The model errs less than `find_frames` takes for granted: the shift is known more closely."""
+    sensors = list(robot.description.sensors)
+    shift = 1e-3 * np.array([3.0, 4.0, 0.0])
+    sensors[BASE] = replace(sensors[BASE], xyz=tuple(shift.tolist()))
+    real = Robot(replace(robot.description, sensors=tuple(sensors)), robot.mechanism)
+    samples = recorded(robot, real, 40.0)
+    first = find_frames(gather(robot, [[samples]]))
+    evidence = gather(with_frames(robot, first), [[samples]])
+    (found,) = joined(first, frames_left(evidence, first))
+    sigma = np.linalg.norm(found.shift_error)
+    assert sigma < 0.5 * np.linalg.norm(first[0].shift_error)
+    assert np.linalg.norm(found.shift - shift) < 3.0 * sigma
+    sure = [replace(first[0], turn_error=1e-9 * np.ones(3), shift_error=1e-9 * np.ones(3))]
+    (nothing,) = frames_left(evidence, sure)
+    assert not nothing.turn.any() and not nothing.shift.any()
+    assert frames_left(evidence, []) == []
 
 
 def test_a_later_round_keeps_the_errors_of_what_it_does_not_tell():

@@ -33,7 +33,7 @@ from touchline.folder import check_file
 from touchline.identify.delay import Delay, find_delays, refined, with_delays
 from touchline.identify.described import description_changes, identified_robot
 from touchline.identify.evidence import filtered, gather
-from touchline.identify.frame import FrameError, find_frames, joined, with_frames
+from touchline.identify.frame import FrameError, find_frames, frames_left, joined, with_frames
 from touchline.identify.gain import Gain, find_gains, motor_joints, multiplied, with_gains
 from touchline.identify.identification import Identification, identify
 from touchline.identify.rest import Rest, grids_of, with_rest
@@ -202,8 +202,8 @@ def calibrate(
                 model = with_delays(model, delays)
                 recordings = Recordings(model, logs)
                 evidence = gather(model, recordings.all("equations"))
-            for _ in range(TURNS):
-                off = find_frames(evidence, frames)
+            for look in (*(find_frames,) * TURNS, frames_left):
+                off = look(evidence, frames)
                 if not off:
                     break
                 frames = joined(frames, off)

@@ -32,6 +32,7 @@ SIGMAS = (0.01, 0.03, 0.1, 0.3)  # of inertias about the model's, from hardly fr
 CORRELATED = 0.2  # equations closer than the filter's memory repeat each other
 HUBER = 3.0  # usual sigmas beyond which an equation loses weight
 LEAST_SCATTER = 0.002  # of the row's largest reading: no model foretells more closely than this
+FINE_SCATTER = 1e-4  # the same where the model does: what a sensor of 13 bits resolves
 POSES = 0.1  # rad; joints that all moved less show one pose, which tells no inertia
 MANY = 5.0  # times a bias is less sure beside masses: then it may be one
 OFFSET, OFFSET_SHARE = 0.1, 0.003  # N or Nm, or of the row's largest reading: less matters little
@@ -91,12 +92,13 @@ class Chooser:
     Args:
         evidence: all instants.
         use: (N,) those that may be used.
+        least: scatter that a row has at least, as a part of its largest reading.
     """
 
-    def __init__(self, evidence: Evidence, use: Mask) -> None:
+    def __init__(self, evidence: Evidence, use: Mask, least: float = LEAST_SCATTER) -> None:
         self.evidence, self.use = evidence, use
         self.start = evidence.residual()
-        self.floor = LEAST_SCATTER * np.abs(evidence.reading).max(axis=0, initial=0.0)
+        self.floor = least * np.abs(evidence.reading).max(axis=0, initial=0.0)
         self.folds = list(folds_of(evidence, use))
         self.blocks = blocks_of(evidence)
         self.moved = np.sqrt(np.mean(evidence.qd[use] ** 2, axis=0)) > MOVED

@@ -4,7 +4,8 @@
 A sensor's frame is off where its axes are turned against those of what it carries. Biases, a
 payload and inertias are free beside it, for a body whose centre is off looks like a shifted sensor.
 A frame is written only if that foretells parts of time which the fit has not seen. A shift is often
-sure only in a second round, once the turn has been taken out.
+sure only in a second round, once the turn has been taken out. What was told is then refined: each
+row counts by what the model leaves of it.
 """
 
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from touchline.arrays import Array
-from touchline.identify.choice import Chooser
+from touchline.identify.choice import FINE_SCATTER, Chooser
 from touchline.identify.evidence import Evidence
 from touchline.identify.fit import Column, Solution
 from touchline.model.description import AXES
@@ -52,19 +53,11 @@ def find_frames(evidence: Evidence, before: Sequence[FrameError] = ()) -> list[F
     sensors = _judged(evidence)
     if not sensors:
         return []
-    told = {
-        (kind, evidence.joints + 6 * s)
-        for s in sensors
-        for frame in before
-        for kind, error in (("turn", frame.turn_error), ("shift", frame.shift_error))
-        if frame.name == evidence.robot.sensor_names[s] and error.any()
-    }
     chooser = Chooser(evidence, np.ones(len(evidence), dtype=bool))
-    every = frame_columns(evidence)
+    every, known = frame_columns(evidence), _told_columns(evidence, before)
     turns = tuple(c for c in every if c.kind == "turn")
-    if not told and not _sure_columns(chooser.fit_beside(every)):
+    if not known and not _sure_columns(chooser.fit_beside(every)):
         return []
-    known = tuple(c for c in every if (c.kind, c.row) in told)
     options = [known, tuple(c for c in every if c in known or c in turns), every]
     found = chooser.choose_beside(list(dict.fromkeys(options)))
     while True:
@@ -79,6 +72,34 @@ def find_frames(evidence: Evidence, before: Sequence[FrameError] = ()) -> list[F
         found = chooser.with_errors(chooser.fit(replace(found.problem, columns=columns)))
     off = {c.row for c in _frame_columns(found)}
     return [_error_of(evidence, found, s) for s in sensors if evidence.joints + 6 * s in off]
+
+
+def frames_left(evidence: Evidence, before: Sequence[FrameError]) -> list[FrameError]:
+    """What is left of frames once each row counts by what the model leaves of it.
+
+    Only what is surer than before is told; the rest is zero.
+
+    Args:
+        evidence: read with the frames found so far.
+        before: these.
+    """
+    known = _told_columns(evidence, before)
+    if not known:
+        return []
+    every = np.ones(len(evidence), dtype=bool)
+    found = Chooser(evidence, every, FINE_SCATTER).choose_beside([known])
+    names = evidence.robot.sensor_names
+    return [_surer(_error_of(evidence, found, names.index(old.name)), old) for old in before]
+
+
+def _surer(own: FrameError, old: FrameError) -> FrameError:
+    """`own` without what `old` knows as surely."""
+    nothing = np.zeros(3)
+    if np.linalg.norm(own.turn_error) >= np.linalg.norm(old.turn_error):
+        own = replace(own, turn=nothing, turn_error=nothing)
+    if np.linalg.norm(own.shift_error) >= np.linalg.norm(old.shift_error):
+        own = replace(own, shift=nothing, shift_error=nothing)
+    return own
 
 
 def frame_columns(evidence: Evidence) -> tuple[Column, ...]:
@@ -130,6 +151,18 @@ def _judged(evidence: Evidence) -> list[int]:
         and sensor.compensated == "none"
         and evidence.used[n + 6 * s : n + 6 * s + 6].all()
     ]
+
+
+def _told_columns(evidence: Evidence, frames: Sequence[FrameError]) -> tuple[Column, ...]:
+    """The columns of what has been told of frames."""
+    told = {
+        (kind, evidence.joints + 6 * s)
+        for s in _judged(evidence)
+        for frame in frames
+        for kind, error in (("turn", frame.turn_error), ("shift", frame.shift_error))
+        if frame.name == evidence.robot.sensor_names[s] and error.any()
+    }
+    return tuple(c for c in frame_columns(evidence) if (c.kind, c.row) in told)
 
 
 def _of(found: Solution, kind: str, s: int, evidence: Evidence) -> tuple[Array, Array]:
