@@ -3,16 +3,19 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from touchline.bench.identify import injected, run
 from touchline.bench.identify.arms import ARMS
+from touchline.bench.identify.bound import Bound, least_errors
 from touchline.bench.identify.injected import GOALS, Figure, Judgement, judge
 from touchline.bench.identify.pushes import Detected
 from touchline.cli import main
 from touchline.errors import InputError
+from touchline.model.robot import Robot
 from touchline.trials.arms import load_arm
 from touchline.trials.free_motion import random_trajectory
 from touchline.trials.wrong_arm import make_wrong_arm
@@ -38,8 +41,38 @@ def test_what_is_wrong_with_an_arm_is_found(tmp_path, monkeypatch, kind, figure)
     assert after.found == after.pushes >= before.found and after.false <= before.false
 
 
+def minute(robot, seconds=20.0) -> Any:
+    """A motion in place of the planned one, which takes long to find."""
+    time = np.arange(0.0, seconds, 0.02)
+    motion = random_trajectory(robot, np.random.default_rng(3))
+    return SimpleNamespace(time=time, q=motion(time)[0])
+
+
+def test_no_motion_tells_a_payload_from_links_that_are_off():
+    """Joints feel sums of links: less noise leaves the mass as unknown as it was."""
+    pytest.importorskip("pinocchio", reason="comes with example-robot-data in the test group")
+    robot = load_arm("panda", 1)
+    noise = robot.description.noise
+    less = replace(
+        noise,
+        tau=tuple(0.1 * x for x in noise.tau),
+        sensors={name: tuple(0.1 * x for x in own) for name, own in noise.sensors.items()},
+    )
+    quiet = Robot(replace(robot.description, noise=less), robot.mechanism)
+    a, b = (least_errors(r, minute(r), 50.0) for r in (robot, quiet))
+    assert 0.02 < b.mass <= a.mass < 0.05
+    assert b.shift["base"] < 0.2 * a.shift["base"] and b.delay["base"] < 0.2 * a.delay["base"]
+
+
+def test_a_sensor_at_the_wrist_tells_a_payload():
+    robot = load_arm("sara-full", 1)
+    found = least_errors(robot, minute(robot), 50.0)
+    assert found.mass < 1e-3 and found.of("mass", "") == 1e3 * found.mass
+    assert found.of("turn", "wrist") < 0.1 and np.isnan(found.of("friction", ""))
+
+
 def judgement(error, found=4):
-    figures = {"mass": Figure(error), "delay": Figure(0.1, told=False)}
+    figures = {"mass": Figure(error), "delay": Figure(0.1, False, "torques")}
     felt = {"before": Detected(4, 2, 1, 0.5), "after": Detected(4, found, 0, 0.0)}
     return Judgement(figures, felt)
 
@@ -48,6 +81,8 @@ def judgement(error, found=4):
 def planned(monkeypatch):
     """No motion is planned and nothing is simulated: what is judged comes from a list."""
     monkeypatch.setattr(injected, "make_plan", lambda robot: None)
+    bound = Bound(0.02, 0.001, {}, {}, {"torques": 1e-5})
+    monkeypatch.setattr(injected, "least_errors", lambda robot, plan, rate: bound)
     monkeypatch.setattr(injected, "make_wrong_arm", lambda robot, kind, rng: kind)
     answers = []
 
@@ -67,8 +102,16 @@ WORDS = ["bench", "identify", "--arms", "sara-full", "--kinds", "bias", "delay",
 @pytest.mark.parametrize(
     ("answers", "status", "line"),
     [
-        ([judgement(9.0), judgement(1.0)], 0, "mass    10 g    2      2     5        9      2"),
-        ([judgement(9.0), judgement(11.0)], 1, "mass    10 g    2      2     10       11     1"),
+        (
+            [judgement(9.0), judgement(1.0)],
+            0,
+            "mass 10 g 2 2 5 9 2 6.4 20",
+        ),
+        (
+            [judgement(9.0), judgement(11.0)],
+            1,
+            "mass 10 g 2 2 10 11 1 10 20",
+        ),
         ([judgement(9.0, found=0), judgement(9.0, found=3)], 1, "after   3 of 8"),
         ([judgement(9.0), InputError("log: no")], 1, "refused, so nothing was written: sara-full"),
     ],

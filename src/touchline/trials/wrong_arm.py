@@ -18,6 +18,7 @@ from touchline.trials.free_motion import Path as Motion
 
 UNKNOWN = 0.015  # relative error of masses and inertias, 1 sigma
 MASS = 0.3, 2.0  # kg, of the payload
+RADIUS = 0.04  # m, of its gyration
 REACH = 0.08  # m; how far its centre may be from that of the link that carries it
 TURNED, MOVED = np.radians(2.0), 5e-3  # rad, m; of a sensor's frame
 BIAS, FRICTION, LATE = 2.0, 1.0, 5e-3  # N, Nm, s
@@ -68,7 +69,7 @@ def make_wrong_arm(robot: Robot, kind: str, rng: np.random.Generator) -> WrongAr
     node, link = flange(robot)
     mass = float(rng.uniform(*MASS))
     centre = robot.mechanism.links[link].inertia.com + _direction(rng) * rng.uniform(0.0, REACH)
-    body = Inertia(mass, centre, mass * 0.04**2 * np.eye(3))
+    body = Inertia(mass, centre, mass * RADIUS**2 * np.eye(3))
     if kind == "gain" and not k:
         body = Inertia.zero()
     own = mechanism.links[link]

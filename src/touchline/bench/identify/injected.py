@@ -17,6 +17,7 @@ from scipy.signal import butter, sosfiltfilt
 from tqdm import tqdm
 
 from touchline.arrays import Array
+from touchline.bench.identify.bound import Bound, least_errors
 from touchline.bench.identify.pushes import Detected, judged
 from touchline.bench.tables import Row, aligned
 from touchline.calibrate.plan import Plan, make_plan
@@ -60,10 +61,12 @@ class Figure:
     Attributes:
         error: of what `calibrate` wrote.
         told: does it claim to know that?
+        of: the sensor that was off, or "torques"; empty where it is no reading's.
     """
 
     error: float
     told: bool = True
+    of: str = ""
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,7 @@ def judge(case: WrongArm, plan: Plan, rng: np.random.Generator, folder: Path) ->
     errors = _wrench_errors(case, found, rng)
     true, own = (robot.nodes[case.payload].inertia for robot in (case.real, found))
     told: dict[str, bool] = {}
+    of: dict[str, str] = {}
     T = _to_link(case.real, case.payload), _to_link(found, case.payload)
     errors["mass"] = 1e3 * abs(own.mass - true.mass)
     centres = [(M @ np.append(b.com, 1.0))[:3] for M, b in zip(T, (true, own), strict=True)]
@@ -96,6 +100,7 @@ def judge(case: WrongArm, plan: Plan, rng: np.random.Generator, folder: Path) ->
         turned = off is not None and off.turn_error.any()
         shifted = off is not None and off.shift_error.any()
         told |= {"turn": bool(turned), "shift": bool(shifted)}
+        of |= {"turn": a.name, "shift": a.name}
         errors["turn"] = float(np.degrees(np.arccos(np.clip((np.trace(R) - 1.0) / 2.0, -1.0, 1.0))))
         errors["shift"] = 1e3 * float(np.linalg.norm(np.array(b.xyz) - a.xyz))
     if case.bias.any():
@@ -123,8 +128,11 @@ def judge(case: WrongArm, plan: Plan, rng: np.random.Generator, folder: Path) ->
     for name, late in case.late.items():
         delay = _delay(found.description.joints, found.description.sensors, name)
         errors["delay"] = 1e3 * abs(delay - late)
-        told["delay"] = delay != 0.0
-    figures = {name: Figure(error, told.get(name, True)) for name, error in errors.items()}
+        told["delay"], of["delay"] = delay != 0.0, name
+    figures = {
+        name: Figure(error, told.get(name, True), of.get(name, ""))
+        for name, error in errors.items()
+    }
     other = record(case, random_trajectory(case.robot, rng), SECONDS, RATE, rng)
     kinds = {"before": case.robot, "after": found}
     felt = {name: judged(case.real, kind, other, FORCE, 1) for name, kind in kinds.items()}
@@ -192,7 +200,8 @@ def _noiseless(robot: Robot) -> Robot:
 
 def main(arms: Sequence[str], kinds: Sequence[str], runs: int, seed: int) -> int:
     """Prints by arm how far off what was found is; 1 where a figure is missed."""
-    lines: list[Row] = [("arm", "figure", "goal", "cases", "told", "median", "worst", "within")]
+    head = "arm", "figure", "goal", "cases", "told", "median", "worst", "within", "RMS", "bound"
+    lines: list[Row] = [head]
     pushes: list[Row] = [("arm", "", "pushes found", "false events", "in contact untouched")]
     refused: list[str] = []
     missed = False
@@ -200,6 +209,7 @@ def main(arms: Sequence[str], kinds: Sequence[str], runs: int, seed: int) -> int
     for arm in arms:
         robot = load_arm(arm, NOISE)
         plan = make_plan(robot)
+        bound = least_errors(robot, plan, RATE)
         figures: dict[str, list[Figure]] = {name: [] for name in GOALS}
         felt: dict[str, list[Detected]] = {"before": [], "after": []}
         for i, kind in enumerate(KINDS):
@@ -222,7 +232,7 @@ def main(arms: Sequence[str], kinds: Sequence[str], runs: int, seed: int) -> int
                 progress.update()
         for name, found in figures.items():
             if found:
-                lines.append((arm, name, *_row(name, found)))
+                lines.append((arm, name, *_row(name, found, bound)))
                 missed |= any(figure.error > GOALS[name][1] for figure in found)
         for name, of in felt.items():
             pushes.append((arm, name, *_felt_row(of)))
@@ -232,6 +242,7 @@ def main(arms: Sequence[str], kinds: Sequence[str], runs: int, seed: int) -> int
     print(aligned(lines, (0, 1)))
     print("claimed: joints whose friction is said to fall with speed, but does not.")
     print("gain: of the joints whose gain is told, the worst; of all where none is.")
+    print("bound: RMS that no estimator can fall below, were it told how far links are off.")
     print("told: calibrate claims to know it. Biases that it calls mass or bias are left out.")
     for line in refused:
         print(f"refused, so nothing was written: {line}")
@@ -240,12 +251,19 @@ def main(arms: Sequence[str], kinds: Sequence[str], runs: int, seed: int) -> int
     return int(missed or len(refused) > 0)
 
 
-def _row(name: str, found: Sequence[Figure]) -> tuple[str, ...]:
+def _row(name: str, found: Sequence[Figure], bound: Bound) -> tuple[str, ...]:
     unit, goal = GOALS[name]
     values = np.array([figure.error for figure in found])
     within, told = int((values <= goal).sum()), sum(figure.told for figure in found)
     middle, worst = f"{np.median(values):.2g}", f"{values.max():.2g}"
-    return f"{goal:g} {unit}", str(len(values)), str(told), middle, worst, str(within)
+    least = _rms(np.array([bound.of(name, figure.of) for figure in found]))
+    counts = f"{goal:g} {unit}", str(len(values)), str(told)
+    told_least = "-" if np.isnan(least) else f"{least:.2g}"
+    return *counts, middle, worst, str(within), f"{_rms(values):.2g}", told_least
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _found(felt: Sequence[Detected]) -> int:
