@@ -186,6 +186,67 @@ def test_one_that_is_no_recording_is_refused_in_words(made, results, tmp_path, c
         make_plan([str(tmp_path / "fleet.html")], "sara")
 
 
+def test_a_recording_may_be_called_as_a_result_is(made, results, tmp_path, capsys):
+    """What a file is shows in its columns; and no recording is replaced by results."""
+    recording = made / "a" / "whole.parquet"
+    names = ("estimates.parquet", "contacts.parquet", "postures.parquet")
+    runs = tmp_path / "runs"
+    runs.mkdir()
+    for name in names:
+        shutil.copy(recording, runs / name)
+    for word in (runs, runs / "*", f"file://{runs}", f"file://{runs / names[0]}"):
+        if "://" in str(word):
+            pytest.importorskip("fsspec", reason="fsspec is not installed: touchline[fleet]")
+        plan = make_plan([str(word)], "sara")
+        assert not plan.none and {r.name for r in plan} <= {n.split(".")[0] for n in names}
+    assert run(runs / names[0], "--robot", "sara", "--out", tmp_path / "r") == 0
+    for log in (recording, runs / names[1]):
+        assert run(log, "--robot", "sara", "--out", runs) == 2
+        assert "would be replaced by the results" in capsys.readouterr().err
+    assert all((runs / n).read_bytes() == recording.read_bytes() for n in names)
+    for name in names:
+        own = results / "a" / "whole" / name
+        assert run(own, "--robot", "sara", "--out", tmp_path / "no") == 2
+        assert f"{own}: among Touchline's own results" in capsys.readouterr().err
+        assert list(make_plan([str(recording), str(own)], "sara").none) == [str(own)]
+    assert not (tmp_path / "no").exists()
+
+
+def test_a_users_files_are_not_replaced_by_those_of_a_fleet(made, tmp_path, capsys):
+    (tmp_path / "tables").mkdir()
+    shutil.copy(made / "a" / "whole.parquet", tmp_path / "tables" / "mine.parquet")
+    words = (made / "a", made / "b.csv.gz", "--robot", "sara", "--out", tmp_path)
+    assert run(*words) == 2
+    assert f"{tmp_path / 'tables'}: would be replaced" in capsys.readouterr().err
+    assert (tmp_path / "tables" / "mine.parquet").is_file()
+    shutil.rmtree(tmp_path / "tables")
+    text = '{"audio": "a.wav", "text": "mine"}\n'
+    (tmp_path / MANIFEST).write_text(text)
+    assert run(*words) == 2
+    assert f"{tmp_path / MANIFEST}: not by Touchline" in capsys.readouterr().err
+    assert (tmp_path / MANIFEST).read_text() == text
+    assert [path.name for path in tmp_path.iterdir()] == [MANIFEST]
+
+
+def test_a_data_set_for_learning_is_told_by_the_plan(made, tmp_path, capsys):
+    folder = tmp_path / "runs" / "droid"
+    for name in ("meta", "data"):
+        (folder / name).mkdir(parents=True)
+    (folder / "meta" / "info.json").write_text('{"codebase_version": "v3.0"}')
+    shutil.copy(made / "a" / "whole.parquet", folder / "data" / "file-000.parquet")
+    assert run(folder, "--robot", "sara", "--out", tmp_path / "r") == 2
+    assert f"`touchline label {folder} --out COPY`" in capsys.readouterr().err
+    part = folder / "data" / "file-000.parquet"
+    assert run(part, "--robot", "sara", "--out", tmp_path / "r") == 2
+    assert f"{part}: of a LeRobot data set" in capsys.readouterr().err
+    shutil.copy(made / "a" / "whole.parquet", tmp_path / "runs" / "one.parquet")
+    for word in ("", "*", "**/*"):
+        plan = make_plan([str(tmp_path / "runs" / word)], "sara")
+        assert [r.name for r in plan] == ["one"] and list(plan.none) == [str(folder)], word
+    assert run(tmp_path / "runs", "--robot", "sara", "--out", tmp_path / "r") == 0
+    assert "of a LeRobot data set" in capsys.readouterr().out
+
+
 def test_a_file_with_scenes_and_joint_states_is_a_recording(tmp_path):
     path = tmp_path / "both.mcap"
     writer = McapWriter(path, {})

@@ -87,14 +87,9 @@ def analyze(
         nearest_robot,
         why_not_recording,
     )
-    from touchline.label.lerobot import is_lerobot
 
     if not logs:
         raise InputError("LOG: name at least one recording, folder, pattern or list")
-    for word in logs:
-        if is_lerobot(Path(word)):
-            wanted = f"`touchline label {word} --out COPY` adds what the arm feels"
-            raise InputError(f"{word}: a LeRobot data set, no folder of recordings; {wanted}")
     if dry_run:
         print(forecast_text(forecast(make_plan(logs, robot), out, report, workers)))
         return 0

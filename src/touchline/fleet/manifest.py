@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from touchline import __version__
+from touchline.errors import InputError
 from touchline.folder import replaced_file
 from touchline.model.robot import load_robot
 
@@ -24,16 +25,22 @@ class Manifest:
     """
 
     def __init__(self, folder: Path) -> None:
-        """Read what an earlier run has left; a line that is not whole does not count."""
+        """Read what an earlier run has left; a line that is not whole does not count.
+
+        Raises:
+            InputError: another program wrote it.
+        """
         self.path = folder / MANIFEST
         self.rows: dict[str, Row] = {}
         if self.path.is_file():
             for line in self.path.read_text(encoding="utf-8", errors="replace").splitlines():
                 try:
                     row = json.loads(line)
-                    self.rows[str(row["name"])] = row
-                except (ValueError, TypeError, KeyError):
+                except ValueError:
                     continue
+                if not isinstance(row, dict) or not {"name", "status"} <= row.keys():
+                    raise InputError(f"{self.path}: not by Touchline; choose another --out")
+                self.rows[str(row["name"])] = row
 
     def add(self, row: Row) -> None:
         """Take the row of a recording that is done."""

@@ -6,14 +6,15 @@ import glob
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
 from touchline.errors import InputError
 from touchline.fleet.own import OWN, ROBOT_FILE, is_result, why_none
-from touchline.fleet.remote import found, is_url
+from touchline.fleet.remote import found, is_result_there, is_url
+from touchline.logs.dataset import is_lerobot, lerobot_of
 from touchline.logs.log import BAGS, TABLES
-from touchline.logs.parquet import damages, first_line
+from touchline.logs.parquet import column_names, damages, first_line
 
 LOG_COLUMN, ROBOT_COLUMN = "log", "robot"
 ENDINGS = (*TABLES, *BAGS)
@@ -106,7 +107,7 @@ def make_plan(logs: Sequence[str], robot: str | None) -> Plan:
             continue
         for log, own in _named(word):
             if is_url(log):
-                there = found(log, ENDINGS, is_result)
+                there = found(log, ENDINGS)
                 remote |= {url: (size, robot or own) for url, size in there}
                 continue
             # A link keeps its own name: what it leads to may be called by its hash alone.
@@ -139,8 +140,7 @@ def make_plan(logs: Sequence[str], robot: str | None) -> Plan:
 def why_not_recording(word: str) -> str:
     """Why a word of the command line names no recording but what stands beside some, or nothing."""
     if is_url(word):
-        own = is_result(PurePosixPath(word), lambda _: False)
-        return OWN if own else ""
+        return OWN if is_result_there(word) else ""
     return why_none(Path(word)) if Path(word).exists() else ""
 
 
@@ -160,10 +160,11 @@ def _named(word: str) -> Iterator[tuple[str, str]]:
         matches = sorted(glob.glob(word, recursive=True)) if glob.has_magic(word) else []
         if not matches:
             raise InputError(f"{word}: no such file" + (" matches" if glob.has_magic(word) else ""))
-        for match in map(Path, matches):
-            if (match.is_dir() or _is_log(match)) and not is_result(match, os.path.exists):
+        # Of a data set only itself is told, not each of its files.
+        for match in dict.fromkeys(lerobot_of(Path(m)) or Path(m) for m in matches):
+            if (match.is_dir() or _is_log(match)) and not is_result(match):
                 yield from _named(str(match))
-    elif path.is_dir() and not _is_bag_folder(path):
+    elif path.is_dir() and not _is_bag_folder(path) and not is_lerobot(path):
         for log in _below(path):
             yield str(log), ""
     elif _is_list(path):
@@ -176,10 +177,10 @@ def _below(folder: Path) -> Iterator[Path]:
     """Recordings in a folder and the folders in it, without results of earlier analyses."""
     for path in sorted(folder.iterdir()):
         hidden = path.name.startswith(".") or path.name.endswith(".parts")
-        if hidden or is_result(path, os.path.exists):
+        if hidden or is_result(path):
             continue
         if path.is_dir():
-            if _is_bag_folder(path):
+            if _is_bag_folder(path) or is_lerobot(path):  # of the latter the reason is told
                 yield path
             else:
                 yield from _below(path)
@@ -200,7 +201,7 @@ def _is_list(path: Path) -> bool:
     if not path.is_file():
         return False
     if path.suffix.lower() == ".parquet":
-        return LOG_COLUMN in _parquet_columns(path)
+        return LOG_COLUMN in column_names(path)
     if path.suffix.lower() != ".csv":
         return False
     try:
@@ -209,16 +210,6 @@ def _is_list(path: Path) -> bool:
     except (OSError, UnicodeDecodeError, csv.Error):
         return False
     return LOG_COLUMN in [name.strip() for name in head]
-
-
-def _parquet_columns(path: Path) -> list[str]:
-    """Columns of a Parquet file; none of one that cannot be read."""
-    import pyarrow.parquet as pq
-
-    try:
-        return pq.read_schema(path).names
-    except damages():
-        return []
 
 
 def _listed(path: Path) -> Iterator[tuple[str, str]]:
@@ -237,7 +228,7 @@ def _list_rows(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
     if path.suffix.lower() == ".parquet":
         import pyarrow.parquet as pq
 
-        columns = [c for c in (LOG_COLUMN, ROBOT_COLUMN) if c in _parquet_columns(path)]
+        columns = [c for c in (LOG_COLUMN, ROBOT_COLUMN) if c in column_names(path)]
         try:
             rows = pq.read_table(path, columns=columns).to_pylist()
         except damages() as error:

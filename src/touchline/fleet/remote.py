@@ -2,13 +2,15 @@
 """Recordings that are elsewhere: any URL that fsspec knows, such as s3:// and http://."""
 
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path, PurePath, PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from touchline.errors import InputError
 from touchline.extras import need
+from touchline.fleet.own import is_result
+from touchline.logs.parquet import column_names
 
 FETCHED = ".fetched"
 # What fsspec needs for a kind of URL; its own message names no module that could be looked up.
@@ -20,24 +22,56 @@ def is_url(word: str) -> bool:
     return "://" in word
 
 
-def found(
-    url: str,
-    endings: tuple[str, ...],
-    is_result: Callable[[PurePath, Callable[[str], bool]], bool],
-) -> list[tuple[str, int]]:
+class There:
+    """Files elsewhere, as of a file system of fsspec."""
+
+    def __init__(self, system: Any) -> None:
+        self._system = system
+
+    def exists(self, path: str) -> bool:
+        """Whether there is a file or folder."""
+        return bool(self._system.exists(path))
+
+    def columns(self, path: str) -> list[str]:
+        """Columns of a Parquet file; none of one that cannot be read."""
+        if not self._system.isfile(path):
+            return []
+        with self._system.open(path, "rb") as file:
+            return column_names(file)
+
+
+def is_result_there(url: str) -> bool:
+    """Whether an earlier analysis wrote what a URL names.
+
+    Raises:
+        InputError: it cannot be reached.
+    """
+    system, path = _system(url)
+    with _reaching(url):
+        return is_result(PurePosixPath(path), There(system))
+
+
+@contextmanager
+def _reaching(url: str) -> Iterator[None]:
+    try:
+        yield
+    except (OSError, ValueError) as error:
+        raise InputError(f"{url}: cannot be read: {error}") from error
+
+
+def found(url: str, endings: tuple[str, ...]) -> list[tuple[str, int]]:
     """Recordings below a URL or that a pattern matches, with their sizes [bytes].
 
     Args:
         url: of a file, a folder, or a pattern.
         endings: of the names of recordings.
-        is_result: whether an earlier analysis wrote a file; `touchline.fleet.plan.is_result`.
 
     Raises:
         InputError: nothing is there, or it cannot be reached.
         ModuleNotFoundError: fsspec, or what it needs for this kind of URL, is not installed.
     """
     system, path = _system(url)
-    try:
+    with _reaching(url):
         if any(mark in path for mark in "*?["):
             paths = system.glob(path)
         elif path.lower().endswith(endings) and not _is_folder(system, path):
@@ -47,13 +81,11 @@ def found(
         names = sorted(
             p
             for p in paths
-            if p.lower().endswith(endings) and not is_result(PurePosixPath(p), system.exists)
+            if p.lower().endswith(endings) and not is_result(PurePosixPath(p), There(system))
         )
         sizes = [
             (str(system.unstrip_protocol(name)), int(system.size(name) or 0)) for name in names
         ]
-    except (OSError, ValueError) as error:
-        raise InputError(f"{url}: cannot be read: {error}") from error
     if not sizes:
         raise InputError(f"{url}: no recordings there")
     return sizes
@@ -71,11 +103,8 @@ def fetched(url: str, folder: Path) -> Iterator[Path]:
     place.mkdir(parents=True, exist_ok=True)
     try:
         copy = place / path.rsplit("/", 1)[-1]
-        try:
-            with system.open(path, "rb") as source, copy.open("wb") as target:
-                shutil.copyfileobj(source, target, 1 << 22)
-        except (OSError, ValueError) as error:
-            raise InputError(f"{url}: cannot be read: {error}") from error
+        with _reaching(url), system.open(path, "rb") as source, copy.open("wb") as target:
+            shutil.copyfileobj(source, target, 1 << 22)
         yield copy
     finally:
         shutil.rmtree(place, ignore_errors=True)

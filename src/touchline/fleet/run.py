@@ -18,7 +18,7 @@ from touchline.fleet.manifest import JOURNAL, Manifest, Row, configuration_hash
 from touchline.fleet.page import write_page
 from touchline.fleet.plan import Recording, briefly, make_plan, none_text
 from touchline.fleet.pool import Pool
-from touchline.fleet.tables import table_rows, write_tables
+from touchline.fleet.tables import check_tables, table_rows, write_tables
 from touchline.fleet.work import Job, blank
 from touchline.folder import ResultsFolder
 from touchline.numbers import counted, lasting
@@ -123,6 +123,7 @@ def analyze_all(
     with ResultsFolder(out, ()) as folder:  # its lock: one such run at a time
         folder.draft.rmdir()
         manifest = Manifest(out)
+        check_tables(out)
         with (out / JOURNAL).open("a", encoding="utf-8") as journal:
             outcome = _run(plan, manifest, journal, out, options, limits)
         manifest.close(recording.name for recording in plan)

@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from touchline.errors import InputError
 from touchline.fleet.figures import HOUR, Figures, hour_of, percentile
+from touchline.fleet.manifest import MANIFEST
 
 COMMON = "tables"
 UNDATED = "undated"  # the date of recordings whose stamps do not begin in 1970
@@ -34,6 +36,17 @@ def table_rows(figures: dict[str, Figures]) -> Rows:
             rows["joints"] += [when | row for row in _joints(entry)]
             rows["segments"] += [when | row for row in _segments(entry)]
     return rows
+
+
+def check_tables(out: Path) -> None:
+    """Make sure, before the work begins, that no folder of the user's would be replaced.
+
+    Raises:
+        InputError: it would.
+    """
+    folder = out / COMMON
+    if folder.is_dir() and not (out / MANIFEST).is_file() and any(folder.iterdir()):
+        raise InputError(f"{folder}: would be replaced by the results; choose another --out")
 
 
 def write_tables(out: Path, rows: Rows) -> None:

@@ -20,18 +20,14 @@ from touchline.folder import replaced_file
 from touchline.label.channel import BEFORE, LEVELS, Channel, Feeler, episode_samples, parts
 from touchline.label.labelled import Labelled
 from touchline.label.naming import Given, choose
+from touchline.logs.dataset import INFO
 from touchline.logs.parquet import damages, first_line
 from touchline.model.robot import Robot
 from touchline.workers import workers
 
-INFO, STATS, ABOUT = "meta/info.json", "meta/stats.json", "meta/touchline.json"
+STATS, ABOUT = "meta/stats.json", "meta/touchline.json"
 PREFIX = "observation.touch."
 NUMBERS = ("float32", "float64", "int32", "int64")
-
-
-def is_lerobot(path: Path) -> bool:
-    """Whether a folder is such a data set."""
-    return (path / INFO).is_file()
 
 
 def label_lerobot(path: Path, robot: Robot, given: Given, workers: int = 1) -> Labelled:

@@ -11,9 +11,10 @@ from touchline.errors import InputError
 from touchline.folder import check_file
 from touchline.label.hdf5 import ENDINGS, label_hdf5
 from touchline.label.labelled import Labelled
-from touchline.label.lerobot import is_lerobot, label_lerobot
+from touchline.label.lerobot import label_lerobot
 from touchline.label.naming import Given
 from touchline.label.table import label_table
+from touchline.logs.dataset import is_lerobot, lerobot_of
 from touchline.model.robot import Robot, load_robot
 from touchline.numbers import counted, lasting
 
@@ -38,7 +39,7 @@ def label(
     given.check()
     if not dataset.exists():
         raise InputError(f"{dataset}: no such file")
-    whole = next((p for p in Path(os.path.abspath(dataset)).parents if is_lerobot(p)), None)
+    whole = lerobot_of(Path(os.path.abspath(dataset)).parent)
     if whole is not None:  # features of one part would be unknown to the others
         raise InputError(f"{dataset}: a part of the LeRobot data set {whole}; name that")
     robot = robot if isinstance(robot, Robot) else load_robot(robot)

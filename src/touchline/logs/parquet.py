@@ -217,6 +217,20 @@ def _metadata(raw: dict[bytes, bytes]) -> dict[str, Any]:
     return found
 
 
+def column_names(table: Any) -> list[str]:
+    """Columns of a Parquet file; none of one that cannot be read.
+
+    Args:
+        table: path of the file, or the file, opened.
+    """
+    import pyarrow.parquet as pq
+
+    try:
+        return pq.read_schema(table).names
+    except damages():
+        return []
+
+
 def table_metadata(path: Path) -> dict[str, Any]:
     """What the writer of a table left; empty where the file cannot be read."""
     import pyarrow.parquet as pq

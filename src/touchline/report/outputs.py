@@ -13,6 +13,7 @@ from touchline import __version__
 from touchline.errors import InputError
 from touchline.localizer.skin import Skin
 from touchline.logs import EstimateWriter, TableWriter
+from touchline.logs.parquet import column_names
 from touchline.model.robot import Robot
 from touchline.observer.observer import Estimate
 from touchline.pipeline.table import ContactTable, contact_schema
@@ -23,21 +24,38 @@ from touchline.touch.touch import Touch
 
 ESTIMATES, CONTACTS, POSTURES = "estimates.parquet", "contacts.parquet", "postures.parquet"
 EVENTS, ANALYSIS, REPORT = "events.json", "analysis.json", "report.html"
-NAMES = (ESTIMATES, CONTACTS, POSTURES, EVENTS, ANALYSIS, REPORT)
+TABLES = (ESTIMATES, CONTACTS, POSTURES)
+NAMES = (*TABLES, EVENTS, ANALYSIS, REPORT)
 LONGEST = 10.0  # s; the first seconds of a longer touch tell its widget no more
 REST = 100.0  # times as long as `events.json` took to write, until it is written again
 MOST = 500  # samples of a touch that are looked at
 CONTACT_SCHEMA = {"time": "f8", "health": "u4"} | contact_schema()
 
 
+def is_result_table(columns: Sequence[str]) -> bool:
+    """Whether a table is of an analysis, by its columns: any file may have such a table's name.
+
+    It holds what was felt beside `health`, or joint positions and nothing to feel by.
+    """
+    signals = {name for name in columns if name != "time"}
+    positions = {name for name in signals if name.startswith("q.")}
+    if positions:
+        return positions == signals
+    felt = signals.issuperset(CONTACT_SCHEMA.keys() - {"time"})
+    felt |= any(name.startswith("tau_ext.") for name in signals)
+    return felt and "health" in signals
+
+
 def check_inputs(directory: Path, *inputs: Path) -> None:
-    """Make sure that no result would replace what it is made from.
+    """Make sure that no result would replace what it is made from, nor a recording.
 
     Raises:
         InputError: it would.
     """
     targets = {(directory / name).resolve() for name in NAMES}
-    for path in inputs:
+    tables = {path: column_names(path) for name in TABLES if (path := directory / name).is_file()}
+    others = [path for path, columns in tables.items() if columns and not is_result_table(columns)]
+    for path in (*inputs, *others):
         if path.resolve() in targets:
             raise InputError(f"{path}: would be replaced by the results; choose another --out")
 
