@@ -218,7 +218,7 @@ def real(*, data: Directory = None, rate: float | None = None, leave_one_out: bo
         data: Folder with the recordings: panda_touches, panda_touches_more, panda_ur10_rosbag2,
             kuka_lwr4, kinova_gen3; those that are missing are left out. The
             models of the Panda and the UR10 come with the package example-robot-data.
-        rate: Looks at the touched recordings once more as if recorded at this rate [Hz].
+        rate: Looks at all recordings once more as if recorded at this rate [Hz].
         leave_one_out: For each touched recording, chooses three tuning numbers on all others, and
             prints what holds on the one left out.
     """

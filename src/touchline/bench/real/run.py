@@ -11,7 +11,6 @@ from tempfile import TemporaryDirectory
 
 from touchline.bench.matching import MARGIN
 from touchline.bench.real.judged import (
-    Free,
     Touched,
     events_of,
     judge_free,
@@ -20,7 +19,13 @@ from touchline.bench.real.judged import (
 from touchline.bench.real.left_out import CHOICES, chosen, named, try_all
 from touchline.bench.tables import Row, aligned
 from touchline.errors import InputError
-from touchline.trials.real_recordings import at_rate, read_free, read_touched, touched_files
+from touchline.trials.real_recordings import (
+    Recording,
+    at_rate,
+    read_free,
+    read_touched,
+    touched_files,
+)
 
 TOUCHED_HEAD = (
     "file",
@@ -44,7 +49,7 @@ def main(data: Path, rate: float | None = None, leave_one_out: bool = False) -> 
 
     Args:
         data: folder of the recordings.
-        rate: at which the touched ones are looked at once more [Hz], or None.
+        rate: at which all are looked at once more [Hz], or None.
         leave_one_out: numbers are chosen anew on all touched files but the one that is judged, and
             nothing else is printed.
 
@@ -65,12 +70,15 @@ def main(data: Path, rate: float | None = None, leave_one_out: bool = False) -> 
             whole = [_judged(path, folder) for path in files]
             print(_touched_text("A real Panda touched by hand", whole))
         if files and rate is not None:
-            thin = [_judged(path, folder, rate) for path in files]
-            print(_touched_text(f"The same at {rate:g} Hz", thin))
-            before, found = (sum(c.found for _, _, c in all_of) for all_of in (whole, thin))
+            slow = [_judged(path, folder, rate) for path in files]
+            print(_touched_text(f"The same at {rate:g} Hz", slow))
+            before, found = (sum(c.found for _, _, c in all_of) for all_of in (whole, slow))
             print(f"touches found at {rate:g} Hz of those found before: {found} of {before}\n")
         if free:
-            print(_free_text([(r.name, judge_free(r, events_of(r))) for r in free]))
+            print(_free_text("Motion in which nothing touches", free))
+        if free and rate is not None:
+            slowed = [at_rate(recording, rate) for recording in free]
+            print(f"\n{_free_text(f'The same at {rate:g} Hz', slowed)}")
 
 
 def _left_out(files: list[Path], folder: Path) -> str:
@@ -127,12 +135,13 @@ def _touched_row(name: str, link: str, t: Touched) -> Row:
     )
 
 
-def _free_text(judged: list[tuple[str, Free]]) -> str:
+def _free_text(what: str, recordings: list[Recording]) -> str:
     rows: list[Row] = [FREE_HEAD]
-    for name, f in judged:
+    for recording in recordings:
+        f = judge_free(recording, events_of(recording))
         rows.append(
             (
-                name,
+                recording.name,
                 f"{f.seconds:.1f}",
                 f"{100 * f.share:.1f} %",
                 f"{f.longest:.2f} s",
@@ -140,7 +149,7 @@ def _free_text(judged: list[tuple[str, Free]]) -> str:
                 "yes" if f.open else "no",
             )
         )
-    return "\n".join(["Motion in which nothing touches:", aligned(rows)])
+    return f"{what}:\n{aligned(rows)}"
 
 
 def _percent(part: int, whole: int) -> str:
