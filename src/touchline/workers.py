@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Processes that work for this one. They end with it, even where it is killed."""
 
+import atexit
 import multiprocessing
 import os
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from multiprocessing.connection import wait
+from multiprocessing.connection import Connection, wait
 from typing import Any
 
 
@@ -35,7 +36,12 @@ def follow_parent() -> None:
 
     It may hold both ends of the pipe it asks for work, and wait there for ever, or be amid work.
     """
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    over, ending = multiprocessing.Pipe(duplex=False)
+    watch = threading.Thread(target=_end_with_parent, args=(parent.sentinel, over), daemon=True)
+    watch.start()
+    atexit.register(_end_watch, watch, ending)
 
 
 def _begin(call: list[Any]) -> None:
@@ -46,8 +52,12 @@ def _begin(call: list[Any]) -> None:
         begin(*given)
 
 
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    wait([parent.sentinel])
-    os._exit(1)
+def _end_with_parent(parent: int, over: Connection) -> None:
+    if parent in wait([parent, over]):
+        os._exit(1)
+
+
+def _end_watch(watch: threading.Thread, ending: Connection) -> None:
+    """Python keeps all that native modules made while a thread lives, and these complain of it."""
+    ending.close()
+    watch.join()

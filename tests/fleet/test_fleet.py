@@ -327,6 +327,13 @@ def test_what_is_unchanged_is_left_alone(made, results, tmp_path, capsys):
     assert rows(out)["b"]["configuration"] != before["b"]["configuration"]
 
 
+def test_workers_end_in_silence(made, tmp_path, capfd):
+    """A thread that lives at the end keeps all that native modules have made."""
+    words = (made / "a", made / "b.csv.gz", "--robot", "sara", "--out", tmp_path)
+    assert run(*words, "--workers", 2) == 0
+    assert capfd.readouterr().err == ""
+
+
 def test_results_do_not_depend_on_the_processes(made, results, tmp_path):
     plan = make_plan([str(made)], "sara")
     before = rows(results)

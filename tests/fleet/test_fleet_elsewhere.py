@@ -133,6 +133,40 @@ def test_recordings_by_http(made, tmp_path, local):
     assert without_origin(results(tmp_path / "out")) == without_origin(expected)
 
 
+def test_urls_that_cannot_be_read_are_told_with_the_reason(made, tmp_path, monkeypatch, capsys):
+    pytest.importorskip("aiohttp", reason="aiohttp is not installed: touchline[fleet]")
+    with served(made) as address:
+        assert run(f"{address}/gone.parquet", "--out", tmp_path / "out") == 2
+        assert "404" in capsys.readouterr().err
+    assert run(f"{address}/a.parquet", "--out", tmp_path / "out") == 2  # nobody listens any more
+    assert "Cannot connect to host" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_errors_of_any_kind_of_url_are_told(tmp_path, monkeypatch, capsys):
+    fsspec = pytest.importorskip("fsspec", reason="fsspec is not installed: touchline[fleet]")
+
+    def without_credentials(*_):
+        raise RuntimeError("Unable to locate credentials")
+
+    monkeypatch.setattr(fsspec.get_filesystem_class("memory"), "isdir", without_credentials)
+    assert run("memory://bucket/a.parquet", "--out", tmp_path / "out") == 2
+    assert "memory://bucket/a.parquet: cannot be read: Unable to" in capsys.readouterr().err
+    assert run("memroy://bucket/a.parquet", "--out", tmp_path / "out") == 2
+    assert "memroy; known are http" in capsys.readouterr().err and not list(tmp_path.iterdir())
+
+
+def test_a_cluster_that_does_not_answer_is_told_before_anything_is_written(
+    made, tmp_path, monkeypatch, capsys
+):
+    pytest.importorskip("distributed", reason="distributed is not installed: touchline[fleet]")
+    monkeypatch.setattr("touchline.fleet.cluster.PATIENCE", 0.5)
+    for address in ("tcp://127.0.0.1:1", "nonsense"):
+        assert run(made, "--out", tmp_path / "out", "--cluster", address) == 2
+        assert f"--cluster {address}: cannot be reached" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_recordings_by_file_url_and_list(made, tmp_path, local):
     pytest.importorskip("fsspec", reason="fsspec is not installed: touchline[fleet]")
     listed = tmp_path / "list.csv"

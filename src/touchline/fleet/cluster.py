@@ -27,6 +27,8 @@ class Cluster:
     def __init__(self, address: str) -> None:
         distributed = need("distributed")
         try:
+            # Of no address the client complains once more when it is left.
+            distributed.comm.resolve_address(address)
             self._client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
         except (OSError, ValueError) as error:
             raise InputError(f"--cluster {address}: cannot be reached: {error}") from None

@@ -55,8 +55,11 @@ def is_result_there(url: str) -> bool:
 def _reaching(url: str) -> Iterator[None]:
     try:
         yield
-    except (OSError, ValueError) as error:
-        raise InputError(f"{url}: cannot be read: {error}") from error
+    except (InputError, ImportError):
+        raise
+    except Exception as error:  # each kind of URL has errors of its own
+        reason = error.__cause__ or error  # fsspec itself may say no more than the URL
+        raise InputError(f"{url}: cannot be read: {reason}") from error
 
 
 def found(url: str, endings: tuple[str, ...]) -> list[tuple[str, int]]:
@@ -127,4 +130,4 @@ def _system(url: str) -> tuple[Any, str]:
             raise InputError(f"{url}: {error}") from error
         raise ModuleNotFoundError(f"{url}: {error}", name=package) from error
     except ValueError as error:
-        raise InputError(f"{url}: {error}") from error
+        raise InputError(f"{url}: {error}; known are {', '.join(PACKAGES)} and others") from error

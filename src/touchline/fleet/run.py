@@ -61,8 +61,12 @@ class Limits:
         if self.cluster is not None:
             need("distributed")  # told before anything is written
 
-    def takers(self, jobs: int) -> "Pool | Cluster":
-        """Who analyzes so many recordings."""
+    def takers(self, jobs: int) -> Pool | Cluster:
+        """Who analyzes so many recordings.
+
+        Raises:
+            InputError: the cluster cannot be reached.
+        """
         if self.cluster is not None:
             return Cluster(self.cluster)
         memory = None if self.megabytes is None else int(self.megabytes * 2**20)
@@ -120,12 +124,14 @@ def analyze_all(
     """
     limits.check()
     plan = make_plan(logs, robot)
-    with ResultsFolder(out, ()) as folder:  # its lock: one such run at a time
+    # The lock of the folder: one such run at a time. Before anything is written there, the
+    # cluster has answered.
+    with limits.takers(len(plan)) as takers, ResultsFolder(out, ()) as folder:
         folder.draft.rmdir()
         manifest = Manifest(out)
         check_tables(out)
         with (out / JOURNAL).open("a", encoding="utf-8") as journal:
-            outcome = _run(plan, manifest, journal, out, options, limits)
+            outcome = _run(plan, manifest, journal, out, options, takers)
         manifest.close(recording.name for recording in plan)
         outcome.none = plan.none
         outcome.rows = [manifest.rows[r.name] for r in plan if r.name in manifest.rows]
@@ -155,7 +161,7 @@ def _run(
     journal: Any,
     out: Path,
     options: dict[str, Any],
-    limits: Limits,
+    takers: Pool | Cluster,
 ) -> Outcome:
     outcome = Outcome()
     jobs, refused = _jobs(plan, manifest, out, options)
@@ -163,7 +169,7 @@ def _run(
         manifest.add(row)
         _note(journal, row)
     try:
-        with limits.takers(len(jobs)) as takers, _bar(jobs) as bar:
+        with _bar(jobs) as bar:
             for row in takers.rows(jobs):
                 if row.pop("unchanged", False):
                     outcome.unchanged.add(row["name"])
