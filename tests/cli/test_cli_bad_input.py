@@ -190,7 +190,7 @@ def test_results_never_replace_an_input(capsys, robot, samples, tmp_path):
     path = tmp_path / "estimates.parquet"
     write_table(path, samples, robot.description)
     before = path.read_bytes()
-    assert "named as Touchline's own results are" in refused(capsys, path, tmp_path)
+    assert "would be replaced by the results" in refused(capsys, path, tmp_path)
     with pytest.raises(tl.InputError, match="would be replaced"):
         tl.analyze(path, "sara", tmp_path)
     assert path.read_bytes() == before

@@ -426,3 +426,34 @@ def test_lerobots_own_loader(robot, episodes, tmp_path):
             np.testing.assert_array_equal(
                 np.ravel(values), np.ravel(column(table, name, "")[index])
             )
+
+
+@pytest.mark.skipif(os.name != "posix", reason="asks for the permissions of POSIX")
+def test_a_write_protected_data_set(lerobot, robot, tmp_path):
+    """It is labelled as a copy; in place all is refused before the first file is replaced."""
+    files = {p: p.read_bytes() for p in lerobot.rglob("*") if p.is_file()}
+    for path in (lerobot, *lerobot.rglob("*")):
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    try:
+        assert label(lerobot, robot, tmp_path / "copy", Given()).episodes == EPISODES
+        assert label(tmp_path / "copy", robot, None, Given()).episodes == EPISODES
+    finally:
+        for path in (lerobot, *lerobot.rglob("*")):
+            path.chmod(0o755 if path.is_dir() else 0o644)
+    (tmp_path / ".part.other").mkdir()
+    with pytest.raises(InputError, match=r"\.part\.other: left by a run"):
+        label(lerobot, robot, tmp_path / "other", Given())
+    last = max((lerobot / "data").rglob("*.parquet"))
+    last.with_name(f".part.{last.name}").mkdir()  # nothing can be written in its place
+    with pytest.raises(InputError, match=rf"{last.name}: cannot be written"):
+        label(lerobot, robot, None, Given())
+    assert all(path.read_bytes() == content for path, content in files.items())
+
+
+def test_a_copy_of_another_kind_is_refused(tmp_path, capsys):
+    table = tmp_path / "a.parquet"
+    table.write_bytes(b"")
+    words = ["label", str(table), "--robot", "sara", "--out", str(tmp_path / "b.csv")]
+    assert main(words) == 2
+    assert "b.csv: must end in '.parquet'" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [table]

@@ -23,6 +23,7 @@ import numpy as np
 
 from touchline.bench.tables import Row, aligned
 from touchline.errors import InputError
+from touchline.folder import make_folder
 
 LONGEST = 30.0  # s that a file may take
 MOST = 300.0  # MB that a file may take beyond three times its size
@@ -514,6 +515,8 @@ def main(runs: int, seed: int, keep: Path | None) -> int:
     """Prints a line for each kind of file; 1 where one was not refused in words."""
     rows: list[Row] = [("files", "damaged", "failed", "longest", "memory")]
     failed = 0
+    if keep is not None:
+        make_folder(keep)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for parser in parsers(folder):
@@ -528,7 +531,6 @@ def main(runs: int, seed: int, keep: Path | None) -> int:
             for failure in found[:3]:
                 print(f"{failure.parser} {failure.number}:\n{failure.what}")
             if keep is not None:
-                keep.mkdir(parents=True, exist_ok=True)
                 for failure in found:
                     stem = f"{failure.parser.replace(' ', '_')}_{failure.number}"
                     (keep / stem).write_bytes(failure.data)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from touchline import __version__
 from touchline.arrays import Array
 from touchline.errors import InputError
-from touchline.folder import replaced_file
+from touchline.folder import check_file, replaced_file
 from touchline.label.channel import BEFORE, LEVELS, Channel, Feeler, episode_samples, parts
 from touchline.label.labelled import Labelled
 from touchline.label.naming import Given, choose
@@ -61,6 +61,8 @@ def label_lerobot(path: Path, robot: Robot, given: Given, workers: int = 1) -> L
     files = sorted((path / "data").glob("**/*.parquet"))
     if not files:
         raise InputError(f"{path / 'data'}: no Parquet files")
+    for file in (*files, path / INFO):  # before the first is replaced
+        check_file(file)
     task = _Task(robot, float(rate), given.bandwidth, names)
     done, spread, links = Labelled(rate=float(rate)), _Spread(), tuple[str, ...]()
     with _hands(task, min(workers, len(files))) as label_all:

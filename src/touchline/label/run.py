@@ -3,6 +3,7 @@
 
 import os
 import shutil
+import stat
 from collections.abc import Callable
 from pathlib import Path
 
@@ -47,10 +48,14 @@ def label(
         return _in_place(dataset, robot, given, workers)
     if out.exists():
         raise InputError(f"--out {out}: exists already; name a new place")
-    check_file(out)
+    if dataset.is_file() and out.suffix != dataset.suffix:
+        raise InputError(f"--out {out}: must end in {dataset.suffix!r}, as {dataset} does")
     draft = out.with_name(f".part.{out.name}")  # keeps the ending: it tells the kind
+    if draft.is_dir():
+        raise InputError(f"{draft}: left by a run that was killed, or one is at work; remove it")
+    check_file(out, "--out")
     try:
-        (shutil.copytree if dataset.is_dir() else shutil.copyfile)(dataset, draft)
+        _copy(dataset, draft)
         try:
             done = _in_place(draft, robot, given, workers)
         except InputError as error:  # in the user's words: of the copy nothing is left
@@ -64,14 +69,30 @@ def label(
     return done
 
 
+def _copy(dataset: Path, draft: Path) -> None:
+    """A copy that can be written, of what may be write-protected."""
+    if not dataset.is_dir():
+        shutil.copyfile(dataset, draft)
+        return
+    try:
+        shutil.copytree(dataset, draft, copy_function=shutil.copyfile)
+    finally:
+        for folder, _, _ in os.walk(draft):
+            os.chmod(folder, os.stat(folder).st_mode | stat.S_IRWXU)
+
+
 def _in_place(path: Path, robot: Robot, given: Given, workers: int) -> Labelled:
     if path.is_dir() and is_lerobot(path):
         return label_lerobot(path, robot, given, workers)
     if not path.is_dir():
-        return _kind(path)(path, robot, given)
+        kind = _kind(path)
+        check_file(path)
+        return kind(path, robot, given)
     files = [f for f in sorted(path.rglob("*")) if f.suffix in (*ENDINGS, ".parquet")]
     if not files:
         raise InputError(f"{path}: neither a LeRobot data set nor HDF5 or Parquet files")
+    for file in files:  # the last one, too, before the first is replaced
+        check_file(file)
     done: Labelled | None = None
     for file in files:
         one = _kind(file)(file, robot, given)

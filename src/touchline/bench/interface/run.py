@@ -12,7 +12,7 @@ from touchline.bench.interface.spots import taught_spots
 from touchline.bench.interface.unmeant import unmeant
 from touchline.bench.interface.writing import confusion, draw, pen_digits, write
 from touchline.bench.tables import aligned
-from touchline.errors import InputError
+from touchline.folder import check_file, replaced_file
 
 # What others report, of other arms and other tasks: to stand beside, not to compare digit by digit.
 WRITTEN_BEFORE = ("published: letters and digits on another arm [1]", "90 to 95 %", "-", "-")
@@ -38,6 +38,8 @@ class Plan:
 
 def main(plan: Plan) -> None:
     """Runs what can be run and prints tables."""
+    if plan.picture is not None:
+        check_file(plan.picture, "--picture")
     for part in plan.parts:
         rng = np.random.default_rng(plan.seed)
         if part == "digits":
@@ -75,8 +77,6 @@ def _print_digits(plan: Plan, rng: np.random.Generator) -> None:
     print(f"{SOURCES[0]}\n")
     print(aligned(confusion(written[0])) + "\n", flush=True)
     if plan.picture is not None:
-        try:
-            plan.picture.write_text(draw(written[0]), encoding="utf-8")
-        except OSError as error:
-            raise InputError(f"--picture {plan.picture}: {error.strerror}") from None
+        with replaced_file(plan.picture) as draft:
+            draft.write_text(draw(written[0]), encoding="utf-8")
         print(f"digits as the pen drew them and as they were felt: {plan.picture}\n", flush=True)

@@ -18,6 +18,7 @@ from touchline.bench.observer.discretization import DiscretizationError, discret
 from touchline.bench.observer.tables import error_table, timing_table
 from touchline.bench.observer.timing import Candidate, Timing, measure
 from touchline.errors import InputError
+from touchline.folder import check_file, replaced_file
 from touchline.model.description import JointDescription, SensorDescription
 from touchline.model.robot import Robot
 from touchline.numbers import check_least
@@ -78,7 +79,8 @@ class ObserverBenchmark:
         else:
             raise InputError(f"output is '{path}', allowed endings: .json, .csv")
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
+        with replaced_file(path) as draft:
+            draft.write_text(text, encoding="utf-8")
 
 
 def run_benchmark(
@@ -267,6 +269,8 @@ def main(output: Path | None = None, rounds: int = 40, robot: Robot | None = Non
     if output is not None and output.suffix not in (".json", ".csv"):
         raise InputError(f"output is '{output}', allowed endings: .json, .csv")
     check_least(1, rounds=rounds)
+    if output is not None:
+        check_file(output, "--output")
     result = run_benchmark(robot, rounds)
     print(result)
     if output is not None:

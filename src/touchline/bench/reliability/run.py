@@ -14,6 +14,7 @@ from touchline.bench.reliability.campaign import Part, run_all, spread
 from touchline.bench.reliability.judge import Outcome, listen
 from touchline.bench.tables import Row, aligned
 from touchline.check.parity import parity_of
+from touchline.folder import check_file, replaced_file
 from touchline.model.robot import Robot
 from touchline.pipeline.pipeline import Pipeline
 from touchline.trials.faults import FAULTS, SIGN_TO_DELAY, WANDERS
@@ -93,11 +94,14 @@ def _healthy_part(part: tuple[str, int], seconds: float) -> tuple[int, list[str]
 
 def main(plan: Plan, out: Path | None = None) -> int:
     """Prints the tables; 1 where a goal is missed."""
+    if out is not None:
+        check_file(out, "--page")
     found = list(outcomes(plan))
     text, missed = tables(found, healthy_motion(plan))
     print(text)
     if out is not None:
-        out.write_text(page(found, text))
+        with replaced_file(out) as draft:
+            draft.write_text(page(found, text), encoding="utf-8")
     return int(missed)
 
 

@@ -11,6 +11,7 @@ from touchline.bench.tables import aligned
 from touchline.bench.tuning.effect import Outcome, effect, outcome
 from touchline.bench.tuning.recordings import Recording, recordings
 from touchline.errors import InputError
+from touchline.folder import check_file, replaced_file
 from touchline.suggest import unknown
 from touchline.tuning import DEFAULTS
 
@@ -25,6 +26,8 @@ def main(names: Sequence[str], out: Path | None) -> None:
         InputError: there is no number or module of that name.
     """
     chosen = [name for wanted in names for name in _numbers(wanted)] or list(DEFAULTS)
+    if out is not None:
+        check_file(out, "--out")
     healthy, faulty = recordings()
     usual = {module: outcome(_of(module, healthy, faulty), {}) for module in ("gates", "place")}
     everything = usual["gates"].text()
@@ -46,7 +49,8 @@ def main(names: Sequence[str], out: Path | None) -> None:
             "summary": summary,
             "numbers": found,
         }
-        out.write_text(json.dumps(told, indent=1) + "\n")
+        with replaced_file(out) as draft:
+            draft.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
 
 
 def summarized(found: dict[str, dict[str, str]]) -> str:
