@@ -228,6 +228,19 @@ def test_a_blow_that_shows_without_a_faulty_channel_is_a_collision(arm, name, ch
     assert found != [] and found[0].detected == pytest.approx(healthy.detected, abs=0.02)
 
 
+@pytest.mark.parametrize("fault", [("double", "wrist.fy"), ("half", "wrist.fx")])
+def test_a_blow_is_not_what_a_faulty_sensor_felt_before(fault):
+    """Who steps in has listened and not felt that: it is over, and the blow is another event."""
+    robot = tl.load_robot("sara")
+    recording = record(robot, 0)
+    _, told, events = heard(tl.Pipeline(robot), faulty(robot, recording.samples, *fault, 0.6))
+    assert {(change.channel, change.fault) for change in told} >= {(fault[1], Fault.DISAGREES)}
+    (blow,) = [event for event in events if event.level == "collision"]
+    assert abs(blow.detected - PUSHED) < 0.02
+    before = [event for event in events if event.detected < PUSHED]
+    assert before != [] and max(event.cleared for event in before) <= blow.detected
+
+
 @pytest.mark.parametrize("part", [-1.0, -0.5, 3.0])
 def test_a_joint_torque_that_steps_alone_is_no_collision_then_or_later(torques_alone, part):
     """Of joint torques alone a push may load one, but no blow does so within one sample."""

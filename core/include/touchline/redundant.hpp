@@ -240,19 +240,20 @@ class RedundantPipeline {
     Deputy* const before = std::exchange(warming_, needed != now_ ? needed : nullptr);
     if (warming_ != nullptr && warming_ != before) {
       warming_->begin(whole_, last_.sample());
-      since_ = sample.time;
+      since_ = listens_ = sample.time;
     }
     const Result of_whole = whole_.update(sample);  // it settles anew as soon as all are back
     Result of_now = now_ != nullptr ? now_->update(sample) : of_whole;
     events_.end_those_that_waited();
     if (warming_ != nullptr) {
       const Result of_warming = warming_->update(sample);
+      if (!settled(of_warming)) listens_ = sample.time;
       if (settled(of_warming) && is_time(of_now, of_warming)) {
-        hand_over(of_now, std::exchange(warming_, nullptr));
+        hand_over(of_now, std::exchange(warming_, nullptr), listens_);
         of_now = of_warming;
       }
     } else if (now_ != nullptr && !absent_.any() && settled(of_whole)) {
-      hand_over(of_now, nullptr);
+      hand_over(of_now, nullptr, sample.time);
       of_now = of_whole;
     }
     listen(sample);
@@ -283,9 +284,10 @@ class RedundantPipeline {
   static bool settled(const Result& result) { return (result.health & kSettling) == 0; }
 
   // From now on `to` speaks; null: the whole robot. `last`: what the one before makes of this sample.
-  void hand_over(const Result& last, Deputy* to) {
+  // It has listened since then [s].
+  void hand_over(const Result& last, Deputy* to, double since) {
     events_.take(now_, last.events);
-    events_.hand_over(std::exchange(now_, to), to);
+    events_.hand_over(std::exchange(now_, to), to, since);
   }
 
   Result said_by_stand_in(const Result& r) {
@@ -315,7 +317,8 @@ class RedundantPipeline {
   SpokenResets resets_;
   AbsentSensors absent_;  // at the last sample
   KeptSample last_;       // that the whole robot has taken
-  double since_ = kUnknown;  // when `warming_` began [s]
+  double since_ = kUnknown;    // when `warming_` began [s]
+  double listens_ = kUnknown;  // since when it has settled [s]
   bool listening_ = false;   // does any that has spoken before?
   std::vector<Fault> sound_, faults_;  // of channels that are all believed; of all that tell, together
   std::vector<double> ratios_;         // (kAhead, channels)

@@ -55,9 +55,10 @@ class ToldEvents {
     waiting_.clear();
   }
 
-  // From now on `to` speaks; null: the whole robot.
-  void hand_over(Deputy* from, Deputy* to) {
+  // From now on `to` speaks, which has listened since then [s]; null: the whole robot.
+  void hand_over(Deputy* from, Deputy* to, double since) {
     handed_over_ = whole_.time();
+    listened_ = since;
     pipeline_of(from).visit_lasting([&](Event event) {
       rename(from, event);
       if (is_doubted(event)) doubt(event);
@@ -139,13 +140,16 @@ class ToldEvents {
   }
 
   // The event of `waiting_` that an event goes on with, if any: one on the same link, else one that was
-  // told of the same segment, else one of a part of it.
+  // told of the same segment, else one of a part of it. A contact that is doubted, and that the one who
+  // speaks now has listened for and not felt, is none: a blow that comes then is another.
   void go_on(Deputy* speaker, const Event& own) {
     const int segment = told_segment(speaker, own.segment);
     Event* best = nullptr;
     int most = -1;
     for (Event& event : waiting_) {
       if (event.segment != segment && !same_part(event.segment, segment)) continue;
+      const bool unfelt = own.detected > listened_ + whole_.observer().bridge(0);
+      if (unfelt && event.doubted && event.level == ContactLevel::contact) continue;
       const bool link = own.link >= 0 && event.link == own.link;
       const int fits = 2 * static_cast<int>(link) + static_cast<int>(event.segment == segment);
       if (fits <= most) continue;
@@ -192,6 +196,7 @@ class ToldEvents {
   const Deputy* parts_ = nullptr;  // of the last hand-over: it says which segments are one
   std::vector<Event> waiting_;     // that lasted then, and that the next one has not felt yet
   double handed_over_ = kUnknown;  // [s]
+  double listened_ = kUnknown;     // [s]: since when the one that speaks could have felt what waits
   std::vector<EventChange> changes_;
 };
 
