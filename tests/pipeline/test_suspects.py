@@ -228,6 +228,18 @@ def test_a_blow_that_shows_without_a_faulty_channel_is_a_collision(arm, name, ch
     assert found != [] and found[0].detected == pytest.approx(healthy.detected, abs=0.02)
 
 
+@pytest.mark.parametrize("name", ["noisy", "garbage", "stuck"])
+def test_a_blow_that_other_joints_show_is_a_collision(torques_alone, name):
+    """The torque of one joint is faulty, and stands for no force: the others do."""
+    pipeline, samples = torques_alone
+    _, _, (healthy,) = heard(pipeline, samples)
+    wrong = faulty(pipeline.robot, samples, name, "tau.joint6", HIT - 0.3)
+    _, told, events = heard(pipeline, wrong)
+    assert "tau.joint6" in {change.channel for change in told}
+    (found,) = [event for event in events if event.level == "collision"]
+    assert found.detected == pytest.approx(healthy.detected, abs=0.02)
+
+
 @pytest.mark.parametrize("fault", [("double", "wrist.fy"), ("half", "wrist.fx")])
 def test_a_blow_is_not_what_a_faulty_sensor_felt_before(fault):
     """Who steps in has listened and not felt that: it is over, and the blow is another event."""

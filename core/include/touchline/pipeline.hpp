@@ -85,12 +85,17 @@ class Pipeline {
 
   // Events of segment g that have begun at `since` or later are doubted until `until` [s]: a channel
   // that it feels is not what it was. What is doubted is no collision, and its link is not sure. No
-  // contact becomes a collision then, however long ago it is. But a blow that shows in the wrench of a
-  // segment does without torques of joints.
-  void doubt(std::size_t g, Doubtful channel, double since, double until) {
+  // contact becomes a collision then, however long ago it is.
+  void doubt(std::size_t g, double since, double until) {
     suspicions_[g].extend(observer_.time(), since, until);
-    if (channel == Doubtful::torque && robot_.blows[g].joints.empty()) return;
     blow_suspicions_[g].extend(observer_.time(), since, until);
+    classifier_.forget_blows(g, since);
+  }
+  // The same of the torque of joint j. A blow that shows without it is a collision.
+  void doubt_torque(std::size_t g, std::size_t j, double since, double until) {
+    suspicions_[g].extend(observer_.time(), since, until);
+    if (robot_.blows[g].joints.empty()) return;
+    classifier_.leave_out(j, until);
     classifier_.forget_blows(g, since);
   }
 

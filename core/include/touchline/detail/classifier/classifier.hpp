@@ -44,6 +44,7 @@ class Classifier {
         sizes_(2 * limits_.size()),
         touches_(limits_.size()),
         settled_(limits_.size(), 0),
+        left_out_(static_cast<std::size_t>(row_.joints), -std::numeric_limits<double>::infinity()),
         history_(sizes_.size(), tuning_.rate_window),
         clamping_(limits_.size(), tuning_) {
     bool good = limits_.size() == static_cast<std::size_t>(row_.segments);
@@ -87,6 +88,8 @@ class Classifier {
       decide(static_cast<int>(g), levels[g] > 0.0, doubted(g));
   }
 
+  // The torque of joint j shows no blow until then [s].
+  void leave_out(std::size_t j, double until) { left_out_[j] = std::fmax(left_out_[j], until); }
   // What segment g has shown since then [s] was no blow.
   void forget_blows(std::size_t g, double since) {
     Touch& touch = touches_[g];
@@ -138,18 +141,23 @@ class Classifier {
     }
     most = second = 0.0;
     for (const int joint : limits_[g].joints) {
-      if (!(row[row_.joint_settled() + joint] > 0.0)) continue;
+      if (!counts(joint, row)) continue;
       const double size = std::fabs(row[row_.segment_torque() + joint]) / tuning_.lever;
       second = std::fmax(second, std::fmin(size, most));
       most = std::fmax(most, size);
     }
   }
 
-  // How much of what segment g is felt with has settled.
+  // Does the torque of a joint stand for a force?
+  bool counts(int joint, const double* row) const {
+    return row[row_.joint_settled() + joint] > 0.0 && !(time_ < left_out_[joint]);
+  }
+
+  // How much of what segment g is felt with has settled, and is not left out.
   int count_settled(std::size_t g, const double* row) const {
     if (limits_[g].joints.empty()) return row[row_.segment_settled() + g] > 0.0 ? 1 : 0;
     int count = 0;
-    for (const int joint : limits_[g].joints) count += row[row_.joint_settled() + joint] > 0.0 ? 1 : 0;
+    for (const int joint : limits_[g].joints) count += counts(joint, row) ? 1 : 0;
     return count;
   }
 
@@ -183,6 +191,7 @@ class Classifier {
   std::vector<double> sizes_;  // of the segments' forces, and then their second ones [N]
   std::vector<Touch> touches_;
   std::vector<int> settled_;  // per segment, at the last sample: see `count_settled`
+  std::vector<double> left_out_;  // per joint, until when [s]
   ForceHistory history_;
   Clamping clamping_;
   double time_ = -std::numeric_limits<double>::infinity();

@@ -9,9 +9,6 @@
 
 namespace touchline {
 
-// Which channel is doubted: the torque of a joint, or a reading of motion or of a force-torque sensor.
-enum class Doubtful { torque, reading };
-
 class Suspicion {
  public:
   // What has begun at `since` or later is doubted until `until` [s].

@@ -80,17 +80,19 @@ class ChannelDoubts {
   void doubt(std::size_t channel, double time, double since, double lasts = kDoubtful) {
     const ChannelLayout& at = gates_.layout();
     const bool torque = at.tau() <= channel && channel < at.wrench();
-    const Doubtful kind = torque ? Doubtful::torque : Doubtful::reading;
     const auto has = [&](const Deputy& deputy) {
       return channel < at.wrench() || !deputy.is_without((channel - at.wrench()) / 6);
     };
+    const double until = time + lasts;
+    const auto tell = [&](auto& one, std::size_t g) {
+      torque ? one.doubt_torque(g, channel - at.tau(), since, until) : one.doubt(g, since, until);
+    };
     for (std::size_t g = 0; g < suspicions_.size(); ++g) {
       if (!feels(g, channel)) continue;
-      const double until = time + lasts;
       suspicions_[g].extend(time, since, until);
-      whole_.doubt(g, kind, since, until);
+      tell(whole_, g);
       deputies_.visit([&](Deputy& deputy) {
-        if (has(deputy)) deputy.doubt(g, kind, since, until);
+        if (has(deputy)) tell(deputy, g);
       });
     }
   }

@@ -69,12 +69,11 @@ class Deputy {
         std::find(given_.sensors.begin(), given_.sensors.end(), static_cast<int>(s));
     pipeline_.begin_sensor_anew(static_cast<std::size_t>(found - given_.sensors.begin()));
   }
-  void doubt(std::size_t g, Doubtful channel, double since, double until) {
-    for (std::size_t i = 0; i < given_.segments.size(); ++i) {
-      if (told_as_[g] != given_.segments[i]) continue;
-      used_ = true;
-      pipeline_.doubt(i, channel, since, until);
-    }
+  void doubt(std::size_t g, double since, double until) {
+    visit_parts(g, [&](std::size_t own) { pipeline_.doubt(own, since, until); });
+  }
+  void doubt_torque(std::size_t g, std::size_t j, double since, double until) {
+    visit_parts(g, [&](std::size_t own) { pipeline_.doubt_torque(own, j, since, until); });
   }
 
   // Begins with the last sample that `whole` has taken: what that has learned and filtered goes on.
@@ -85,6 +84,16 @@ class Deputy {
   }
 
  private:
+  // Its own segments that segment g of the whole robot is told as.
+  template <class Visit>
+  void visit_parts(std::size_t g, Visit&& visit) {
+    for (std::size_t i = 0; i < given_.segments.size(); ++i) {
+      if (told_as_[g] != given_.segments[i]) continue;
+      used_ = true;
+      visit(i);
+    }
+  }
+
   // Tells it what stands on the arm while nothing touches it, as `whole` has learned that.
   void learn(const Pipeline& whole) {
     used_ = true;
