@@ -10,9 +10,9 @@
 //
 // A stand-in begins with the last sample of the whole robot, and goes on with what that has filtered.
 // It speaks once a few samples are lost: at once where it alone feels something, else as soon as the
-// whole robot's estimates could not go on any more. The whole robot speaks again 5 / K after the sensor is back; the stand-in listens until what it felt has
-// ended. What stands on the arm while nothing touches it, the one tells the other. An event that both
-// feel is one event.
+// whole robot's estimates could not go on any more. The whole robot speaks again 5 / K after the
+// sensor is back; the stand-in listens until what it felt has ended. What stands on the arm while
+// nothing touches it, the one tells the other. An event that both feel is one event.
 #pragma once
 
 #include <algorithm>
@@ -24,10 +24,10 @@
 #include "touchline/detail/gates/parity_watch.hpp"
 #include "touchline/detail/redundant/absent_sensors.hpp"
 #include "touchline/detail/redundant/channel_doubts.hpp"
+#include "touchline/detail/redundant/deputy.hpp"
 #include "touchline/detail/redundant/kept_sample.hpp"
 #include "touchline/detail/redundant/left_out.hpp"
 #include "touchline/detail/redundant/spoken_resets.hpp"
-#include "touchline/detail/redundant/deputy.hpp"
 #include "touchline/detail/redundant/told_events.hpp"
 #include "touchline/detail/redundant/whole_words.hpp"
 #include "touchline/pipeline.hpp"

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A channel that comes to be wrong, or right again, or is at another level from now on: what begins
-// about then where it is felt may be no contact. It is doubted, and none of it is a collision.
+// about then where it is felt may be no contact. It is doubted. None of it is a collision but a blow
+// that shows without the channel: in a wrench, without a joint's torque; in what other joints show; in
+// what a stand-in feels without that sensor.
 // Theory: docs/theory.md, section 3.5.
 #pragma once
 
@@ -12,8 +14,8 @@
 #include "touchline/detail/events/suspicion.hpp"
 #include "touchline/detail/gates/channel_gates.hpp"
 #include "touchline/detail/gates/fault.hpp"
-#include "touchline/detail/redundant/left_out.hpp"
 #include "touchline/detail/redundant/deputy.hpp"
+#include "touchline/detail/redundant/left_out.hpp"
 #include "touchline/pipeline.hpp"
 
 namespace touchline {

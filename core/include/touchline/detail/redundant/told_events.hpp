@@ -10,8 +10,8 @@
 
 #include "touchline/detail/events/describe.hpp"
 #include "touchline/detail/redundant/channel_doubts.hpp"
-#include "touchline/detail/redundant/event_numbers.hpp"
 #include "touchline/detail/redundant/deputy.hpp"
+#include "touchline/detail/redundant/event_numbers.hpp"
 #include "touchline/pipeline.hpp"
 #include "touchline/result.hpp"
 
