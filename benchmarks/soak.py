@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A pipeline that runs for long: `soak.py [SAMPLES]`, 1e8 without it (a day of 1 kHz).
+"""A pipeline that runs for long: `soak.py [SAMPLES] [--native]`, 1e8 without it (a day of 1 kHz).
 
 An arm swings and is pushed, again and again, with a pause of a minute between. Prints the resident
 memory as it goes, its slope over the second half in MB an hour of 1 kHz and of wall time. Tells
 whether a pipeline that has been reset afterwards says what a fresh one says, to the last bit.
+
+With `--native` a C++ program (soak.cpp) does it on the exported robot, without Python.
 """
 
 import resource
+import subprocess
 import sys
 import time as clock
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -18,6 +23,7 @@ from touchline.trials.recordings import record
 PAUSE = 60.0  # s of recorded time between two pushes
 GAP = 0.5  # s without samples after each recording: the next one begins in another posture
 PARTS = 20  # prints of the memory
+HERE = Path(__file__).parent
 
 
 def resident():
@@ -67,5 +73,24 @@ def main(samples):
     return int(not same or events < pushes)
 
 
+def native(samples):
+    """The same without Python: compiles soak.cpp and runs it on the exported robot."""
+    robot = tl.load_robot("sara")
+    with TemporaryDirectory() as folder:
+        program, exported = Path(folder, "soak"), Path(folder, "sara.touchline")
+        tl.Pipeline(robot).export(exported)
+        for name in ("touched", "free"):
+            s = record(robot, 0, pushed=name == "touched").samples
+            flat = s.wrench.reshape(len(s), -1)
+            np.column_stack([s.time, s.q, s.qd, s.tau, flat]).tofile(Path(folder, name))
+        include = HERE.parent / "core" / "include"
+        flags = ["-std=c++17", "-O2", "-ffp-contract=off", f"-I{include}"]
+        subprocess.run(["c++", *flags, HERE / "soak.cpp", "-o", program], check=True)
+        logs = [Path(folder, "touched"), Path(folder, "free")]
+        return subprocess.run([program, exported, *logs, str(samples)], check=False).returncode
+
+
 if __name__ == "__main__":
-    sys.exit(main(int(float(sys.argv[1])) if len(sys.argv) > 1 else 100_000_000))
+    given = [a for a in sys.argv[1:] if a != "--native"]
+    length = int(float(given[0])) if given else 100_000_000
+    sys.exit(native(length) if "--native" in sys.argv else main(length))
