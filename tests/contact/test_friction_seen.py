@@ -120,6 +120,20 @@ def test_a_push_on_friction_that_is_known_is_felt():
     assert event.cleared is not None and 10.6 < event.cleared < 10.9
 
 
+def test_of_slow_samples_joints_that_turn_between_two_are_no_pushes():
+    """At 15 Hz a joint is quick again with the first sample after its turn: it was 15 events."""
+    arm, slow = load_arm("panda-torques", 1), slice(None, None, 33)
+    n = len(arm.joint_names)
+    way = swaying(n, 0.3, 3.0, 5.0)
+    maker = MotionMaker(arm, arm, RATE, 19.0)
+    q, qd, loads = maker.loads(replace(way, center=way.center - np.eye(n)[3] * 1.5))
+    s = maker.sensed(q, qd, loads, np.random.default_rng(2)).where(slow)
+    pipeline = tl.Pipeline(arm, period=33.0 / RATE)
+    pipeline.run(s.time, s.q, s.qd, s.tau + 2.0 * np.tanh(s.qd / TURN), s.wrench)
+    assert len(pipeline.events) <= 3
+    assert all(e.cleared is not None and e.cleared - e.detected < 0.3 for e in pipeline.events)
+
+
 def test_pushes_against_an_arm_that_turns_are_no_friction():
     """On an arm as told, at each stroke of its second joint: each lasts until it is let go."""
     arm = load_arm("panda-torques", 1)

@@ -54,6 +54,7 @@ struct RowSample {
   double referred = 0.0;    // time over which the quick one has been averaged [s]
   double gap_std = 0.0;     // one sigma of what lost samples may have left in the residual
   double speed = 0.0;       // of its joint [rad/s or m/s]; a wrench has none
+  double slowest = 0.0;     // the least size of that since the sample before: 0 where the joint has turned
   bool known = false;
 };
 

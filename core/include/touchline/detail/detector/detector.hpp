@@ -239,6 +239,7 @@ class Detector {
         s.residual = torque[row.joint];
         s.innovation = observer_.own_innovation(row.joint);
         s.gap_std = joint_gap[row.joint];
+        s.slowest = least_speed(s.speed, qd[row.joint]);
         s.speed = qd[row.joint];
       } else {
         if (i == rows_.first(g)) known = read_wrench(g, wrench, load);
@@ -254,6 +255,12 @@ class Detector {
       if (!std::isfinite(s.innovation)) s.innovation = s.residual;  // samples were lost
     }
     rows_.off[g] = (off || friction_.has_turned(g)) && fires_[g];
+  }
+
+  // The least size of a speed on its way from one sample to the next: what begins between two samples may
+  // have begun with it.
+  static double least_speed(double before, double now) {
+    return before * now < 0.0 ? 0.0 : std::min(std::fabs(now), std::fabs(before));
   }
 
   bool read_wrench(std::size_t g, double* wrench, double* innovation) const {

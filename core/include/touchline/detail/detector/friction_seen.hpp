@@ -173,7 +173,7 @@ class FrictionSeen {
       if (!shows(i) || loadable[i] == 0 || !offsets_.started(i)) continue;
       Joint& joint = joints_[i];
       const bool before = std::exchange(joint.over, std::fabs(off(i)) > rows_.limit(i));
-      if (!joint.over || before || std::fabs(rows_.samples[i].speed) >= tuning_.reversal_speed) continue;
+      if (!joint.over || before || rows_.samples[i].slowest >= tuning_.reversal_speed) continue;
       if (joint.turned() < tuning_.friction_turned) continue;
       const double turn = joint.way - joint.base;
       const int side = turn > 0.0 ? 1 : -1;

@@ -263,7 +263,7 @@ class SegmentLevels {
     bool slow = true, creeps = true;
     for (const std::size_t i : rows_.of(g)) {
       if (rows_.shares[i] < std::min(1.0, now.peak)) continue;
-      slow = slow && std::fabs(rows_.samples[i].speed) < tuning_.reversal_speed &&
+      slow = slow && rows_.samples[i].slowest < tuning_.reversal_speed &&
              friction_.explains_onset(i);
       creeps = creeps && offsets_.quick(i) < offsets_.creep(i);
     }
