@@ -139,7 +139,11 @@ def test_urls_that_cannot_be_read_are_told_with_the_reason(made, tmp_path, monke
         assert run(f"{address}/gone.parquet", "--out", tmp_path / "out") == 2
         assert "404" in capsys.readouterr().err
     assert run(f"{address}/a.parquet", "--out", tmp_path / "out") == 2  # nobody listens any more
-    assert "Cannot connect to host" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "server does not answer" in told and "Cannot connect to host" in told
+    assert run(f"{address}/", "--out", tmp_path / "out") == 2  # fsspec finds nothing
+    told = capsys.readouterr().err
+    assert "server does not answer" in told and "no recordings there" not in told
     assert not (tmp_path / "out").exists()
 
 

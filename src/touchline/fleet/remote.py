@@ -2,8 +2,9 @@
 """Recordings that are elsewhere: any URL that fsspec knows, such as s3:// and http://."""
 
 import shutil
+import socket
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -15,6 +16,9 @@ from touchline.logs.parquet import column_names
 FETCHED = ".fetched"
 # What fsspec needs for a kind of URL; its own message names no module that could be looked up.
 PACKAGES = {"http": "aiohttp", "https": "aiohttp", "s3": "s3fs", "gs": "gcsfs", "gcs": "gcsfs"}
+
+# Of a server that refuses, is not known or keeps silent: what is raised, or what that comes from.
+NO_ANSWER = (ConnectionError, TimeoutError, socket.gaierror)
 
 
 def is_url(word: str) -> bool:
@@ -59,7 +63,10 @@ def _reaching(url: str) -> Iterator[None]:
         raise
     except Exception as error:  # each kind of URL has errors of its own
         reason = error.__cause__ or error  # fsspec itself may say no more than the URL
-        raise InputError(f"{url}: cannot be read: {reason}") from error
+        causes = (error, error.__cause__, reason.__cause__)
+        silent = any(isinstance(cause, NO_ANSWER) for cause in causes)
+        what = "the server does not answer" if silent else "cannot be read"
+        raise InputError(f"{url}: {what}: {str(reason) or type(reason).__name__}") from error
 
 
 def found(url: str, endings: tuple[str, ...]) -> list[tuple[str, int]]:
@@ -80,7 +87,7 @@ def found(url: str, endings: tuple[str, ...]) -> list[tuple[str, int]]:
         elif path.lower().endswith(endings) and not _is_folder(system, path):
             return [(str(system.unstrip_protocol(path)), int(system.size(path) or 0))]
         else:
-            paths = system.find(path)
+            paths = system.find(path) or _listed(system, path)
         names = sorted(
             p
             for p in paths
@@ -111,6 +118,13 @@ def fetched(url: str, folder: Path) -> Iterator[Path]:
         yield copy
     finally:
         shutil.rmtree(place, ignore_errors=True)
+
+
+def _listed(system: Any, path: str) -> list[str]:
+    """Nothing, of a folder in which `find` has found nothing; what it keeps to itself is raised."""
+    with suppress(FileNotFoundError):
+        system.ls(path, detail=False)
+    return []
 
 
 def _is_folder(system: Any, path: str) -> bool:
