@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.arrays import Array, Index, Mask
+from touchline.identify.elsewhere import Elsewhere
 from touchline.identify.evidence import WIDTHS, Evidence
 from touchline.identify.falling import APART, DryFriction, rounded
 from touchline.identify.fit import (
@@ -144,6 +145,27 @@ class Chooser:
             )
             columns = self._beside(bodies)
         return self._polished(Problem(columns, bodies))
+
+    def vouched(self, problem: Problem) -> Problem:
+        """The problem, or a smaller one where it is far off in postures that were not shown.
+
+        Links are held closer to the model first, then payloads are left out, then all bodies.
+        """
+        links = self._bodies(SIGMAS[0])
+        if not problem.bodies or not links:
+            return problem
+        elsewhere, before = Elsewhere(self.evidence, links), _rms(self.start[self.use])
+        loads = tuple(body for body in problem.bodies if body.added)
+        smaller = [loads + links, loads] if len(problem.bodies) > len(loads) else []
+        for bodies in (problem.bodies, *smaller, links):
+            if bodies is not problem.bodies:
+                problem = Problem(self._beside(bodies), bodies)
+            free = tuple(replace(body, sigma=SIGMA) for body in bodies if body.added)
+            beside = free + (bodies[len(free) :] or links)
+            equations = self._equations(Problem(problem.columns, beside), self.use)
+            if not elsewhere.stretched(self.fit(problem), equations, before):
+                return problem
+        return Problem(self._columns_of_rows(self.start))
 
     def _polished(self, problem: Problem) -> Problem:
         """With the widths and speeds that fit best beside all else, where friction falls."""
@@ -505,6 +527,10 @@ def _options(rich: list[Column], falling: bool = False) -> list[list[Column]]:
         kinds = [(*of, "stribeck") for of in kinds if "coulomb" in of]
     sets = [tuple(c for c in rich if c.kind in of) for of in kinds]
     return [list(option) for option in dict.fromkeys(sets)]
+
+
+def _rms(left: Array) -> Array:
+    return np.asarray(np.sqrt(np.mean(left**2, axis=0)), dtype=np.float64)
 
 
 def _doubted(found: Solution) -> Solution:

@@ -36,6 +36,7 @@ class Identification:
         ambiguous: rows whose bias a mass could be as well, with 1 sigma [N or Nm] of the bias then.
         growth: (R,) how much larger residuals are than `solution` leaves them, at least 1: on data
             held out, or where the arm was not while it was fitted.
+        withheld: would freer inertias or a payload explain more, but be off in postures not shown?
     """
 
     evidence: Evidence
@@ -49,6 +50,7 @@ class Identification:
     trained: Solution
     ambiguous: dict[int, float]
     growth: Array
+    withheld: bool = False
 
     @property
     def problem(self) -> Problem:
@@ -92,8 +94,10 @@ def identify(evidence: Evidence, trust: bool = False) -> Identification:
             "record a minute in which nothing touches it"
         )
     train, test, parted = _part(evidence, ~touched)
-    chooser = Chooser(evidence, train)
-    problem = chooser.choose()
+    chooser, whole = Chooser(evidence, train), Chooser(evidence, ~touched)
+    chosen = chooser.choose()
+    problem = whole.vouched(chosen)
+    withheld = problem is not chosen
     held = evidence.part(test)
     start = held.residual()
     before = rms(start)
@@ -112,7 +116,6 @@ def identify(evidence: Evidence, trust: bool = False) -> Identification:
     if float(after.sum()) >= float(before.sum()):
         problem, after = Problem(), before
         trained = chooser.fit(problem)
-    whole = Chooser(evidence, ~touched)
     solution = whole.with_errors(whole.fit(problem))
     left = rms((whole.start + applied(evidence, solution))[~touched])
     later = after / np.maximum(left, 1e-9)
@@ -128,6 +131,7 @@ def identify(evidence: Evidence, trust: bool = False) -> Identification:
         trained,
         whole.ambiguous(),
         np.maximum(later, whole.growth_elsewhere(solution)),
+        withheld,
     )
 
 

@@ -34,6 +34,11 @@ def identification_lines(found: Identification, beside: list[str] | None = None)
     if len(lines) == 1:
         lines.append("  nothing that foretells data held out better than the description does")
     lines += _ambiguous_lines(found)
+    if found.withheld:
+        lines.append(
+            "  freer inertias or a payload would explain more, but these postures do not vouch for "
+            "what they do in others; a minute of motion of all joints tells them"
+        )
     if found.seconds < SHORT:
         lines.append(
             f"  from {found.seconds:.1f} s: offsets may be worth it, inertias and friction of "
