@@ -101,6 +101,34 @@ def test_a_single_sample_is_refused(robot, command, tmp_path, capsys):
     assert command.out.read_text() == OLD
 
 
+def backwards(time):
+    return time[::-1].copy()
+
+
+@pytest.mark.parametrize("change", [np.zeros_like, backwards], ids=["repeated", "going back"])
+def test_stamps_that_do_not_rise_are_counted_with_the_first_row(robot, tmp_path, capsys, change):
+    log = tmp_path / "clock.parquet"
+    s = free_motion(robot, 20.0, RATE)
+    write_table(log, replace(s, time=change(s.time)), robot.description)
+    out = tmp_path / "o.yaml"
+    assert main(["calibrate", str(log), "--robot", "sara", "--out", str(out)]) == 2
+    told = capsys.readouterr().err
+    assert f"{log}: 1999 of 2000 time stamps are not later than all before" in told
+    assert "the first in row 1:" in told and "log: time" in told and not out.exists()
+
+
+def test_a_clock_that_was_set_back_is_told_beside_the_result(robot, tmp_path, capsys):
+    log = tmp_path / "clock.csv"
+    s = free_motion(robot, 16.0, RATE)
+    s.tau[:, 2] += 1.0  # an offset to be found
+    s.time[1100:] -= 10.0
+    write_table(log, s, robot.description)
+    arguments = ["calibrate", str(log), "--robot", "sara", "--out", str(tmp_path / "o.yaml")]
+    assert main(arguments) == 0
+    told = capsys.readouterr().out
+    assert "500 of 1600 time stamps are not later than all before them, the first in row 1100" in told
+
+
 def test_a_recording_that_is_cut_off_is_said_to_be(robot, tmp_path, capsys):
     log = tmp_path / "cut.csv"
     write_table(log, free_motion(robot, 3.0, RATE), robot.description)

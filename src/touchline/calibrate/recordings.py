@@ -16,6 +16,7 @@ from touchline.observer.samples import Samples
 
 CHUNK = 1 << 15  # samples
 LEAST_SECONDS = 5.0  # shorter ones tell an offset at best
+FEW = 0.005  # of the samples; losses below it change nothing, as for `touchline check`
 BESIDE = 0.3  # s on either side of a stretch that is left out
 
 
@@ -64,6 +65,9 @@ class Recordings:
                 present.add(part)
             self.losses += recording.losses
         present.refuse_void(log)
+        present.refuse_unordered(log)
+        if present.unordered > FEW * present.samples:
+            self.losses.append(f"{log}: {present.unordered_words}: they are left out")
         self.samples += present.samples
         self.moving += present.moving
         return period, present.samples * period
