@@ -19,6 +19,7 @@ from touchline.identify.evidence import gather
 from touchline.identify.identification import identify
 from touchline.identify.touches import jumps
 from touchline.logs import write_table
+from touchline.trials.arms import described_arm
 from touchline.trials.free_motion import random_trajectory
 from touchline.trials.wrong_arm import make_wrong_arm, record
 
@@ -126,7 +127,8 @@ def test_a_clock_that_was_set_back_is_told_beside_the_result(robot, tmp_path, ca
     arguments = ["calibrate", str(log), "--robot", "sara", "--out", str(tmp_path / "o.yaml")]
     assert main(arguments) == 0
     told = capsys.readouterr().out
-    assert "500 of 1600 time stamps are not later than all before them, the first in row 1100" in told
+    assert "500 of 1600 time stamps are not later than all before them, the first in" in told
+    assert "row 1100: they are left out" in told
 
 
 def test_a_recording_that_is_cut_off_is_said_to_be(robot, tmp_path, capsys):
@@ -223,6 +225,39 @@ def test_the_log_of_another_robot_is_refused(robot, tmp_path):
     tau, wrench = exact_loads(robot, s.time, q, qd)
     found = identify(gather(robot, [[replace(s, tau=tau, wrench=wrench)]]))
     with pytest.raises(InputError, match=r"a\.parquet: does not fit sara: .*whatever"):
+        refuse_unexplained(found, [tmp_path / "a.parquet"])
+
+
+@pytest.fixture(scope="module")
+def panda():
+    """Recordings of an arm with torques alone, which has an unknown payload and friction."""
+    robot, rng = described_arm("panda-torques"), np.random.default_rng(1)
+    arm = make_wrong_arm(robot, "friction", rng)
+    return robot, record(arm, random_trajectory(robot, rng), 30.0, RATE, rng)
+
+
+def test_a_robot_whose_weight_an_offset_would_take_is_refused(panda, tmp_path):
+    robot, s = panda
+    other, rng = tl.load_robot("sara"), np.random.default_rng(3)
+    arm = make_wrong_arm(other, "payload alone", rng)
+    own = record(arm, random_trajectory(other, rng), 30.0, RATE, rng)
+    n = own.q.shape[1]
+    filled = [np.zeros_like(s.q), np.zeros_like(s.q), s.tau.copy()]
+    for values, theirs in zip(filled, (own.q, own.qd, own.tau), strict=True):
+        values[:, :n] = theirs
+    q, qd, tau = filled
+    found = identify(gather(robot, [[replace(s, q=q, qd=qd, tau=tau)]]))
+    with pytest.raises(InputError, match=r"a\.parquet: does not fit panda-torques: .*check ROBOT"):
+        refuse_unexplained(found, [tmp_path / "a.parquet"])
+
+
+def test_an_offset_beyond_all_torques_of_the_arm_is_refused(panda, tmp_path):
+    robot, s = panda
+    refuse_unexplained(identify(gather(robot, [[s]])), [])
+    tau = s.tau.copy()
+    tau[:, 1] += 150.0  # Nm; the arm's own weight makes 60 Nm at most
+    found = identify(gather(robot, [[replace(s, tau=tau)]]))
+    with pytest.raises(InputError, match=r"panda_joint2 would have an offset of \+150 Nm, where"):
         refuse_unexplained(found, [tmp_path / "a.parquet"])
 
 

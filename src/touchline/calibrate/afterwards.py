@@ -4,6 +4,7 @@
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from touchline.calibrate.beforehand import named
 from touchline.errors import InputError
@@ -19,6 +20,10 @@ from touchline.identify.touches import jumps
 MUCH = 0.3  # of the time seems touched
 MOST_JUMPS, MOST_JUMPS_BESIDE_MUCH = 13.0, 5.0
 UNEXPLAINED = 0.3  # of what is read; of real arms 0.03 to 0.09 is left, of another robot's log 1.3
+# An offset may take the mean of another robot's readings: then little is left of what is read, but
+# 0.9 of its spread. Of real arms 0.05 of that is left. Friction of an arm that hardly moves can be
+# most of the spread, but not a tenth of what is read.
+UNMOVED, BESIDE_READ = 0.5, 0.1
 LEAST = 2.0  # N or Nm, sums over joints or sensors; less is noise on unloaded sensors
 APART = 20.0  # times as much left in a row as by a fit to itself; parts of real recordings: 5
 LEAST_APART, LEAST_SHARE = 1.0, 0.05  # N or Nm, or of what is read; less is a bias that drifts
@@ -58,17 +63,43 @@ def refuse_unexplained(found: Identification, logs: list[Path]) -> None:
         InputError: how little, and what to do.
     """
     e = found.evidence
-    size = rms(e.reading[~found.touched])
+    reading = e.reading[~found.touched]
+    size, spread = rms(reading), reading.std(axis=0)
     rows = np.flatnonzero(e.used)
     joints = rows[rows < e.joints]
     forces = rows[(rows >= e.joints) & ((rows - e.joints) % 6 < 3)]
     for own, unit in ((joints, "Nm of joint torques"), (forces, "N of forces")):
-        left, read = float(found.after[own].sum()), float(size[own].sum())
+        left, read, varied = (float(x[own].sum()) for x in (found.after, size, spread))
+        told = ""
         if left > max(LEAST, UNEXPLAINED * read):
+            told = f"{left:.3g} {unit} are left of {read:.3g}"
+        elif left > max(LEAST, UNMOVED * varied, BESIDE_READ * read):
+            told = f"{left:.3g} {unit} are left where readings vary by {varied:.3g}"
+        if told:
             raise InputError(
-                f"{named(logs)}: does not fit {e.robot.description.name}: {left:.3g} {unit} are "
-                f"left of {read:.3g}, whatever is identified. Is it another robot's recording, "
-                f"or are columns swapped or dead (touchline check ROBOT LOG)? {KEPT}"
+                f"{named(logs)}: does not fit {e.robot.description.name}: {told}, whatever is "
+                "identified. Is it another robot's recording, or are columns swapped or dead "
+                f"(touchline check ROBOT LOG)? {KEPT}"
+            )
+    _refuse_far_offsets(found, joints, logs)
+
+
+def _refuse_far_offsets(found: Identification, joints: NDArray, logs: list[Path]) -> None:
+    """Refuses offsets of joints beyond every torque that the model expects of the arm."""
+    e = found.evidence
+    untouched = ~found.touched
+    reading = e.reading[np.ix_(untouched, joints)]
+    expected = float(np.abs(e.load[np.ix_(untouched, joints)]).max(initial=0.0))
+    # An arm with vertical axes alone has no weight in its torques, but what moves it.
+    moving = float(np.abs(reading - reading.mean(axis=0)).max(initial=0.0)) if len(reading) else 0.0
+    for j in joints:
+        offset = found.solution.value("bias", j)
+        if abs(offset) > max(LEAST, expected, moving):
+            raise InputError(
+                f"{named(logs)}: does not fit {e.robot.description.name}: {e.rows.names[j]} would "
+                f"have an offset of {offset:+.3g} Nm, where the model expects {expected:.3g} Nm "
+                "at most of any joint. Is it another robot's recording, a wrong unit or column, "
+                f"or does the description lack a load (touchline check ROBOT LOG)? {KEPT}"
             )
 
 
