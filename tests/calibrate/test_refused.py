@@ -93,6 +93,45 @@ def test_samples_that_are_no_numbers_are_counted_before_what_the_others_lack(
     assert ("one pose alone" if rests else "2 s of contact-free data") in second
 
 
+@pytest.mark.parametrize(("signal", "every"), [("q", False), ("qd", False), ("qd", True)])
+def test_the_joint_whose_motion_is_no_number_is_named(robot, tmp_path, capsys, signal, every):
+    log, out = tmp_path / "void.parquet", tmp_path / "o.yaml"
+    s, name = free_motion(robot, 6.0, RATE), robot.joint_names[1]
+    getattr(s, signal)[:, slice(None) if every else 1] = np.nan
+    write_table(log, s, robot.description)
+    assert main(["calibrate", str(log), "--robot", "sara", "--out", str(out)]) == 2
+    told = capsys.readouterr().err
+    what = {"q": "position", "qd": "velocity"}[signal]
+    whose = f"all {len(robot.joint_names)} joints" if every else f"{name} (column {signal}.{name}"
+    assert "600 of 600 samples have a position or velocity that is not a number" in told
+    assert f"{what} of {whose}" in told and f"columns under `log: {signal}`" in told
+    assert not out.exists()
+
+
+def test_a_velocity_column_that_is_taken_out_is_estimated(robot, tmp_path):
+    log, out = tmp_path / "less.csv", tmp_path / "o.yaml"
+    s = free_motion(robot, 16.0, RATE)
+    s.tau[:, 2] += 1.0  # an offset to be found
+    write_table(log, s, robot.description)
+    rows = [line.split(",") for line in log.read_text().splitlines()]
+    at = rows[0].index(f"qd.{robot.joint_names[1]}")
+    log.write_text("".join(",".join(r[:at] + r[at + 1 :]) + "\n" for r in rows))
+    assert main(["calibrate", str(log), "--robot", "sara", "--out", str(out)]) == 0
+
+
+def test_a_joint_whose_torque_is_no_number_is_told_to_be_not_calibrated(robot, tmp_path, capsys):
+    log, out = tmp_path / "void.parquet", tmp_path / "o.yaml"
+    s, name = free_motion(robot, 16.0, RATE), robot.joint_names[1]
+    s.tau[:, 1] = np.nan
+    s.tau[:, 2] += 1.0  # an offset to be found
+    write_table(log, s, robot.description)
+    assert main(["calibrate", str(log), "--robot", "sara", "--out", str(out)]) == 0
+    told = capsys.readouterr().out
+    assert f"torque of {name} (column tau.{name} of `log: tau`) is not a number" in told
+    assert "in 1600 of 1600 samples: not calibrated; record it" in told
+    tl.load_robot(out)
+
+
 def test_a_single_sample_is_refused(robot, command, tmp_path, capsys):
     log = tmp_path / "one.parquet"
     s = free_motion(robot, 1.0, RATE)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from touchline.calibrate.lacking import ADVICE, MOST_LACKING
 from touchline.calibrate.recordings import Recordings
 from touchline.check.coarse import next_step
 from touchline.check.mending import Mending
@@ -15,8 +16,6 @@ from touchline.errors import InputError
 from touchline.identify.choice import POSES
 from touchline.identify.evidence import Evidence
 from touchline.model.robot import Robot
-
-MOST_LACKING = 0.5  # of the samples: where more lack a value, that is told first
 
 
 def named(logs: list[Path]) -> str:
@@ -35,7 +34,10 @@ def naming(logs: list[Path], recordings: Recordings) -> Iterator[None]:
         if lacking > MOST_LACKING * recordings.samples:
             what = "a position or velocity that is not a number, and show nothing"
             told = f"{lacking} of {recordings.samples} samples have {what}"
-            raise InputError([f"{named(logs)}: {told}", *error.problems]) from None
+            if recordings.lacking:
+                told += f": {'; '.join(recordings.lacking.values())}"
+            advice = [ADVICE[signal] for signal in recordings.lacking]
+            raise InputError([f"{named(logs)}: {told}", *error.problems, *advice]) from None
         if any(str(log) in first for log in logs):
             raise
         raise InputError([f"{named(logs)}: {first}", *more]) from None

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from touchline.calibrate.lacking import joints_lacking, signal_words, uncalibrated_words
 from touchline.detector.thresholds import PERIOD_RATIO
 from touchline.errors import InputError
 from touchline.logs import open_log
@@ -29,12 +30,14 @@ class Recordings:
         samples: that the logs hold.
         moving: of them with the positions and velocities of all joints.
         losses: what is said of parts of the logs that cannot be read.
+        lacking: by `q` and `qd`, whose are no numbers in most samples of a log.
     """
 
     def __init__(self, robot: Robot, logs: list[Path]) -> None:
         self._robot, self._logs = robot, logs
         self._left_out: list[tuple[int, float, float]] = []
         self.losses: list[str] = []
+        self.lacking: dict[str, str] = {}
         self.seconds = 0.0
         self.samples = self.moving = 0
         self.period = float("nan")
@@ -64,10 +67,19 @@ class Recordings:
                     period = typical_period(part.time)
                 present.add(part)
             self.losses += recording.losses
+            columns = recording.columns
         present.refuse_void(log)
         present.refuse_unordered(log)
         if present.unordered > FEW * present.samples:
             self.losses.append(f"{log}: {present.unordered_words}: they are left out")
+        told = uncalibrated_words(self._robot.description, present, columns)
+        if told is not None:
+            self.losses.append(f"{log}: {told}")
+        for signal in ("q", "qd"):
+            joints = joints_lacking(self._robot.description, present, signal)
+            if len(joints):
+                words = signal_words(self._robot.description, signal, joints, columns)
+                self.lacking.setdefault(signal, words)
         self.samples += present.samples
         self.moving += present.moving
         return period, present.samples * period
