@@ -19,6 +19,7 @@ from touchline.identify.evidence import gather
 from touchline.identify.identification import identify
 from touchline.identify.touches import jumps
 from touchline.logs import write_table
+from touchline.observer.dynamics import gravity_loads
 from touchline.trials.arms import described_arm
 from touchline.trials.free_motion import random_trajectory
 from touchline.trials.wrong_arm import make_wrong_arm, record
@@ -298,6 +299,33 @@ def test_an_offset_beyond_all_torques_of_the_arm_is_refused(panda, tmp_path):
     found = identify(gather(robot, [[replace(s, tau=tau)]]))
     with pytest.raises(InputError, match=r"panda_joint2 would have an offset of \+150 Nm, where"):
         refuse_unexplained(found, [tmp_path / "a.parquet"])
+
+
+NOT_READ = {
+    "nothing": (lambda robot, s: np.zeros_like(s.tau), "is always 0: dead"),
+    "gravity taken out": (
+        lambda robot, s: s.tau - gravity_loads(robot, s.q).torque,
+        "times what the model expects",
+    ),
+    "external torques": (
+        lambda robot, s: np.random.default_rng(0).normal(0.0, 0.05, s.tau.shape),
+        "gravity seems taken out already",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", NOT_READ)
+def test_what_does_not_fit_is_told_with_the_cause_that_check_finds(panda, tmp_path, capsys, kind):
+    robot, s = panda
+    change, words = NOT_READ[kind]
+    log, out = tmp_path / "other.parquet", tmp_path / "o.yaml"
+    write_table(log, replace(s, tau=change(robot, s)), robot.description)
+    described = str(robot.description.path)
+    assert main(["calibrate", str(log), "--robot", described, "--out", str(out)]) == 2
+    first, *more = capsys.readouterr().err.splitlines()
+    assert f"{log}: does not fit panda-torques" in first and "touchline check ROBOT LOG" in first
+    assert any(words in line for line in more), more
+    assert not out.exists()
 
 
 def test_recordings_of_robots_that_carry_different_weights_are_refused(robot, tmp_path):

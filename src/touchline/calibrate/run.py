@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 from touchline.calibrate.afterwards import refuse_touched, refuse_two_robots, refuse_unexplained
 from touchline.calibrate.beforehand import naming, refuse_one_pose, refuse_wrong_signals
 from touchline.calibrate.blame import find_blame, often_off
+from touchline.calibrate.causes import causes_told
 from touchline.calibrate.held_out import HeldOut, judge, split
 from touchline.calibrate.noise import measure_noise, noise_keys
 from touchline.calibrate.one_moment import OneMoment, find_moments
@@ -214,7 +215,8 @@ def calibrate(
                 found = identify(evidence, trust)
             if not trust:
                 refuse_two_robots(found, logs)
-                refuse_unexplained(found, logs)
+                with causes_told(described, logs):
+                    refuse_unexplained(found, logs)
                 refuse_touched(found, logs)
             left_out = found.touches()
             if learn:
