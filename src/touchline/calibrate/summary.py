@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from touchline.calibrate.lasting import lasting_lines
 from touchline.calibrate.run import Calibration, Thresholds
 from touchline.detector.limits import threshold
 from touchline.detector.residual_noise import residual_noise
@@ -36,6 +37,7 @@ def summary_text(result: Calibration) -> str:
         off = [line for frame in result.frames for line in _frame_lines(frame)]
         gains = [] if result.gains is None else _gain_lines(result.gains)
         parts.append(identification_lines(result.identification, gains + late + off))
+        parts.append(lasting_lines(result.identification))
     if result.rest is not None:
         parts.append(rest_lines(result.rest, result.robot.joint_names))
     parts.append(_noise_lines(result))
