@@ -3,6 +3,8 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from touchline.arrays import Index
 from touchline.logs.naming import parse_naming
 from touchline.logs.presence import Presence
@@ -24,7 +26,7 @@ def joints_lacking(robot: RobotDescription, present: Presence, signal: str) -> I
     """Joints whose `q`, `qd` or `tau` is no number in most of the samples."""
     most = present.lacking[signal] > MOST_LACKING * present.samples
     if signal == "tau":
-        most &= [joint.measured for joint in robot.joints]
+        most &= np.array([joint.measured for joint in robot.joints], dtype=bool)
     return most.nonzero()[0]
 
 
