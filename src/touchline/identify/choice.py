@@ -154,7 +154,7 @@ class Chooser:
         links = self._bodies(SIGMAS[0])
         if not problem.bodies or not links:
             return problem
-        elsewhere, before = Elsewhere(self.evidence, links), _rms(self.start[self.use])
+        elsewhere, before = Elsewhere(self.evidence, links), rms(self.start[self.use])
         loads = tuple(body for body in problem.bodies if body.added)
         smaller = [loads + links, loads] if len(problem.bodies) > len(loads) else []
         for bodies in (problem.bodies, *smaller, links):
@@ -529,8 +529,9 @@ def _options(rich: list[Column], falling: bool = False) -> list[list[Column]]:
     return [list(option) for option in dict.fromkeys(sets)]
 
 
-def _rms(left: Array) -> Array:
-    return np.asarray(np.sqrt(np.mean(left**2, axis=0)), dtype=np.float64)
+def rms(left: Array) -> Array:
+    """Root mean square of each row."""
+    return np.sqrt(np.mean(left**2, axis=0)) if len(left) else np.zeros(left.shape[1])
 
 
 def _doubted(found: Solution) -> Solution:

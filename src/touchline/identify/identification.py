@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from touchline.arrays import Array, Mask
 from touchline.errors import InputError
-from touchline.identify.choice import Chooser
+from touchline.identify.choice import Chooser, rms
 from touchline.identify.evidence import Evidence
 from touchline.identify.fit import Problem, Solution, applied
 from touchline.identify.touches import STICTION, find_touches, stretches
@@ -156,11 +156,6 @@ def touched_instants(evidence: Evidence) -> Mask:
             return now
         touched = now
     return touched
-
-
-def rms(left: Array) -> Array:
-    """Root mean square of each row."""
-    return np.sqrt(np.mean(left**2, axis=0)) if len(left) else np.zeros(left.shape[1])
 
 
 def duration(evidence: Evidence, use: Mask) -> float:
