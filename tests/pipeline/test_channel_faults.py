@@ -88,6 +88,40 @@ def test_a_spike_of_any_channel_is_told_at_once_by_name_and_begins_nothing(name,
         assert told.tolist() == [AT]
 
 
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("speed", [0.04, 0.048])
+def test_a_velocity_of_a_slow_joint_that_turns_its_sign_is_held_and_no_collision(speed, seed):
+    """The step is less than a tenth of a radian per second: only positions show that it is none."""
+    robot = robot_named("ur5")
+    pipeline = tl.Pipeline(robot)
+    s = in_motion("ur5", seed=seed)
+    joint = 0
+    s.qd[:, joint] += speed - s.qd[AT, joint]  # at AT it is as fast as told
+    s.q[:, joint] = s.q[0, joint] + np.cumsum(s.qd[:, joint]) / RATE
+    s.q[:, joint] += 2e-6 * np.random.default_rng(seed).normal(size=len(s.time))
+    tau, wrench = exact_loads(robot, s.time, s.q, s.qd)
+    s = replace(s, tau=tau, wrench=wrench)
+    s.qd[AT : AT + 300, joint] *= -1.0
+    run(pipeline, s)
+    first = pipeline.faults[0]
+    assert (first.sample, first.channel, str(first.fault)) == (
+        AT,
+        "qd.shoulder_pan_joint",
+        "spike",
+    )
+    assert [event for event in pipeline.events if event.level == "collision"] == []
+
+
+@pytest.mark.parametrize("grain", [0.06, 0.1])
+def test_a_velocity_that_flickers_by_its_last_digit_is_not_faulty(grain):
+    """The arm stands: one sample in a hundred is rounded up, and no position shows that."""
+    pipeline = tl.Pipeline(robot_named("sara"))
+    s = in_motion("sara", swing=0.0)
+    s.qd[:] = grain * (np.random.default_rng(0).random(s.qd.shape) < 0.01)
+    run(pipeline, s)
+    assert [c for c in pipeline.faults if c.channel.startswith("qd")] == []
+
+
 def frozen(values, at):
     values[AT:] = values[at]
 

@@ -73,6 +73,7 @@ class ChannelGates {
         spiked_(at_.count(), -std::numeric_limits<double>::infinity()),
         moved_(at_.count(), Moved::no),
         unproven_(at_.count(), 0),
+        shown_from_(at_.joints),
         far_(at_.joints),
         since_(at_.count()),
         calm_(at_.count()),
@@ -243,6 +244,7 @@ class ChannelGates {
           ways_.turn(c, turns);
           return;
         }
+        if (c < at_.tau() && speeds_.is_rounding(c, std::fabs(x - last_[c]))) return;
         if (borne_out(c, dt)) {
           const bool first = !(ratio_before_[c] > 1.0);  // what goes on to step changes
           if (first && c >= at_.wrench() && !felt_elsewhere(c)) unproven_[c] = any_unproven_ = true;
@@ -252,6 +254,7 @@ class ChannelGates {
         since_[c] = calm_[c] = 0;
         if (time_ - spiked_[c] < kAgain) moved_[c] = moved(c);
         spiked_[c] = time_;
+        if (c >= at_.qd() && c < at_.tau()) shown_from_[c - at_.qd()] = {time_ - dt, last_[c - at_.qd()]};
         hold(c, dt);
         return;
       case Fault::spike: return go_on_holding(c, dt);
@@ -472,11 +475,15 @@ class ChannelGates {
   }
   static constexpr double kLeastMove = 1e-9;  // of any unit: rounding
 
-  // A step of speed shows in the way since the last sample, unless positions are too rough.
+  // A step of speed shows in the way since then, unless positions are too rough for so short a time.
   bool speed_borne_out(std::size_t j, double dt) const {
-    const double before = last_[at_.qd() + j], jump = std::fabs(now_[at_.qd() + j] - before);
-    const double shown = std::fabs((now_[j] - last_[j]) / dt - before);
-    return !(shown + tuning_.moves * mean_[j] / dt < tuning_.borne_out * jump);
+    const std::size_t v = at_.qd() + j;
+    const bool held = fault_[v] == Fault::spike;
+    const double over = held ? time_ - shown_from_[j].time : dt;
+    const double from = held ? shown_from_[j].position : last_[j];
+    const double before = last_[v], jump = std::fabs(now_[v] - before);
+    const double shown = std::fabs((now_[j] - from) / over - before);
+    return !(shown + tuning_.moves * mean_[j] / over < tuning_.borne_out * jump);
   }
 
   // Is the step of a sensor that of one force on a link: no moment along it, none beyond reach, and
@@ -590,6 +597,10 @@ class ChannelGates {
             out_.data() + at_.wrench()};
   }
 
+  // Where a joint was.
+  struct Place {
+    double time, position;  // [s]; [rad or m]
+  };
   // A joint with dry friction that the description knows.
   struct Rough {
     std::size_t number;
@@ -611,6 +622,7 @@ class ChannelGates {
   std::vector<double> spiked_;  // when it jumped last [s]
   std::vector<Moved> moved_;    // see `take_moved`
   std::vector<char> unproven_;  // see `any_unproven`
+  std::vector<Place> shown_from_;  // per joint, before its velocity was held
   std::vector<int> far_;
   std::vector<int> since_, calm_;  // samples, of what a fault waits for
   std::vector<Passes> passes_;

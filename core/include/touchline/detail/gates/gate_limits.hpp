@@ -41,7 +41,7 @@ class GateLimits {
     for (std::size_t j = 0; j < at.joints; ++j) {
       const JointRow& joint = robot.joints[j];
       floors_[at.q() + j] = std::max(tuning.least_travel, tuning.fastest * period);
-      floors_[at.qd() + j] = tuning.speed_step + tuning.hardest * period;
+      floors_[at.qd() + j] = tuning.hardest * period;
       wraps_[j] = robot.nodes[joint.nodes[0]].kind == NodeKind::revolute;
       if (!layout.inboard_sensors[j].empty())
         witnesses_[at.tau() + j] = layout.inboard_sensors[j][0].sensor;

@@ -33,7 +33,7 @@ class SpeedWatch {
         turn_(joints),
         usual_(joints),
         most_(joints),
-        grain_(joints, std::numeric_limits<double>::infinity()),
+        grain_(2 * joints, std::numeric_limits<double>::infinity()),
         same_(2 * joints),
         often_(2 * joints) {}
 
@@ -59,6 +59,8 @@ class SpeedWatch {
     double* __restrict often = often_.data();
     for (std::size_t c = 0; c < 2 * n; ++c) {
       const bool changes = !(now[c] == last[c]);
+      const double change = std::fabs(now[c] - last[c]);
+      grain[c] = change > 0.0 && change < grain[c] ? change : grain[c];
       same[c] = changes ? 0.0 : same[c] + 1.0;
       often[c] += same[c] < stands ? rate * ((changes ? 1.0 : 0.0) - often[c]) : 0.0;
     }
@@ -72,8 +74,6 @@ class SpeedWatch {
       drift[j] = sum == sum ? sum : 0.0;
       way[j] = by_speed == by_speed ? by_speed : 0.0;
       turn[j] = faster == faster ? faster : 0.0;
-      const double change = std::fabs(step);
-      grain[j] = change > 0.0 && change < grain[j] ? change : grain[j];
       const bool alive = same[n + j] < stands && often[n + j] > lively && often[j] > lively;
       const double lag = turn[j] * drift[j] > 0.0 ? late : period;
       const double clear = slight + part * std::fabs(way[j]) + lag * std::fabs(turn[j]) +
@@ -101,6 +101,8 @@ class SpeedWatch {
   }
   // For how many samples a position (c = j) or velocity (c = joints + j) has been the same.
   double same(std::size_t c) const { return same_[c]; }
+  // Is what a position or velocity has changed by no more than what rounding makes of it?
+  bool is_rounding(std::size_t c, double change) const { return change <= kGrains * grain_[c]; }
   // Does it change in too few samples for two that are alike to say anything?
   bool is_dull(std::size_t c) const { return often_[c] < tuning_.lively; }
 
@@ -112,7 +114,7 @@ class SpeedWatch {
   }
 
  private:
-  static constexpr double kGrains = 2.0;  // a position stands until its joint has come by one of them
+  static constexpr double kGrains = 2.0;  // what is rounded stands until it has come by one of them
 
   std::size_t joints_;
   int silent_;  // [samples]
@@ -122,7 +124,7 @@ class SpeedWatch {
   std::vector<double> drift_, way_;    // per joint: what they differ by; its way by its velocity [rad or m]
   std::vector<double> turn_;           // by what its velocity has changed [rad/s or m/s]
   std::vector<double> usual_, most_;   // of what they differ by: the mean, and what is believed [rad or m]
-  std::vector<double> grain_;          // the smallest change of its position [rad or m]
+  std::vector<double> grain_;          // the smallest change of each position, then velocity
   std::vector<double> same_, often_;   // per position, then per velocity: samples; of the samples
 };
 

@@ -37,10 +37,9 @@ struct GatesTuning {
   // Way that gravity hardly notices [rad or m]: less is no jump of a position. Half or double only
   // matter for robots at more than 1 kHz.
   double least_travel = 0.01;
-  // A velocity may step by so much [rad/s or m/s] in a sample, and by `hardest` times its period
-  // [rad/s2 or m/s2], as in a hard stop. Half: blows are doubted. Double: spikes of twice
-  // the size pass, whose momentum the filters take for a load.
-  double speed_step = 0.05;
+  // No velocity changes faster [rad/s2 or m/s2], as in a hard stop, without its position showing it.
+  // Half: blows are held for a sample. Double: steps of twice the size pass, whose momentum the filters
+  // take for a blow.
   double hardest = 50.0;
   // No contact is less than this, in a force [N] or a torque [Nm]: smaller steps are not judged.
   // Half: weak knocks are judged. Double: spikes of 2 N pass.
@@ -177,7 +176,6 @@ struct GatesTuning {
     v("moves", "1", t.moves);
     v("fastest", "rad/s", t.fastest);
     v("least_travel", "rad", t.least_travel);
-    v("speed_step", "rad/s", t.speed_step);
     v("hardest", "rad/s2", t.hardest);
     v("least_step_force", "N", t.least_step_force);
     v("least_step_torque", "Nm", t.least_step_torque);
