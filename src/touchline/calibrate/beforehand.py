@@ -82,6 +82,6 @@ def refuse_one_pose(evidence: Evidence, logs: list[Path]) -> None:
                 f"{POSES:g} rad are needed. An offset of a sensor then reads the same as a mass",
                 "nothing written. Record a minute in which all joints move, or let the arm rest in "
                 "some ten poses for three seconds each: touchline calibrate --plan ROBOT proposes "
-                "both. Noise and thresholds of this pose alone are measured with --no-identify",
+                "both. The noise of this pose alone is measured with --no-identify",
             ]
         )

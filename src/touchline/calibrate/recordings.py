@@ -29,6 +29,7 @@ class Recordings:
         period: of the samples [s].
         samples: that the logs hold.
         moving: of them with the positions and velocities of all joints.
+        travel: of the joint that comes farthest, over all logs [rad or m]; 0 without joints.
         losses: what is said of parts of the logs that cannot be read.
         lacking: by `q` and `qd`, whose are no numbers in most samples of a log.
     """
@@ -41,6 +42,8 @@ class Recordings:
         self.seconds = 0.0
         self.samples = self.moving = 0
         self.period = float("nan")
+        joints = len(robot.joint_names)
+        self._least, self._most = np.full(joints, np.inf), np.full(joints, -np.inf)
         seconds = 0.0
         for log in logs:
             period, length = self._look_at(log)
@@ -66,6 +69,8 @@ class Recordings:
                 if not np.isfinite(period):
                     period = typical_period(part.time)
                 present.add(part)
+                self._least = np.fmin(self._least, np.fmin.reduce(part.q, axis=0, initial=np.inf))
+                self._most = np.fmax(self._most, np.fmax.reduce(part.q, axis=0, initial=-np.inf))
             self.losses += recording.losses
             columns = recording.columns
         present.refuse_void(log)
@@ -83,6 +88,11 @@ class Recordings:
         self.samples += present.samples
         self.moving += present.moving
         return period, present.samples * period
+
+    @property
+    def travel(self) -> float:
+        """See the class."""
+        return float(np.max(self._most - self._least, initial=0.0))
 
     def all(self, what: str) -> Iterator[Iterator[Samples]]:
         """Every recording, in parts."""

@@ -31,6 +31,7 @@ from touchline.detector.calibration import (
 from touchline.detector.tail import Tail
 from touchline.errors import InputError
 from touchline.folder import check_file
+from touchline.identify.choice import POSES
 from touchline.identify.delay import Delay, find_delays, refined, with_delays
 from touchline.identify.described import description_changes, identified_robot
 from touchline.identify.evidence import filtered, gather
@@ -240,6 +241,8 @@ def calibrate(
             quiet, recordings, logs, chosen, rate, trust, more_elsewhere
         )
         left_out += more
+    except StandsStill as error:
+        lacking = str(error)
     except NoThresholds as error:
         if found is None or not found.problem.columns + found.problem.bodies:
             with naming(logs, recordings):
@@ -299,6 +302,10 @@ class NoThresholds(InputError):
     """The recordings are no good for thresholds."""
 
 
+class StandsStill(NoThresholds):
+    """What an arm that stands in one pose shows is its noise, and for too short a time for more."""
+
+
 def _find_thresholds(
     robot: Robot,
     recordings: Recordings,
@@ -321,6 +328,14 @@ def _find_thresholds(
         found, rows = _watch(robot, recordings, trust)
         suspicions = [] if trust else find_contacts(found, METHODS)
         if not suspicions:
+            share = rate / max(len(chosen) * len(robot.segment_names), 1)
+            if 0.0 < recordings.travel < POSES and share * found.hours < 1.0:
+                raise StandsStill(
+                    f"no joint moves by more than {recordings.travel:.2g} rad, and "
+                    f"{3600 * found.hours:.3g} s without contact show no alarm that comes "
+                    f"{rate:g} times an hour: nothing is guessed beyond that\n"
+                    "they follow from the noise figures, in each posture, if none were calibrated"
+                )
             train, test, parted = split(found, len(logs))
             held_out = judge(robot, train, test, rate)
             tails = fit_tails(robot, found)

@@ -5,7 +5,7 @@ Two passes over the same motion. The first finds what the model's errors leave i
 that grows with speed and acceleration; the second how often each method's statistic exceeds what.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,6 +29,9 @@ from touchline.observer.samples import Samples
 BLOCK = 0.02  # s, over which the largest value of a statistic is kept
 GAP = 0.2  # s; alarms closer than this are one
 EVERY = 0.01  # s, between the residuals that model errors are fitted to
+# s; after a longer gap what stands there is an offset, as where a recording begins. So it is where
+# a touch was left out, since dry friction leaves another offset after each.
+BROKEN = 0.2
 FAR = 6.0  # robust standard deviations; residuals beyond it count as if they were there
 ROUNDS = 4
 LEAST_ERROR = 0.05  # of the typical residual: no model is better
@@ -104,10 +107,24 @@ def collect_residuals(
     parts: list[tuple[Array, ...]] = []
     for recording in recordings:
         detector = Detector(Observer(robot), thresholds, period)
-        for s in recording:
+        for begins, s in _unbroken(recording):
+            if begins:
+                detector = Detector(Observer(robot), thresholds, period)
             d = detector.details(s.time, s.q, s.qd, s.tau, s.wrench, every)
             parts.append((d.residual, d.slow, d.quick, d.noise, d.activity))
     return Residuals(*(np.concatenate(x) for x in zip(*parts, strict=True)))
+
+
+def _unbroken(recording: Iterable[Samples]) -> Iterator[tuple[bool, Samples]]:
+    """Parts of a recording without long gaps; does one begin after such a gap?"""
+    last = np.inf
+    for s in recording:
+        after = np.flatnonzero(np.diff(s.time, prepend=last) > BROKEN)
+        edges = [0, *after[after > 0].tolist(), len(s)]
+        for start, end in zip(edges[:-1], edges[1:], strict=True):
+            if end > start:
+                yield start in after, s.where(slice(start, end))
+        last = s.time[-1] if len(s) else last
 
 
 def fit_rows(robot: Robot, period: float, found: Residuals) -> dict[str, RowCalibration]:
@@ -187,11 +204,15 @@ def collect_statistics(
     thresholds = watching(robot, period, rows)
     per_block = max(1, round(BLOCK / period))
     hold = round(robot.description.detection.min_duration / period)
+    shape = _shape(thresholds)
     blocks, times, numbers, count = [], [], [], 0
     for number, recording in enumerate(recordings):
         detector = Detector(Observer(robot), thresholds, period)
-        rest, rest_time = np.empty((0, *_shape(thresholds))), np.empty(0)
-        for s in recording:
+        rest, rest_time = np.empty((0, *shape)), np.empty(0)
+        for begins, s in _unbroken(recording):
+            if begins:
+                detector = Detector(Observer(robot), thresholds, period)
+                rest, rest_time = np.full((1, *shape), np.nan), s.time[:1]
             found = detector.details(s.time, s.q, s.qd, s.tau, s.wrench, max(1, len(s.time)))
             count += len(s.time)
             values = np.concatenate([rest, found.statistics])
@@ -202,7 +223,7 @@ def collect_statistics(
             times.append(time[:whole:per_block])
             numbers.append(np.full(len(times[-1]), number))
             rest, rest_time = values[whole:], time[whole:]
-        blocks.append(np.full((1, *_shape(thresholds)), np.nan))
+        blocks.append(np.full((1, *shape), np.nan))
         times.append(np.full(1, np.nan))
         numbers.append(np.full(1, number))
     hours = count * period / 3600

@@ -33,7 +33,7 @@ class Samples:
     def __len__(self) -> int:
         return len(self.time)
 
-    def where(self, keep: np.ndarray) -> "Samples":
+    def where(self, keep: np.ndarray | slice) -> "Samples":
         """Some of the samples; `row` stays that of the first of all."""
         q, qd, tau, wrench = self.q[keep], self.qd[keep], self.tau[keep], self.wrench[keep]
         return Samples(self.time[keep], q, qd, tau, wrench, self.row)
