@@ -12,6 +12,7 @@ from touchline.errors import InputError
 from touchline.identify.payload import weigh_load
 from touchline.model.corrections import with_loads
 from touchline.model.description import Load
+from touchline.model.perturbed import perturbed
 from touchline.model.robot import Robot
 from touchline.observer.samples import Samples
 from touchline.simulation.contacts import Profile, ScriptedContact
@@ -200,6 +201,18 @@ def test_a_grasped_body_is_weighed_in_three_seconds_of_motion(sara, seed):
     assert found.mass == pytest.approx(0.8, abs=max(4 * found.mass_error, 0.005))
     assert found.mass_error < 0.02
     np.testing.assert_allclose(found.com, com, atol=0.005)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_links_that_are_off_are_in_the_error_of_a_weighed_body(sara, seed):
+    com = (0.02, -0.01, 0.06)
+    wrong = perturbed(sara.mechanism, 0.015, np.random.default_rng(seed))
+    empty = Robot(sara.description, wrong)
+    held = carrying(empty, 0.8, com)
+    found = weigh_load(sara, [free_motion(held, seconds=3.0, seed=seed, noise=0.05)], LINK)
+    assert abs(found.mass - 0.8) < 4.0 * found.mass_error < 0.3
+    with pytest.raises(InputError, match="no load on tool"):
+        weigh_load(sara, [free_motion(empty, seconds=3.0, seed=seed, noise=0.05)], LINK)
 
 
 def test_an_empty_gripper_has_no_load(sara):

@@ -12,6 +12,7 @@ from touchline.identify.evidence import PER_CONSTANT, Evidence, gather
 from touchline.identify.fit import BodyChange, Equations, Problem, Solution
 from touchline.identify.regressor import PARAMETERS, body_of_vector, body_vector
 from touchline.identify.touches import usual_scatter
+from touchline.identify.usual import usual_links
 from touchline.model.mechanism import Inertia
 from touchline.model.robot import Robot
 from touchline.model.transforms import move_inertia
@@ -90,6 +91,24 @@ def seen_leaves(evidence: Evidence) -> list[int]:
     return [i for i in leaf_nodes(evidence.robot) if np.abs(model[:, used, i]).max(initial=0.0) > 0]
 
 
+def _links_doubt(
+    evidence: Evidence, A: Array, rest: Array, weight: Array, covariance: Array
+) -> Array:
+    """What links that are off add to the covariance (4, 4) of a load beside them.
+
+    How far they are off is told by what the load leaves: as many times as much as links that are
+    off as usual would leave beside it.
+    """
+    root = np.sqrt(weight[:, evidence.used])[..., None]
+    X = (A[:, evidence.used] * root).reshape(-1, 4)
+    U = usual_links(evidence)[:, evidence.used] * root
+    U = U.reshape(len(X), -1)
+    taken = covariance @ (X.T @ U)  # (4, c) of each link's error ends in the load
+    usual = float(((U - X @ taken) ** 2).sum())
+    shown = float((rest[:, evidence.used] ** 2 * root[..., 0] ** 2).sum())
+    return taken @ taken.T * (shown / usual if usual > 0.0 else 1.0)
+
+
 @dataclass(frozen=True)
 class WeighedLoad:
     """A body that was identified on the link that carries it.
@@ -136,16 +155,23 @@ def weigh_load(robot: Robot, samples: Iterable[Samples], link: str) -> WeighedLo
     prior = np.diag([0.0, *np.full(3, CENTRE_SIGMA**-2.0)])
     least = FLOOR * np.abs(evidence.reading).max(axis=0, initial=0.0)
     four, rest = np.zeros(4), left  # mass, and mass times centre
-    covariance, weight = np.zeros((4, 4)), np.ones(left.shape)
+    covariance, weight, turning = np.zeros((4, 4)), np.ones(left.shape), np.zeros(6)
+    own = evidence.model[:, :, node]
     for _ in range(ROUNDS):
         sigma = np.maximum(usual_scatter(rest, evidence.used), np.maximum(least, 1e-6))
         weight = np.broadcast_to(sigma**-2.0, left.shape)
-        equations = Equations.of(evidence, problem, left, weight, use)
+        turned = left + own[..., 4:] @ turning
+        equations = Equations.of(evidence, problem, turned, weight, use)
         covariance = np.linalg.pinv(equations.normal[:4, :4] + prior)
         four = -covariance @ equations.gradient[:4]
-        rest = left + evidence.model[:, :, node, :4] @ four
+        rest = turned + own[..., :4] @ four
+        if four[0] > SURE * np.sqrt(covariance[0, 0]):  # as a ball about its centre turns
+            ball = Inertia(four[0], four[1:] / four[0], four[0] * RADIUS**2 * np.eye(3))
+            turning = body_vector(ball)[4:]
     spread = max(1.0, float(np.mean((rest**2 * weight)[:, evidence.used])))
+    doubt = _links_doubt(evidence, own[..., :4], rest, weight, covariance)
     covariance = covariance * spread * 2.0 * PER_CONSTANT  # instants closer than that repeat
+    covariance = covariance + doubt
     mass, error = float(four[0]), float(np.sqrt(covariance[0, 0]))
     if mass < SURE * error:
         raise InputError(
