@@ -9,6 +9,8 @@ from touchline.arrays import Array
 
 UNREAL = 1e12  # in any unit: no reading of a sensor
 TUKEY = 4.7  # standard deviations beyond which a point does not count (95 % efficiency)
+LOST = 1e-4  # of a coefficient's square that no point tells; rounding mixes in less
+SINGULAR = 1e-12  # of unit columns: rounding makes a combination no weaker
 NEAR = 0.12  # a factor within this fraction of a named one is that one
 
 FORCE_FACTORS = {
@@ -40,7 +42,10 @@ ANGLE_FACTORS = {
 
 @dataclass(frozen=True)
 class Line:
-    """y = X @ coefficients, with their standard errors and the scatter (1 sigma) of the points."""
+    """y = X @ coefficients, with their standard errors and the scatter (1 sigma) of the points.
+
+    An error is infinite where the points do not tell a coefficient.
+    """
 
     coefficients: Array
     errors: Array
@@ -78,8 +83,21 @@ def robust_line(X: Array, y: Array, rounds: int = 30) -> Line | None:
             weight = np.minimum(1.0, 1.5 * spread / np.maximum(np.abs(rest), 1e-300))
         else:
             weight = np.clip(1 - (rest / (TUKEY * spread)) ** 2, 0, None) ** 2
-    inverse = np.linalg.pinv((X * weight[:, None]).T @ X)
-    return Line(beta, spread * np.sqrt(np.diag(inverse)), spread)
+    return Line(beta, spread * unit_errors((X * weight[:, None]).T @ X), spread)
+
+
+def unit_errors(normal: Array) -> Array:
+    """Standard errors (c,) for unit scatter; infinite where the points tell no coefficient."""
+    size = np.sqrt(np.diag(normal))
+    some = np.flatnonzero(size > 0.0)
+    errors = np.full(len(size), np.inf)
+    # Columns have units of their own: a small one is no lost one.
+    powers, vectors = np.linalg.eigh(normal[np.ix_(some, some)] / np.outer(size[some], size[some]))
+    kept = powers > SINGULAR
+    lost = (vectors[:, ~kept] ** 2).sum(axis=1) > LOST
+    variance = (vectors[:, kept] ** 2 / powers[kept]).sum(axis=1)
+    errors[some] = np.where(lost, np.inf, np.sqrt(variance) / size[some])
+    return errors
 
 
 def named_factor(value: float, factors: dict[float, str]) -> str | None:

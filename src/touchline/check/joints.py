@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Joint signals beside the model: signs, units and order of velocities and torques."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -138,11 +139,17 @@ def judged_joints(robot: Robot, windows: Windows, dead: set[str]) -> list[int]:
 
 
 def check_torques(
-    robot: Robot, windows: Windows, dead: set[str], limits: dict[int, float], findings: Findings
+    robot: Robot,
+    windows: Windows,
+    dead: set[str],
+    limits: dict[int, float],
+    findings: Findings,
+    clipped: Collection[str] = (),
 ) -> None:
     """Compare measured torques with those the model expects without contact.
 
-    `limits` are the contact thresholds by joint [Nm].
+    `limits` are the contact thresholds by joint [Nm]. What is cut off of `clipped` torques would
+    look like an offset.
     """
     measured = judged_joints(robot, windows, dead)
     for j, joint in enumerate(robot.description.joints):
@@ -178,6 +185,8 @@ def check_torques(
         if j not in inside:
             fits[j] = fit
             told = driven is not None and not driven.certain
+            if name in clipped:
+                fit = replace(fit, offset=0.0)
             _judge(joint, fit, size, limits.get(j, np.inf), told, findings)
     _judge_delays(robot, fits, findings)
 
@@ -243,9 +252,11 @@ def _note_fit(name: str, fit: TorqueFit, findings: Findings) -> None:
 def torque_words(name: str, fit: TorqueFit) -> list[str]:
     """What is coarsely wrong with a torque: its unit, its sign, or that gravity is not in it."""
     start = f"torque of {name} is {fit.factor:.3g} times what the model expects"
-    unit = named_factor(fit.factor, {k: v for k, v in MOMENT_FACTORS.items() if abs(k - 1) > 0.5})
     if not fit.certain:
         return []
+    units = {k: v for k, v in MOMENT_FACTORS.items() if abs(k - 1) > 0.5}
+    # A factor that may be zero is no unit.
+    unit = named_factor(fit.factor, units) if abs(fit.factor) > SURE * fit.error else None
     if abs(fit.factor) < TAKEN_OUT and unit is None:
         line = f"{start}: gravity seems taken out already; compensated: gravity (or model)"
         if abs(fit.factor) > SURE * fit.error:

@@ -10,12 +10,15 @@ import numpy as np
 from touchline.arrays import Array
 from touchline.check.averages import averaged
 from touchline.check.findings import Findings
+from touchline.check.fit import unit_errors
 from touchline.check.joints import GAIN_OFF, UNEVEN
 from touchline.identify.evidence import WIDTHS, Evidence, gather
 from touchline.identify.fit import main_links
 from touchline.identify.identification import MOST_TOUCHED, touched_instants
 from touchline.identify.payload import payload_link
 from touchline.identify.touches import usual_scatter
+from touchline.identify.usual import usual_links
+from touchline.model.corrections import with_offsets
 from touchline.model.description import Load, RobotDescription
 from touchline.model.mechanism import Inertia
 from touchline.model.robot import Robot
@@ -44,6 +47,7 @@ COULOMB_WIDTH, MOVED = 0.02, 0.02  # rad/s
 # What is known of a motor's torque: friction is `UNEVEN` with the sense and the load that it works
 # against, gains differ by a tenth. Both err alike in all poses, so more poses tell no more.
 GAIN = 0.1
+LIGHT = 0.02  # of a body that is left, and no less, has a centre that can be told
 EDGE = 1e-4  # rad; residuals change linearly with so small a tilt
 
 
@@ -73,24 +77,30 @@ def explain_weights(robot: Robot, parts: Iterable[Samples], findings: Findings) 
     evidence = _untouched(robot, parts)
     if evidence is None:
         return robot
+    told = robot
     for _ in range(MOST_FOUND):
         found = [x for x in _explanations(evidence, robot) if x.share >= EXPLAINED]
         found.sort(key=lambda x: x.cost)
         if not found:
             break
         best = found[0]
+        offset = min(_offsets(evidence, robot), key=lambda x: x.cost, default=None)
+        if offset is not None and offset.cost < best.cost - ALIKE:
+            robot = offset.mended  # told of its joint or sensor; what else is off shows beside it
+            continue
         gains = _gains(evidence, robot)
         if gains is not None and gains.cost < best.cost - ALIKE:
             break  # of currents: told joint by joint
-        if gains is not None and gains.cost < best.cost + ALIKE:
-            found.insert(1, gains)
-        others = [x.short for x in found[1:] if x.cost < best.cost + ALIKE]
-        findings.find(best.words + (f"; or as well: {others[0]}" if others else ""))
+        others = [x for x in (gains, offset) if x is not None and x.cost < best.cost + ALIKE]
+        found[1:1] = others
+        more = [x.short for x in found[1:] if x.cost < best.cost + ALIKE]
+        findings.find(best.words + (f"; or as well: {more[0]}" if more else ""))
         for key, value in best.fix.items():
-            old = findings.fixes.get(key, [])
-            findings.fixes[key] = [*old, *value] if isinstance(value, list) else value
+            before = findings.fixes.get(key, []) if key == "loads" else []
+            findings.fixes[key] = [*before, *value]
         robot = best.mended
-    return robot
+        told = Robot(told.description, robot.mechanism)
+    return told
 
 
 def possible_load(robot: Robot, parts: Iterable[Samples]) -> tuple[str, Robot] | None:
@@ -191,7 +201,7 @@ def _payload(
         f"modelled but not mounted? links: {{LINK: {{mass: 0.0}}}} for what is not there"
     )
     short = f"{-mass:.2f} kg less at {name}"
-    return Explanation(words, short, share, cost, _lighter(robot, node, -mass), {})
+    return Explanation(words, short, share, cost, _lighter(robot, node, -mass, centre), {})
 
 
 def _scaled(
@@ -297,6 +307,32 @@ def _mounted(
     return new, error, share, cost
 
 
+def _offsets(evidence: Evidence, robot: Robot) -> list[Explanation]:
+    """A bias of one joint's torque, or one of each axis of a sensor, that would be the cause."""
+    left, sigma = _off(evidence, robot)
+    description, n = robot.description, evidence.joints
+    rows = [(joint.name, [j]) for j, joint in enumerate(description.joints)]
+    for k, sensor in enumerate(description.sensors):
+        rows.append((sensor.name, list(range(n + 6 * k, n + 6 * k + 6))))
+    found = []
+    for name, own in rows:
+        own = [r for r in own if evidence.used[r]]
+        if not own:
+            continue
+        A = np.zeros((*left.shape, len(own)))
+        for i, row in enumerate(own):
+            A[:, row, i] = 1.0
+        values, errors, share, cost = _fit(A, left, sigma, evidence, np.zeros(len(own)))
+        if share < EXPLAINED or not (np.abs(values) > SURE * errors).any():
+            continue
+        more = np.zeros(left.shape[1])
+        more[own] = values
+        torque, wrench = -more[:n], -more[n:].reshape(-1, 6)
+        biased = Robot(with_offsets(description, torque, wrench), robot.mechanism)
+        found.append(Explanation("", f"an offset of {name}", share, cost, biased, {}))
+    return found
+
+
 def _gains(evidence: Evidence, robot: Robot) -> Explanation | None:
     """The gains that motors' currents would need; None where none is off, or no motor is."""
     joints = robot.description.joints
@@ -338,19 +374,21 @@ def _fit(
 
     The cost is the weighed sum of squares and two for each free number (Akaike's criterion).
     """
-    rows = evidence.used
+    rows, count = evidence.used, A.shape[-1]
     poses = _poses(evidence)
-    A, left = _without_unknowns(A, left, sigma, poses, evidence)
-    X = (A[:, rows] / sigma[rows][:, None]).reshape(-1, A.shape[-1])
-    y = (left[:, rows] / sigma[rows]).ravel()
+    links = usual_links(evidence)
+    A, left = _without_unknowns(np.concatenate([A, links], axis=-1), left, sigma, poses, evidence)
+    both = (A[:, rows] / sigma[rows][:, None]).reshape(-1, A.shape[-1])
+    X, y = both[:, :count], (left[:, rows] / sigma[rows]).ravel()
     weight = poses / len(evidence)  # instants in one pose repeat each other
-    normal = weight * X.T @ X + np.diag(prior)
-    covariance = np.linalg.pinv(normal)
-    values = -covariance @ (weight * X.T @ y)
+    normal = weight * both.T @ both + np.diag([*prior, *np.ones(links.shape[-1])])
+    values = -np.linalg.pinv(normal[:count, :count]) @ (weight * X.T @ y)
+    # Links that are off as usual err alike in all poses: more poses make nothing surer.
+    errors = unit_errors(normal)[:count]
     rest = y + X @ values
     share = 1.0 - float(rest @ rest) / max(float(y @ y), 1e-12)
     cost = weight * float(rest @ rest) + 2.0 * len(values)
-    return values, np.sqrt(np.diag(covariance)), share, cost
+    return values, errors, share, cost
 
 
 def _without_friction(values: Array, evidence: Evidence) -> Array:
@@ -415,16 +453,24 @@ def _loaded(robot: Robot, load: Load) -> Robot:
     return _with_links(robot, robot.description, links)
 
 
-def _lighter(robot: Robot, node: int, mass: float) -> Robot:
-    """The robot with the masses of a node's links scaled down together."""
+def _lighter(robot: Robot, node: int, mass: float, centre: Array) -> Robot:
+    """The robot with a mass [kg] taken off a node's links at a centre (3,) [m] in its frame.
+
+    Of what is left only mass and centre are told; its inertia becomes smaller as its mass does.
+    """
     names = robot.nodes[node].links
-    own = sum(robot.mechanism.links[x].inertia.mass for x in names)
-    factor = max(0.0, 1.0 - mass / own)
+    own = robot.nodes[node].inertia
+    left = max(own.mass - mass, 0.0)
+    factor = left / own.mass
+    middle = (own.mass * own.com - mass * centre) / left if factor > LIGHT else own.com
     links = dict(robot.mechanism.links)
     for name in names:
         body = links[name].inertia
-        scaled = Inertia(factor * body.mass, body.com, factor * body.inertia)
-        links[name] = replace(links[name], inertia=scaled)
+        shift = robot.places[name].T_node_link[:3, :3].T @ (middle - own.com)
+        links[name] = replace(
+            links[name],
+            inertia=Inertia(factor * body.mass, body.com + shift, factor * body.inertia),
+        )
     return _with_links(robot, robot.description, links)
 
 

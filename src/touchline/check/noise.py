@@ -47,6 +47,9 @@ def check_noise(robot: Robot, seen: Seen, findings: Findings) -> None:
                 f"sensor {sensor.name} is up to {worst:.1f} times as noisy as its figures in use: "
                 f"noise: {{{sensor.name}: [{numbers}]}}"
             )
+            all_axes = np.array(robot.description.noise.sensors[sensor.name])
+            all_axes[own] = _louder(sigma[s, own], figures)
+            _mend(findings, sensor.name, all_axes)
 
 
 def _torques(robot: Robot, seen: Seen, findings: Findings, given: bool) -> None:
@@ -66,6 +69,8 @@ def _torques(robot: Robot, seen: Seen, findings: Findings, given: bool) -> None:
         return
     loud = [j for j in own if ratio[j] > OFF]
     single = [j for j in loud if ratio[j] > ODD * usual]
+    if loud:
+        _mend(findings, "tau", _louder(sigma, figures))
     for j in single:
         findings.find(
             f"torque of {joints[j].name} is {ratio[j]:.1f} times as noisy as its figure in use, "
@@ -77,6 +82,16 @@ def _torques(robot: Robot, seen: Seen, findings: Findings, given: bool) -> None:
         findings.find(
             f"torques are {times} times as noisy as the figures in use: noise: {{tau: [{text}]}}"
         )
+
+
+def _louder(sigma: Array, figures: Array) -> Array:
+    """The figures, with what is shown where that is more by so much that it is a finding."""
+    return np.where(_ratio(sigma, figures) > OFF, sigma, figures)
+
+
+def _mend(findings: Findings, key: str, figures: Array) -> None:
+    numbers = [float(f"{x:.2g}") for x in figures]
+    findings.fixes.setdefault("noise", {})[key] = numbers
 
 
 def _ratio(sigma: Array, figures: Array) -> Array:

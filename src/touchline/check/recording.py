@@ -213,7 +213,10 @@ def _compare(robot: Robot, seen: Seen, findings: Findings) -> None:
     dead = {
         kind: {name for k, name in seen.table.dead() if k == kind} for kind in ("tau", "wrench")
     }
+    for kind, names_dead in dead.items():  # a part that is stuck fits no load
+        names_dead |= seen.table.held_names(kind, stuck=True)
     for problem in velocity_problems(robot, windows):
         findings.find(problem.words, Kind.SIGNAL)
-    check_torques(robot, windows, dead["tau"], joints, findings)
+    clipped = seen.table.held_names("tau", stuck=False)
+    check_torques(robot, windows, dead["tau"], joints, findings, clipped)
     check_wrenches(robot, windows, dead["wrench"], components, findings)

@@ -188,26 +188,41 @@ class SignalTable:
             )
 
     def _report_held(self, i: int, column: str, findings: Findings) -> None:
-        """Clipped or stuck: exactly one value for long in a signal that else never rests."""
-        if self.samples < ENOUGH or self.low[i] == self.high[i]:
-            return
-        for count, value, what in (
-            (self.held_high[i], self.high[i], "largest"),
-            (self.held_low[i], self.low[i], "least"),
-        ):
-            others = self.held[i] - self.held_low[i] - self.held_high[i]
-            if count > max(CLIPPED * self.samples, 2 * RUN) and others < ALIVE * self.samples:
-                findings.find(
-                    f"{column}: {100 * count / self.samples:.1f} % of the samples stand at its "
-                    f"{what} value {value:.4g}: clipped; set range"
-                )
-                return
-        others = self.held[i] - self.longest[i]
-        if self.longest[i] >= STUCK and others < ALIVE * self.samples:
+        what = self._held(i)
+        if what == "stuck":
             findings.find(
                 f"{column}: {self.longest[i]} samples in a row have one value, which else changes "
                 "with every sample: stuck"
             )
+        elif what:
+            low = what == "least"
+            count, value = (
+                (self.held_low[i], self.low[i]) if low else (self.held_high[i], self.high[i])
+            )
+            findings.find(
+                f"{column}: {100 * count / self.samples:.1f} % of the samples stand at its "
+                f"{what} value {value:.4g}: clipped; set range"
+            )
+
+    def _held(self, i: int) -> str:
+        """How a signal that else never rests has exactly one value for long.
+
+        "stuck", or clipped at its "largest" or "least" value; "" of others.
+        """
+        if self.samples < ENOUGH or self.low[i] == self.high[i]:
+            return ""
+        ends = ("largest", self.held_high[i]), ("least", self.held_low[i])
+        for what, count in ends:
+            others = self.held[i] - self.held_low[i] - self.held_high[i]
+            if count > max(CLIPPED * self.samples, 2 * RUN) and others < ALIVE * self.samples:
+                return what
+        others = self.held[i] - self.longest[i]
+        return "stuck" if self.longest[i] >= STUCK and others < ALIVE * self.samples else ""
+
+    def held_names(self, kind: str, stuck: bool) -> set[str]:
+        """Names of a kind's signals that are stuck for a part of the recording, or else clipped."""
+        held = ((s, self._held(i)) for i, s in enumerate(self.signals) if s.kind == kind)
+        return {s.name for s, what in held if what and (what == "stuck") == stuck}
 
     def report_limits(self, robot: Robot, findings: Findings) -> None:
         """Say which positions leave the model's limits, or are no angles in rad."""
@@ -240,7 +255,8 @@ class SignalTable:
         joints = robot.mechanism.joints
         found = [p for p in self._positions(robot) if joints[p[0]].kind == "revolute"]
         outside = {p[0] for p in self.outside_limits(robot)}
-        stand = [p for p in found if max(abs(p[1]), abs(p[2])) > NEAR_ZERO]
+        limited = [p for p in found if np.isfinite(p[3]) or np.isfinite(p[4])]
+        stand = [p for p in limited if max(abs(p[1]), abs(p[2])) > NEAR_ZERO]
         if 2 * sum(p[0] in outside for p in stand) < len(stand):
             return False
         far = any(max(-low, high) > 4 * np.pi for _, low, high, _, _ in found)
