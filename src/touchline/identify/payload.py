@@ -162,7 +162,7 @@ def weigh_load(robot: Robot, samples: Iterable[Samples], link: str) -> WeighedLo
         weight = np.broadcast_to(sigma**-2.0, left.shape)
         turned = left + own[..., 4:] @ turning
         equations = Equations.of(evidence, problem, turned, weight, use)
-        covariance = np.linalg.pinv(equations.normal[:4, :4] + prior)
+        covariance = np.asarray(np.linalg.pinv(equations.normal[:4, :4] + prior), float)
         four = -covariance @ equations.gradient[:4]
         rest = turned + own[..., :4] @ four
         if four[0] > SURE * np.sqrt(covariance[0, 0]):  # as a ball about its centre turns
