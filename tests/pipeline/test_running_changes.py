@@ -246,3 +246,14 @@ def test_events_that_are_over_are_kept_only_as_far_as_asked(sara):
     kept = [event.as_json() for event in bounded.events]
     assert 2 <= len(kept) <= 4 and kept == [event.as_json() for event in every.events[-len(kept) :]]
     assert bounded.events == bounded.events
+
+
+@pytest.mark.parametrize(
+    "inertia",
+    [(-1e-3, 0, 0, 1e-3, 0, 1e-3), (1e-3, 0, 0, 1e-3, 0, 3e-3), (1e-3, 2e-3, 0, 1e-3, 0, 1e-3)],
+)
+def test_a_load_that_no_body_has_is_refused(sara, inertia):
+    pipeline = tl.Pipeline(sara)
+    with pytest.raises(ValueError, match="inertia"):
+        pipeline.set_load(LINK, 1.0, (0.0, 0.0, 0.05), inertia)
+    assert not pipeline.robot.description.loads

@@ -39,6 +39,7 @@ from touchline.result.standing import Standing
 from touchline.suggest import unknown
 from touchline.tuning import DEFAULTS, Tuning, native_tuning
 
+ROUNDED = 1e-3  # relative; inertias are given with three digits or more
 REST = DEFAULTS["observer.rest_window"]  # s that an arm must have stood still before a tare
 
 
@@ -306,6 +307,10 @@ class Pipeline:
             raise ValueError(f"mass is {mass}, but must be at least 0 kg")
         if not np.all(np.isfinite([*load.com, *load.inertia])):
             raise ValueError("com and inertia must be finite numbers [m, kg m2]")
+        ixx, ixy, ixz, iyy, iyz, izz = load.inertia
+        low, middle, high = np.linalg.eigvalsh([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+        if low < -ROUNDED * high or high > (1.0 + ROUNDED) * (low + middle):
+            raise ValueError(f"inertia {load.inertia} kg m2 is that of no body")
         set_before = self._loads.get(link)
         kept = tuple(x for x in self.robot.description.loads if x is not set_before)
         loads = (*kept, load) if load.mass > 0.0 else kept
