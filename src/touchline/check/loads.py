@@ -33,6 +33,7 @@ OFFSET = 0.3  # Nm or N, 1 sigma: what offsets and friction leave in any row of 
 OFFSET_SHARE = 0.01  # the same, as a part of the largest reading
 CENTRE = 0.1  # m, 1 sigma of a payload's centre about a hand's breadth before the flange
 EXPLAINED = 0.6  # of what is off; less is no explanation
+WHOLE = 0.95  # explains it, offset or not: weights change with its tilt as far as it is small
 LEAST_MASS, LEAST_TILT = 0.15, np.radians(1.5)  # kg, rad: smaller ones are not told
 MOST_TILT = 0.7  # rad; how far a base may lean whose tilt follows from two angles alone
 SIZE_OFF = 0.15  # relative, of the length of gravity that a turned base would need
@@ -85,7 +86,8 @@ def explain_weights(robot: Robot, parts: Iterable[Samples], findings: Findings) 
             break
         best = found[0]
         offset = min(_offsets(evidence, robot), key=lambda x: x.cost, default=None)
-        if offset is not None and offset.cost < best.cost - ALIKE:
+        better = offset is not None and offset.cost < best.cost - ALIKE
+        if offset is not None and better and best.share < WHOLE:
             robot = offset.mended  # told of its joint or sensor; what else is off shows beside it
             continue
         gains = _gains(evidence, robot)
