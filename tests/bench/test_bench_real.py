@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from touchline.bench.matching import match
 from touchline.bench.real import run as real
+from touchline.bench.real.calibrated import calibrated, untouched
 from touchline.bench.real.judged import Touched, judge_free, judge_touched
 from touchline.bench.real.left_out import CHOICES, Tried, chosen, named
 from touchline.cli import main
@@ -17,7 +18,7 @@ from touchline.model.robot import load_robot
 from touchline.observer.samples import Samples
 from touchline.result.contact import Candidate
 from touchline.result.event import Event
-from touchline.trials.real_recordings import Recording, at_rate
+from touchline.trials.real_recordings import PANDA_HAND, Recording, at_rate
 from touchline.tuning import DEFAULTS
 
 
@@ -147,6 +148,27 @@ def test_leaving_one_out_prints_nothing_else(made_up, monkeypatch, capsys):
     assert told.startswith("Numbers chosen on all other files") and "nothing touches" not in told
     assert told.count(named(CHOICES[chosen([best, best], 0)])) == 2
     assert "found 50.0 % (2 of 4)" in told
+
+
+def test_a_calibrated_arm_has_seen_nothing_of_the_recording_that_is_judged(tmp_path):
+    rng = np.random.default_rng(0)
+    robot = tmp_path / "robot.yaml"
+    robot.write_text(PANDA_HAND)
+    made = []
+    for name in ("a1", "a2"):
+        time = 5e-3 * np.arange(6000)
+        q = 0.3 + 1e-6 * rng.normal(size=(6000, 7))
+        samples = Samples(time, q, 0.0 * q, rng.normal(size=q.shape), np.zeros((6000, 0, 6)))
+        touches = spans((1.0, 1.5), (3.0, 3.5))
+        made.append(Recording(name, load_robot(robot), samples, 5e-3, touches, 7))
+    far = untouched(made[0])
+    assert not far[[150 + 1, 250, 350 - 1]].any() and far[[100, 400, 500]].all()
+    louder = replace(made[1].samples, tau=3.0 * made[1].samples.tau)
+    first, second = calibrated([made[0], replace(made[1], samples=louder)], tmp_path)
+    assert first.name == "a1" and first.samples is made[0].samples
+    np.testing.assert_allclose(first.robot.description.noise.tau, 3.0, rtol=0.1)
+    np.testing.assert_allclose(second.robot.description.noise.tau, 1.0, rtol=0.1)
+    assert first.robot.description.detection.calibration is None
 
 
 def test_a_lower_rate_keeps_samples_of_even_instants():

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
-from free_motion import free_motion
+from free_motion import exact_loads, free_motion
 
 import touchline as tl
 from touchline.calibrate import run
@@ -15,7 +15,7 @@ from touchline.calibrate.blame import Blame
 from touchline.calibrate.noise import NoiseMeter
 from touchline.calibrate.run import _check_tails, calibrate
 from touchline.cli.main import main
-from touchline.detector.calibration import fit_growth
+from touchline.detector.calibration import collect_residuals, fit_growth
 from touchline.detector.detector import Detector
 from touchline.detector.tail import Tail
 from touchline.detector.thresholds import make_thresholds, row_name
@@ -26,6 +26,7 @@ from touchline.model.robot import Robot
 from touchline.model.robot_file import write_description
 from touchline.model.values import METHODS
 from touchline.model.yaml_file import read_yaml
+from touchline.observer.samples import Samples
 from touchline.trials.free_motion import (
     MotionMaker,
     generator,
@@ -477,3 +478,50 @@ def test_keys_are_checked(tmp_path, keys, words):
     path.write_text(f"name: x\nmodel: robot:sara\n{sensors}detection:\n  {keys}\n")
     with pytest.raises(InputError, match=words.replace("[", r"\[")):
         tl.load_robot(path)
+
+
+def standing(robot, seconds, seed):
+    """One pose; 3 times as noisy as described."""
+    rng = generator(seed)
+    time = np.arange(round(seconds * RATE)) / RATE
+    q = np.full((len(time), len(robot.joint_names)), 0.4)
+    tau, wrench = exact_loads(robot, time, q, 0.0 * q)
+    noise = robot.description.noise
+    tau = tau + 3.0 * np.array(noise.tau) * rng.normal(size=tau.shape)
+    axes = np.array([noise.sensors[name] for name in robot.sensor_names])
+    wrench = wrench + 3.0 * axes * rng.normal(size=wrench.shape)
+    qd = np.array(noise.qd) * rng.normal(size=q.shape)
+    return Samples(time, q, qd, tau, wrench)
+
+
+def test_an_arm_that_stands_for_a_short_time_shows_its_noise_alone(robot, tmp_path, capsys):
+    path, out = tmp_path / "standing.parquet", tmp_path / "out.yaml"
+    write_table(path, standing(robot, 30.0, 0), robot.description)
+    command = ["calibrate", str(path), "--robot", "sara", "--out", str(out)]
+    assert main([*command, "--no-identify"]) == 0
+    told = capsys.readouterr().out
+    assert (
+        "no joint moves by more than 0 rad" in told and "They follow from the noise figures" in told
+    )
+    again = tl.load_robot(out)
+    assert again.description.detection.calibration is None
+    np.testing.assert_allclose(
+        again.description.noise.sensors["base"],
+        3.0 * np.array(robot.description.noise.sensors["base"]),
+        rtol=0.05,
+    )
+    assert main(command) == 2  # nothing can be identified in one pose
+    assert "--no-identify" in capsys.readouterr().err
+
+
+def test_what_stands_there_after_a_long_gap_is_an_offset(robot):
+    """As dry friction leaves it after a touch that was left out."""
+    s = standing(robot, 20.0, 1)
+    after = s.time > 10.0
+    s.wrench[after, 0, 2] += 3.0
+    near = (s.time > 9.8) & (s.time < 10.3)
+    whole, parted = (collect_residuals(robot, 1 / RATE, [[part]]) for part in (s, s.where(~near)))
+    rows = make_thresholds(robot, 1 / RATE).rows
+    fz = next(i for i, row in enumerate(rows) if row.component == 2)
+    assert np.nanmax(np.abs(whole.residual[:, fz])) > 2.0
+    assert np.nanmax(np.abs(parted.residual[:, fz])) < 1.0

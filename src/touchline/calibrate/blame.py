@@ -10,7 +10,7 @@ from touchline.calibrate.quiet import Suspicion
 from touchline.detector.calibration import Residuals, watching, with_methods
 from touchline.detector.detector import Detector
 from touchline.detector.thresholds import make_thresholds, row_name
-from touchline.model.description import RowCalibration
+from touchline.model.description import LevelDescription, RowCalibration
 from touchline.model.robot import Robot
 from touchline.observer.observer import Observer
 from touchline.observer.samples import Samples
@@ -92,7 +92,8 @@ def often_off(robot: Robot, period: float, found: Residuals) -> list[str]:
     calibration is none: after a touch dry friction leaves an offset.
     """
     told = []
-    for i, row in enumerate(make_thresholds(with_methods(robot, "rows"), period).rows):
+    plain = with_methods(robot, "rows", contact=LevelDescription(), calibration=None)
+    for i, row in enumerate(make_thresholds(plain, period).rows):
         size = np.abs(found.residual[:, i])
         size = size[np.isfinite(size)]
         if not len(size):

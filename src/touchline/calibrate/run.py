@@ -329,12 +329,12 @@ def _find_thresholds(
         suspicions = [] if trust else find_contacts(found, METHODS)
         if not suspicions:
             share = rate / max(len(chosen) * len(robot.segment_names), 1)
-            if 0.0 < recordings.travel < POSES and share * found.hours < 1.0:
+            if robot.joint_names and recordings.travel < POSES and share * found.hours < 1.0:
                 raise StandsStill(
                     f"no joint moves by more than {recordings.travel:.2g} rad, and "
                     f"{3600 * found.hours:.3g} s without contact show no alarm that comes "
-                    f"{rate:g} times an hour: nothing is guessed beyond that\n"
-                    "they follow from the noise figures, in each posture, if none were calibrated"
+                    f"{rate:g} times an hour.\n"
+                    "They follow from the noise figures, in each posture, if none were calibrated."
                 )
             train, test, parted = split(found, len(logs))
             held_out = judge(robot, train, test, rate)

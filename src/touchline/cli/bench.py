@@ -209,7 +209,13 @@ def detection(
     return 0
 
 
-def real(*, data: Directory = None, rate: float | None = None, leave_one_out: bool = False) -> int:
+def real(
+    *,
+    data: Directory = None,
+    rate: float | None = None,
+    leave_one_out: bool = False,
+    calibrate: bool = False,
+) -> int:
     """How well touches are found on recordings of real arms, described by their model alone.
 
     Example: touchline bench real --data recordings
@@ -221,6 +227,8 @@ def real(*, data: Directory = None, rate: float | None = None, leave_one_out: bo
         rate: Looks at all recordings once more as if recorded at this rate [Hz].
         leave_one_out: For each touched recording, chooses three tuning numbers on all others, and
             prints what holds on the one left out.
+        calibrate: For each touched recording, calibrates on what is untouched of all others, and
+            prints what holds on the one left out.
     """
     from touchline.bench.real.run import main
     from touchline.errors import InputError
@@ -230,7 +238,7 @@ def real(*, data: Directory = None, rate: float | None = None, leave_one_out: bo
         check_positive(rate=rate)
     if data is None:
         raise InputError("real arms: no recordings, name their folder with --data")
-    main(data, rate, leave_one_out)
+    main(data, rate, leave_one_out, calibrate)
     return 0
 
 

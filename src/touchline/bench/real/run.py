@@ -10,6 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from touchline.bench.matching import MARGIN
+from touchline.bench.real.calibrated import calibrated
 from touchline.bench.real.judged import (
     Touched,
     events_of,
@@ -44,7 +45,12 @@ TOUCHED_HEAD = (
 FREE_HEAD = ("recording", "s", "in contact", "longest", "events", "to the end")
 
 
-def main(data: Path, rate: float | None = None, leave_one_out: bool = False) -> None:
+def main(
+    data: Path,
+    rate: float | None = None,
+    leave_one_out: bool = False,
+    calibrate: bool = False,
+) -> None:
     """Prints what holds on the recordings below `data`.
 
     Args:
@@ -52,6 +58,8 @@ def main(data: Path, rate: float | None = None, leave_one_out: bool = False) -> 
         rate: at which all are looked at once more [Hz], or None.
         leave_one_out: numbers are chosen anew on all touched files but the one that is judged, and
             nothing else is printed.
+        calibrate: on what is untouched of all touched files but the one that is judged; nothing
+            else is printed.
 
     Raises:
         InputError: there are none.
@@ -65,6 +73,13 @@ def main(data: Path, rate: float | None = None, leave_one_out: bool = False) -> 
         if leave_one_out:
             if files:
                 print(_left_out(files, folder))
+            return
+        if calibrate:
+            if files:
+                recordings = [read_touched(path, folder) for path in files]
+                found = calibrated(recordings, folder)
+                judged = [(r.name, r.link, judge_touched(r, events_of(r))) for r in found]
+                print(_touched_text("Calibrated on what is untouched of all other files", judged))
             return
         if files:
             whole = [_judged(path, folder) for path in files]
