@@ -55,14 +55,19 @@ def test_the_payload_is_on_the_last_link_alone():
 
 def test_a_line_for_each_fault_and_motion(monkeypatch, capsys):
     def play(self, fault, moving, seed):
-        return Outcome(before=moving, found=True, wrong=seed[-1] == 0, cleared=not moving, events=2)
+        first = seed[-1] == 0
+        level = 0.95 if first else 0.3
+        return Outcome(moving, True, first, not moving, 2, np.nan if moving else level)
 
     monkeypatch.setattr(Trials, "play", play)
     assert main(["bench", "imperfect", "--arms", "sara", "--runs", "2"]) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()[2:]]
     assert len(lines) == 2 * len(FAULTS)
-    assert lines[0] == "sara nothing standing 0/2 2/2 1/2 2/2 2.0".split()
-    assert lines[1] == "sara nothing moving 2/2 2/2 1/2 0/2 2.0".split()
+    assert lines[0] == "sara nothing standing 0/2 2/2 1/2 2/2 2.0 50 %".split()
+    assert lines[1] == "sara nothing moving 2/2 2/2 1/2 0/2 2.0 -".split()
+    assert main(["bench", "imperfect", "--arms", "sara", "ur5", "--runs", "2"]) == 0
+    last = capsys.readouterr().out.splitlines()[-1].split()
+    assert last[:3] == ["all", "noise", "x"] and "4/4" in last
 
 
 def test_a_benchmark_without_runs_is_told(capsys):

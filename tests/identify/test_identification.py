@@ -59,6 +59,21 @@ def test_nothing_is_found_where_nothing_is_wrong():
     assert (found.after <= 1.01 * found.before).all()
 
 
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_a_row_that_one_recording_lacks_counts_in_none(order):
+    """Its absence read as zeros would be a load that the arm does not have."""
+    robot = arm()
+    s = recorded(robot)
+    lacking = replace(s, tau=s.tau.copy())
+    lacking.tau[:, 1] = np.nan
+    evidence = gather(robot, [[(s, lacking)[i]] for i in order])
+    assert evidence.used.tolist() == [True, False, True, True, True]
+    assert np.abs(evidence.residual()).max() < 0.1
+    found = identify(evidence)
+    assert payload_mass(found.solution)[0] == 0.0
+    assert (found.after <= 1.01 * found.before).all()
+
+
 def test_friction_and_offsets_are_found_again():
     robot = arm()
     s = recorded(robot)

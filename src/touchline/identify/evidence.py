@@ -78,12 +78,12 @@ class Evidence:
         return replace(self, **{name: getattr(self, name)[use] for name in fields})
 
     def joined(self, other: "Evidence") -> "Evidence":
-        """These instants and those of further recordings."""
+        """These instants and those of further recordings; rows count that all of them have."""
         fields = ("time", "q", "qd", "reading", "model", "rotor", "speed", "dry", "laws")
         both = {n: np.concatenate([getattr(self, n), getattr(other, n)]) for n in fields}
         number = other.recording + 1 + self.recording.max(initial=-1)
         both["recording"] = np.concatenate([self.recording, number])
-        return replace(self, **both)
+        return replace(self, used=self.used & other.used, **both)
 
     @property
     def joints(self) -> int:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A push on an arm that is not as told, and what is said of it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 
@@ -8,10 +9,12 @@ import numpy as np
 
 from touchline.arrays import Array
 from touchline.bench.imperfect.faults import Fault
+from touchline.bench.localization.credibility import credibility
 from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import contact_loads
 from touchline.pipeline.pipeline import Pipeline
+from touchline.result.contact import Contact
 from touchline.result.event import Event
 from touchline.result.kinds import Status
 from touchline.trials.free_motion import MotionMaker, Trajectory, random_trajectory
@@ -36,6 +39,8 @@ class Outcome:
         wrong: is an event of the touch located more than `NEAR` off, or without any touch?
         cleared: has all ended `LATE` after the touch?
         events: how many began.
+        level: probability of the smallest region that holds the place, of the contact that is told
+            at the push's end (`credibility`); NaN: none with a place.
     """
 
     before: bool
@@ -43,6 +48,7 @@ class Outcome:
     wrong: bool
     cleared: bool
     events: int
+    level: float
 
 
 class Trials:
@@ -73,12 +79,15 @@ class Trials:
         loads[:, n:] -= contact.wrench.reshape(len(q), -1)
         s = fault.read(self._robot, maker.sensed(q, qd, loads, rng), rng)
         pipeline = Pipeline(self._robot, period=1.0 / RATE, skin=self._skin)
-        first = round(BEGIN * RATE)
+        first, last = round(BEGIN * RATE), round(END * RATE) - 1
         columns = (s.time, s.q, s.qd, s.tau, s.wrench)
         pipeline.run(*(column[:first] for column in columns))
         before = any(event.status == Status.LOCATED for event in pipeline.events)
-        pipeline.run(*(column[first:] for column in columns))
-        return _judged(pipeline.events, before, maker.time, path)
+        pipeline.run(*(column[first:last] for column in columns))
+        told = pipeline.update(*(column[last] for column in columns)).contacts
+        level = _level(told, touch.patch.body, path[last])
+        pipeline.run(*(column[last + 1 :] for column in columns))
+        return _judged(pipeline.events, before, maker.time, path, level)
 
     def _touch(self, q: Array, rng: np.random.Generator) -> Touch:
         sampler = TouchSampler(self._skin, rng, self._segments, floor=-10.0)
@@ -108,7 +117,13 @@ def _scaled(trajectory: Trajectory, speed: float) -> Trajectory:
     return replace(trajectory, amplitude=trajectory.amplitude * speed / most)
 
 
-def _judged(events: list[Event], before: bool, time: Array, path: Array) -> Outcome:
+def _level(told: Sequence[Contact], body: str, place: Array) -> float:
+    """Of the first contact with a place."""
+    levels = [credibility(contact, body, place) for contact in told]
+    return next((level for level in levels if np.isfinite(level)), np.nan)
+
+
+def _judged(events: list[Event], before: bool, time: Array, path: Array, level: float) -> Outcome:
     end = END + RISE
     own = [e for e in events if BEGIN <= e.detected <= end]
     over = [e for e in events if e.detected < BEGIN and _ended(e) > end]
@@ -118,6 +133,7 @@ def _judged(events: list[Event], before: bool, time: Array, path: Array) -> Outc
         wrong=any(_wrong(e, time, path) for e in events),
         cleared=all(_ended(e) <= end + LATE for e in events if e.detected <= end),
         events=len(events),
+        level=level,
     )
 
 
