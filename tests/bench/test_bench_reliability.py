@@ -184,7 +184,7 @@ def test_what_a_wrong_speed_begins_before_it_is_told_has_no_sure_place_and_is_no
     robot = tl.load_robot("sara-full")
     recording = record(robot, 2)
     listened = tl.Pipeline(robot), recording, None
-    said, _ = with_fault(listened, "speed zero", "qd.joint1", "free")
+    said, _ = with_fault(listened, "speed zero", "qd.joint3", "free")
     began = [e for e in said.events if e.detected < PUSHED]
     assert began != []
     for event in began:
