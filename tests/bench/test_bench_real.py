@@ -200,3 +200,9 @@ def test_what_is_tried_are_tuning_numbers_and_none_is_the_default():
     for choice in CHOICES[1:]:
         ((name, value),) = choice.items()
         assert DEFAULTS[name] != value and named(choice) == f"{name} {value:g}"
+
+
+def test_one_touched_file_leaves_nothing_to_calibrate_on(made_up, monkeypatch, capsys):
+    monkeypatch.setattr(real, "touched_files", lambda data: [made_up / "a5"])
+    assert main(["bench", "real", "--data", str(made_up), "--calibrate"]) == 2
+    assert "a5: the only touched file" in capsys.readouterr().err

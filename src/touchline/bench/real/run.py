@@ -75,6 +75,8 @@ def main(
                 print(_left_out(files, folder))
             return
         if calibrate:
+            if len(files) == 1:
+                raise InputError(f"{files[0]}: the only touched file; --calibrate needs others")
             if files:
                 recordings = [read_touched(path, folder) for path in files]
                 found = calibrated(recordings, folder)
