@@ -69,7 +69,7 @@ inline Out region(const std::vector<tl::SurfaceCell>& cells) {
 
 inline tl::NoiseFigures noise(std::vector<double> qd, std::vector<double> tau,
                               std::vector<double> wrench, double period, double wrench_error,
-                              double torque_error) {
+                              double torque_error, double wrench_error_off) {
   tl::NoiseFigures figures;
   figures.qd = std::move(qd);
   figures.tau = std::move(tau);
@@ -77,13 +77,14 @@ inline tl::NoiseFigures noise(std::vector<double> qd, std::vector<double> tau,
   figures.period = period;
   figures.wrench_error = wrench_error;
   figures.torque_error = torque_error;
+  figures.wrench_error_off = wrench_error_off;
   return figures;
 }
 
 inline void bind(nb::module_& m) {
   nb::class_<tl::NoiseFigures>(m, "NoiseFigures");
   m.def("noise_figures", &noise, "qd"_a, "tau"_a, "wrench"_a, "period"_a,
-        "wrench_error"_a, "torque_error"_a);
+        "wrench_error"_a, "torque_error"_a, "wrench_error_off"_a);
   nb::class_<tl::LocalizerSettings>(m, "LocalizerSettings")
       .def(nb::init<>())
       .def_rw("friction", &tl::LocalizerSettings::friction)

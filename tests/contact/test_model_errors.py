@@ -161,6 +161,35 @@ def test_gains_of_sensors_are_doubted_where_a_calibration_has_taken_all_else_out
     assert regions[0] == regions[1] > 1.1 * regions[2]
 
 
+def test_gains_are_doubted_once_a_wrench_has_stood_off(sara):
+    """A gain that is 1 % off shows in the arm's own weight, as an offset."""
+    skin, rng = Skin(sara), np.random.default_rng(11)
+    sampler = TouchSampler(skin, rng)
+    touches = [t for t in (sampler.sample(20.0) for _ in range(30)) if t is not None][:12]
+    assert len(touches) == 12
+    far: dict[float | None, int] = {None: 0, 0.0: 0}
+    for touch in touches:
+        s = resting_signals(sara, touch.q, [(touch, 0.6)], 0.8, rng)
+        told = [placed(sara, skin, s, error) for error in far]
+        assert told[0].position_std == told[1].position_std  # the gains are right
+        np.multiply(s.wrench, 1.0 + rng.normal(0.0, 0.01, s.wrench.shape[1:]), out=s.wrench)
+        for error in far:  # readings that contradict each other have no place
+            event = placed(sara, skin, s, error)
+            near = event.position is not None and (
+                np.linalg.norm(event.position - touch.position) < 3.0 * event.position_std
+            )
+            far[error] += not near
+    assert far[None] == 0 and far[0.0] > 6
+
+
+def placed(robot, skin, s, wrench_error):
+    """The event of a recording with one touch."""
+    pipeline = tl.Pipeline(robot, skin=skin, wrench_error=wrench_error)
+    pipeline.run(s.time, s.q, s.qd, s.tau, s.wrench)
+    (event,) = pipeline.events
+    return event
+
+
 def judged(cell, run):
     """The event of a single touch and the last sample's answer, with how far off the event is."""
     robot, _, skin = told_and_real(cell, run)

@@ -194,7 +194,8 @@ class Pipeline {
     const Span<double> normalized{detector_.normalized().data(), detector_.normalized().size()};
     if (touched_) {
       localizer_.set_state(sample.q, sample.qd, detector_.drift().data(),
-                           detector_.quiet_of_places().data(), detector_.excess().data());
+                           detector_.quiet_of_places().data(), detector_.excess().data(),
+                           detector_.wrench_stands_off());
     }
     for (std::size_t segment = 0; segment < levels_.size(); ++segment) {
       const int g = static_cast<int>(segment);

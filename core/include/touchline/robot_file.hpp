@@ -23,7 +23,7 @@
 namespace touchline {
 
 // Of the file; another one is refused. It changes with every part of `Robot`.
-constexpr std::uint32_t kRobotFormat = 7;
+constexpr std::uint32_t kRobotFormat = 8;
 
 // A file that cannot be read or written: it says which, and why.
 struct RobotFileError : std::runtime_error {
@@ -231,8 +231,8 @@ void store(A& file, TestSetting& setting) {
 }
 template <class A>
 void store(A& file, NoiseFigures& noise) {
-  auto& [qd, tau, wrench, period, wrench_error, torque_error, force, moment] = noise;
-  store_all(file, qd, tau, wrench, period, wrench_error, torque_error, force, moment);
+  auto& [qd, tau, wrench, period, wrench_error, torque_error, wrench_error_off, force, moment] = noise;
+  store_all(file, qd, tau, wrench, period, wrench_error, torque_error, wrench_error_off, force, moment);
 }
 template <class A>
 void store(A& file, DetectionSettings& settings) {

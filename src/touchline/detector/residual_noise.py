@@ -11,13 +11,23 @@ CONFIGURATIONS = 64  # sampled for the largest effect of noise
 
 
 def native_noise(
-    robot: Robot, period: float, wrench_error: float = 0.0, torque_error: float = 0.0
+    robot: Robot,
+    period: float,
+    wrench_error: float = 0.0,
+    torque_error: float = 0.0,
+    wrench_error_off: float = 0.0,
 ) -> core.NoiseFigures:
     """The noise figures of a robot's description in the words of the native core."""
     noise = robot.description.noise
     sensors = [x for name in robot.sensor_names for x in noise.sensors[name]]
     return core.noise_figures(
-        list(noise.qd), list(noise.tau), sensors, period, wrench_error, torque_error
+        list(noise.qd),
+        list(noise.tau),
+        sensors,
+        period,
+        wrench_error,
+        torque_error,
+        wrench_error_off,
     )
 
 

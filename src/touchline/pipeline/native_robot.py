@@ -28,6 +28,7 @@ def native_robot(
     bandwidth: float | None,
     wrench_error: float,
     torque_error: float,
+    wrench_error_off: float,
     pushes: PushDescription,
     tuning: Mapping[str, float],
 ) -> core.Robot:
@@ -44,7 +45,7 @@ def native_robot(
     native.segment_names = list(robot.segment_names)
     native.rows = native_rows(thresholds)
     native.detection = native_settings(robot, thresholds, period)
-    native.noise = native_noise(robot, period, wrench_error, torque_error)
+    native.noise = native_noise(robot, period, wrench_error, torque_error, wrench_error_off)
     native.blows = blow_limits(robot, thresholds, zones, tuning)
     native.segment_zones = [_zone(zones.of(segment)) for segment in robot.segment_names]
     native.surfaces = native_surfaces(robot, skin)

@@ -72,8 +72,8 @@ class Pipeline:
             Where the stamps of 64 samples differ from it by a fifth, `health` has `Health.PERIOD`.
         rule: of the localizer, "likelihood" or "paper" (the first entry of the line).
         wrench_error: of the gains of six-axis sensors, as a part of the load, for the localizer's
-            weights; default: `WRENCH_ERROR` where the robot is calibrated. Elsewhere `model_error`
-            allows for more.
+            weights; default: `WRENCH_ERROR` where the robot is calibrated, and while any wrench
+            stands off before it is touched. Elsewhere none.
         torque_error: the same of joint torques.
         skin: the robot's surfaces, if already at hand.
         friction: coefficient of the cone in which pushes are looked for; default: that of the
@@ -128,11 +128,13 @@ class Pipeline:
         native = native_tuning(self.tuning, rule)
         native.method = getattr(core.Method, method)
         pushes = expected_pushes(robot, friction)
+        wrench_error_off = WRENCH_ERROR if wrench_error is None else wrench_error
         if wrench_error is None:
             calibrated = robot.description.detection.calibration is not None
             wrench_error = WRENCH_ERROR if calibrated else 0.0
         self._method = method
-        self._weights = period, bandwidth, wrench_error, torque_error, pushes, self.tuning
+        errors = wrench_error, torque_error, wrench_error_off
+        self._weights = period, bandwidth, *errors, pushes, self.tuning
         self._model_error = model_error
         self._made = self._native()
         self._native_tuning = native

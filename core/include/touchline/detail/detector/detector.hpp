@@ -155,6 +155,14 @@ class Detector {
     return standing;
   }
   bool stands_off() const { return offset_; }
+  // Does any wrench stand off? What gains do to the arm's own weight is such an offset.
+  bool wrench_stands_off() const {
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      if (rows_.of_wrench(i) && std::fabs(offsets_.baseline(i)) > tuning_.doubtful * rows_.limit(i))
+        return true;
+    }
+    return false;
+  }
   bool noisy() const { return noisy_; }
   double reference(int row) const { return offsets_.reference(row); }
   // Over how long a row's baseline has been averaged [s].

@@ -197,6 +197,12 @@ struct DetectorTuning {
   // for 2 s hides the pushes of the next 10 s.
   double hand_times = 4.0;
 
+  // ---- What makes gains doubtful ----
+  // Of what a wrench's row must exceed to be felt: an offset beyond it may come of a sensor's gain, which
+  // errs in a contact as well. Half: noise passes for an offset. Double: an arm whose gains are 1 % off
+  // is more often taken for right.
+  double doubtful = 0.25;
+
   // ---- What ends one ----
   // Of an event's peak: what may rest after it, as friction does. Half: what sticks lasts as an
   // event. Double: any held force that does not change comes to rest.
@@ -283,6 +289,7 @@ struct DetectorTuning {
     v("creep_share", "1", t.creep_share);
     v("hand", "s", t.hand);
     v("hand_times", "1", t.hand_times);
+    v("doubtful", "1", t.doubtful);
     v("little", "1", t.little);
     v("trace", "1", t.trace);
     v("slow", "1", t.slow);

@@ -76,10 +76,10 @@ class Localizer {
   // Of the sample: its configuration `q`, `qd`. `drift`: what the model's errors may have added to
   // each row of the detector since its baseline. `quiet`: for how long the baseline of each segment
   // has been averaged. `excess`: how many times as large as told the noise of each row is. All but
-  // `q` may be null.
+  // `q` may be null. `wrench_off`: does any wrench of the arm stand off?
   void set_state(const double* q, const double* qd, const double* drift, const double* quiet,
-                 const double* excess = nullptr) {
-    measurement_.set_state(q, qd, drift, quiet, excess);
+                 const double* excess = nullptr, bool wrench_off = false) {
+    measurement_.set_state(q, qd, drift, quiet, excess, wrench_off);
     said_ = 0;
     shared_ = false;
   }

@@ -20,17 +20,21 @@ namespace touchline {
 class LastingNoise {
  public:
   LastingNoise(const Observer& observer, const Posture& posture, std::vector<DetectionRow> tests,
-               double wrench_error, double torque_error)
+               double wrench_error, double torque_error, double wrench_error_off)
       : observer_(observer),
         posture_(posture),
         tests_(std::move(tests)),
         wrench_error_(wrench_error),
         torque_error_(torque_error),
+        wrench_errors_{wrench_error, std::max(wrench_error, wrench_error_off)},
         joints_(observer.row_layout().joints, 0.0) {}
 
   double torque_error() const { return torque_error_; }
   // Are torques as good as their noise figures say?
   bool exact_torques() const { return torque_error_ == 0.0; }
+
+  // Does any wrench of the arm stand off? A wrong gain does that, as the sensor bears weight.
+  void set_off(bool off) { wrench_error_ = wrench_errors_[off ? 1 : 0]; }
 
   // Takes what the model's errors have added to the rows of the detector (see `Detector::drift`),
   // or null: nothing. Returns whether there is any lasting error.
@@ -96,6 +100,7 @@ class LastingNoise {
   const Posture& posture_;
   std::vector<DetectionRow> tests_;
   double wrench_error_, torque_error_;
+  double wrench_errors_[2];     // as told, and of an arm that is not as told
   double wrench_[6] = {};       // by the model: sigmas in the frame of the segment's sensor
   std::vector<double> joints_;  // and of the joints' torques
 };

@@ -33,7 +33,8 @@ class Measurement {
         offsets_(observer, posture_, tests),
         rows_(observer, posture_),
         layout_(observer.row_layout()),
-        lasting_(observer, posture_, std::move(tests), noise.wrench_error, noise.torque_error),
+        lasting_(observer, posture_, std::move(tests), noise.wrench_error, noise.torque_error,
+                  noise.wrench_error_off),
         noise_(observer, posture_, std::move(noise), 6 + layout_.joints + 6 * layout_.sensors) {
     const std::size_t most = rows_.most(), size = 6 + most;
     used_.resize(most);
@@ -50,10 +51,11 @@ class Measurement {
   // Of the sample: its configuration; `qd` may be null. `drift`: what the model's errors may have
   // added to each row of the detector since its baseline, or null. `quiet`: for how long the baseline
   // of each segment has been averaged [s], or null. `excess`: how many times as large as told the
-  // noise of each row is, or null.
+  // noise of each row is, or null. `wrench_off`: does any wrench of the arm stand off?
   void set_state(const double* q, const double* qd, const double* drift, const double* quiet,
-                 const double* excess) {
+                 const double* excess, bool wrench_off = false) {
     excess_ = excess;
+    lasting_.set_off(wrench_off);
     posture_.set(q, qd);
     drift_ = drift;
     quiet_ = quiet;
