@@ -390,6 +390,18 @@ shapes = {n: list(f["shape"]) for n, f in opened.features.items() if n in told}
 action = frame["action"].tolist()
 print(json.dumps([opened.num_episodes, len(opened), told, shapes, action]))
 """
+WINDOWS = """
+import sys, json
+import torch
+from lerobot.datasets.lerobot_dataset import LeRobotDataset
+times = json.loads(sys.argv[2])
+names = ["observation.touch.force", "observation.touch.contact", "observation.touch.soon"]
+opened = LeRobotDataset("local/set", root=sys.argv[1], delta_timestamps=dict.fromkeys(names, times))
+indices = json.loads(sys.argv[3])
+loader = torch.utils.data.DataLoader(torch.utils.data.Subset(opened, indices), len(indices))
+batch = next(iter(loader))
+print(json.dumps({n: batch[n].tolist() for n in names + [n + "_is_pad" for n in names]}))
+"""
 
 
 def lerobot_python():
@@ -426,6 +438,18 @@ def test_lerobots_own_loader(robot, episodes, tmp_path):
             np.testing.assert_array_equal(
                 np.ravel(values), np.ravel(column(table, name, "")[index])
             )
+
+    # Windows about a frame, batched for training: those of one episode, padded at its ends.
+    steps, indices = np.array([-40, 0, 40]), [30, 500 * TOUCHED + TOUCH.start, 500 * EPISODES - 1]
+    batch = json.loads(run(WINDOWS, (steps / RATE).tolist(), indices).splitlines()[-1])
+    wanted = np.array(indices)[:, None] + steps
+    first = np.array(indices)[:, None] // 500 * 500
+    held = np.clip(wanted, first, first + 499)  # of an episode
+    for name in [name for name in batch if not name.endswith("_is_pad")]:
+        values = column(table, name, "")[held]
+        np.testing.assert_array_equal(np.squeeze(batch[name]), values)
+        np.testing.assert_array_equal(batch[f"{name}_is_pad"], wanted != held)
+        assert values.any() and not values.all()
 
 
 @pytest.mark.skipif(os.name != "posix", reason="asks for the permissions of POSIX")
