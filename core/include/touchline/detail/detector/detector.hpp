@@ -13,6 +13,7 @@
 
 #include "touchline/detail/detector/activity.hpp"
 #include "touchline/detail/detector/borne_out.hpp"
+#include "touchline/detail/detector/calm_values.hpp"
 #include "touchline/detail/detector/detection_row.hpp"
 #include "touchline/detail/detector/first_look.hpp"
 #include "touchline/detail/detector/friction_seen.hpp"
@@ -47,6 +48,7 @@ class Detector {
         levels_(rows_, motion_, settings_.times, tuning_, offsets_, friction_),
         drift_(rows_, observer.row_layout().joints, settings_.times.baseline, tuning_),
         borne_out_(rows_.bandwidths),
+        calm_(rows_, tuning_),
         meters_(rows_.bandwidths, rows_.numbers(least_noise), tuning_),
         trend_meters_(slower(rows_.bandwidths, tuning_.trend), rows_.numbers(least_noise), tuning_),
         first_looks_(rows_.size()),
@@ -107,8 +109,9 @@ class Detector {
     }
     follow_offsets(dt);
     if (dt > 0.0) {
-      meters_.add(rows_.residuals, rows_.known, counts_, dt, tuning_);
-      trend_meters_.add(offsets_.trends(), rows_.known, counts_, dt, tuning_);
+      calm_.add(offsets_.trends(), counts_, [&](std::size_t g) { return levels_.is_quiet(g); });
+      meters_.add(calm_.values(), calm_.known(), calm_.counts(), dt, tuning_);
+      trend_meters_.add(calm_.trends(), calm_.known(), calm_.counts(), dt, tuning_);
     }
     if (dt > 0.0 && sound_)
       drift_.follow(levels_, offsets_, friction_, meters_, activity(), q, dt);
@@ -458,7 +461,10 @@ class Detector {
   // The first moments of a row's noise.
   void look(std::size_t i) {
     if (first_looks_[i].over()) return;
-    first_looks_[i].add(rows_.samples[i].residual, tuning_);
+    // Third differences of slow samples are reached by hands: there the first few are all.
+    const bool enough = calm_.is_late(rows_[i].segment) && first_looks_[i].ready(tuning_);
+    if (enough) first_looks_[i].end();
+    if (!enough) first_looks_[i].add(rows_.samples[i].residual, tuning_);
     if (first_looks_[i].over()) ++looks_over_;
   }
 
@@ -479,6 +485,7 @@ class Detector {
   SegmentLevels levels_;
   ModelDrift drift_;
   BorneOut borne_out_;
+  CalmValues calm_;
   NoiseMeter meters_, trend_meters_;  // of the residuals, of their trends
   std::vector<FirstLook> first_looks_;  // per row
   std::size_t looks_over_ = 0;          // rows of which the first moments are over

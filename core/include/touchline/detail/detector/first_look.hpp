@@ -28,6 +28,8 @@ class FirstLook {
 
   bool ready(const DetectorTuning& t) const { return count_ >= few(t); }
   bool over() const { return count_ == kMost; }
+  // What has been seen is all: later samples may be a hand's.
+  void end() { count_ = kMost; }
 
   void add(double value, const DetectorTuning& t) {
     if (over()) return;
