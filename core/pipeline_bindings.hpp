@@ -302,7 +302,8 @@ inline void restart(Pipeline& p, tl::Robot robot, bool same) {
   p.value.swap(fresh);
 }
 
-// For how long the arm has been at rest [s]; the mean torques (n) and wrenches (6 k) felt since.
+// For how long the arm has been at rest, untouched [s]; the mean torques (n) and wrenches (6 k) felt
+// since.
 inline nb::tuple rest(Pipeline& p) {
   const guard::Turn turn(p.turn);
   const tl::RestMeter& meter = p.value->rest();

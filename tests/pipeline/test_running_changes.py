@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from free_motion import exact_loads, free_motion
+from free_motion import exact_loads, free_motion, pushed
 
 import touchline as tl
 from touchline.errors import InputError
@@ -92,6 +92,61 @@ def test_a_tare_needs_rest(sara):
         pipeline.tare()
 
 
+def touched_tool(robot, samples, newtons):
+    """With a hand that presses on the tool all the time."""
+    return pushed(robot, samples, LINK, slice(None), [0.0, 0.0, -newtons])
+
+
+@pytest.mark.parametrize("newtons", [4.0, 20.0])
+def test_a_touch_is_not_tared(sara, newtons):
+    still, pipeline = at_rest(sara), tl.Pipeline(sara)
+    feed(pipeline, still)
+    feed(pipeline, touched_tool(sara, still, newtons), 1.0)
+    with pytest.raises(ValueError, match=r"take a touch for an offset: something has touched .* N"):
+        pipeline.tare()
+    assert pipeline.robot is sara
+
+
+def test_a_touch_that_is_over_is_in_no_tare(sara):
+    still, pipeline = at_rest(sara), tl.Pipeline(sara)
+    feed(pipeline, still)
+    feed(pipeline, touched_tool(sara, still, 20.0), 1.0)
+    feed(pipeline, still.where(still.time < 0.5), 2.0)
+    with pytest.raises(ValueError, match=r"tare needs 0\.5 s of rest without a touch"):
+        pipeline.tare()
+    feed(pipeline, still, 2.5)
+    taken = pipeline.tare()
+    assert np.abs(taken.wrench).max() < 0.1 and np.nanmax(np.abs(taken.torque)) < 0.1
+    assert taken.doubt == ""
+
+
+@pytest.mark.parametrize("since", ["the start", "a reset"])
+def test_what_touched_the_arm_all_the_time_is_told_of_a_tare(sara, since):
+    pipeline = tl.Pipeline(sara)
+    touched = touched_tool(sara, at_rest(sara), 20.0)
+    if since == "a reset":
+        feed(pipeline, at_rest(sara))
+        feed(pipeline, touched, 1.0)
+        pipeline.reset()
+    feed(pipeline, touched, 2.0)
+    taken = pipeline.tare()
+    assert "rests on the arm" in taken.doubt and "wrist.fy" in taken.doubt
+    assert np.abs(taken.wrench).max() == pytest.approx(20.0, abs=0.1)
+
+
+def test_a_load_beside_a_touch_is_told(sara):
+    still, pipeline = at_rest(sara, noise=0.0), tl.Pipeline(sara)
+    feed(pipeline, still)
+    feed(pipeline, touched_tool(sara, still, 20.0), 1.0)
+    told = pipeline.set_load(LINK, 0.5, (0.0, 0.0, 0.05))
+    assert "something has touched" in told and "4.9 N" in told
+    lifted = tl.Pipeline(sara)
+    feed(lifted, still)
+    feed(lifted, at_rest(carrying(sara, 1.2), noise=0.0), 1.0)
+    assert any(event.cleared is None for event in lifted.events)
+    assert lifted.set_load(LINK, 1.2, (0.0, 0.0, 0.05)) == ""
+
+
 def test_a_load_that_is_set_is_no_longer_felt(sara):
     loaded = at_rest(carrying(sara, 1.2), noise=0.0)
     pipeline = tl.Pipeline(sara)
@@ -123,6 +178,10 @@ WRONG_LOADS = [
     ((LINK, 1.0, (0.0, 0.0)), "com needs 3 numbers"),
     ((LINK, 1.0, (0.0, 0.0, np.inf)), "finite"),
     ((LINK, 1.0, (0.0, 0.0, 0.0), (1.0,)), "inertia needs 6 numbers"),
+    ((LINK, 1e9), r"mass is 1e\+09 kg, but at most [\d.]+ kg are allowed: 2 times what moves"),
+    ((LINK, 80.0), "mass is 80 kg"),
+    ((LINK, 1.0, (0.0, 4.0, 3.0)), r"com is 5 m from .* at most [\d.]+ m are allowed"),
+    ((LINK, 1.0, (0.0, 0.0, 0.0), (1.0, 0, 0, 1.0, 0, 2.01)), "inertia .* no body has these"),
 ]
 
 
@@ -138,8 +197,8 @@ def test_events_end_with_a_reset_and_their_numbers_go_on(sara):
     pipeline = tl.Pipeline(sara)
     still = at_rest(sara)
     feed(pipeline, still)
-    pushed = replace(still, wrench=still.wrench + np.array([0.0, 0.0, -30.0, 0.0, 0.0, 0.0]))
-    feed(pipeline, pushed, 1.0)
+    touched = replace(still, wrench=still.wrench + np.array([0.0, 0.0, -30.0, 0.0, 0.0, 0.0]))
+    feed(pipeline, touched, 1.0)
     assert pipeline.events and pipeline.events[-1].cleared is None
     count = len(pipeline.events)
     pipeline.reset()
@@ -148,7 +207,7 @@ def test_events_end_with_a_reset_and_their_numbers_go_on(sara):
     told = pipeline.update(2.5, *(x[0] for x in (still.q, still.qd, still.tau, still.wrench)))
     assert "ended" in [change.happened for change in told.events]
     feed(pipeline, still, 3.0)
-    feed(pipeline, pushed, 4.0)
+    feed(pipeline, touched, 4.0)
     ids = [event.id for event in pipeline.events]
     assert ids == sorted(set(ids)) and len(ids) > count
 
@@ -180,13 +239,13 @@ def test_after_a_reset_stand_ins_are_as_at_the_start(sara, lost):
 
 def test_a_pipeline_begins_afresh_as_a_new_one(sara):
     still = at_rest(sara)
-    pushed = replace(still, wrench=still.wrench + np.array([0.0, 0.0, -30.0, 0.0, 0.0, 0.0]))
+    touched = replace(still, wrench=still.wrench + np.array([0.0, 0.0, -30.0, 0.0, 0.0, 0.0]))
     used, new = tl.Pipeline(sara), tl.Pipeline(sara)
     feed(used, still)
-    feed(used, pushed, 1.0)
+    feed(used, touched, 1.0)
     count, afresh = len(used.events), used.afresh()
     assert count and not afresh.events
-    for samples, start in ((still, 5.0), (pushed, 6.0)):
+    for samples, start in ((still, 5.0), (touched, 6.0)):
         expected, found = feed(new, samples, start), feed(afresh, samples, start)
         np.testing.assert_array_equal(expected.tau_ext, found.tau_ext)
     assert [repr(event) for event in afresh.events] == [repr(event) for event in new.events]

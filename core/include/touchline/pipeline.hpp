@@ -108,7 +108,7 @@ class Pipeline {
   // allocates. Throws std::invalid_argument where there are several or none.
   std::vector<SurfaceCell> region() const { return localizer_.region(); }
 
-  // What is felt while the arm is at rest: the offsets that a tare takes off the biases.
+  // What is felt while the arm is at rest, untouched: the offsets that a tare takes off the biases.
   const RestMeter& rest() const { return rest_; }
   double time() const { return observer_.time(); }  // of the last accepted sample [s]
   // The number of the next event; another pipeline that goes on for this one counts on from it.
@@ -176,7 +176,7 @@ class Pipeline {
     }
     recorder_.finish();
     period_.take(observer_.time(), observer_.max_gap());
-    rest_.take(row, sample.qd, observer_.time());
+    rest_.take(row, sample.qd, observer_.time(), touched_);
     resets_.step(row, [this](std::size_t i) { return observer_.restarts(i); });
     judge_watch();
     return result(sample, row);

@@ -152,7 +152,7 @@ class Session:
         """Takes what is felt now for offsets, as `Pipeline.tare`; returns what was done.
 
         Raises:
-            InputError: the arm has not been at rest for half a second.
+            InputError: something touches the arm, or it was not at rest for half a second.
         """
         try:
             taken = self._running().tare()
@@ -167,7 +167,8 @@ class Session:
         torques = np.abs(taken.torque[np.isfinite(taken.torque)])
         if len(torques):
             parts.append(f"up to {torques.max():.2f} Nm at a joint")
-        return f"tare: took off {', '.join(parts) or 'nothing: no signal is measured'}"
+        told = f"tare: took off {', '.join(parts) or 'nothing: no signal is measured'}"
+        return f"{told}. {taken.doubt}" if taken.doubt else told
 
     def set_load(self, link: str, mass: float | None = None, com: ArrayLike = (0, 0, 0)) -> str:
         """Tells what a link carries from now on; returns what was done.
@@ -178,22 +179,29 @@ class Session:
             com: (3,) its centre in the link's frame [m], if the mass is given.
 
         Raises:
-            InputError: there is no such link, or nothing could be weighed.
+            InputError: there is no such link, no arm carries such a body, or nothing could be
+                weighed: no load shows, or what shows is no load alone.
         """
         pipeline, error = self._running(), ""
         if mass is None:
             found = weigh_load(pipeline.robot, [_samples(self._recent)], link)
             mass, com = found.mass, found.com
             error = f" +- {found.mass_error:.3f}"
+            if found.doubt:
+                raise InputError(
+                    f"no load is set on {link}: {mass:.3f}{error} kg would fit best, but "
+                    f"{found.doubt}"
+                )
         try:
-            pipeline.set_load(link, mass, com)
+            doubt = pipeline.set_load(link, mass, com)
         except ValueError as problem:
             raise InputError(str(problem)) from None
         self.result = None
+        doubt = f". But {doubt}" if doubt else ""
         if mass == 0.0:
-            return f"set_load: {link} carries nothing more than described"
+            return f"set_load: {link} carries nothing more than described{doubt}"
         where = ", ".join(f"{x:+.3f}" for x in np.asarray(com, dtype=float))
-        return f"set_load: {link} carries {mass:.3f}{error} kg at ({where}) m of its frame"
+        return f"set_load: {link} carries {mass:.3f}{error} kg at ({where}) m of its frame{doubt}"
 
     def _running(self) -> Pipeline:
         if self.pipeline is None:

@@ -8,7 +8,7 @@ import numpy as np
 from touchline.arrays import Array
 from touchline.model.description import LinkCorrection, Load, RobotDescription
 from touchline.model.mechanism import Inertia, Link, Mechanism
-from touchline.model.plausibility import inertia_warnings
+from touchline.model.plausibility import inertia_warnings, load_problem
 from touchline.model.transforms import combine_inertias, inertia_matrix
 
 NO_MASS = 1e-9  # kg
@@ -114,4 +114,9 @@ def _warnings(
     old, new = set(inertia_warnings(before)), list(inertia_warnings(after, description.locked))
     mended = tuple(f": {line}" for line in old.difference(new))
     kept = [line for line in before.warnings if not line.endswith(mended)]
-    return (*kept, *(f"{description.path}: {line}" for line in new if line not in old))
+    told = [line for line in new if line not in old]
+    for i, load in enumerate(description.loads):
+        problem = load_problem(load, before)
+        if problem:
+            told.append(f"loads[{i}] of link '{load.link}': {problem}")
+    return (*kept, *(f"{description.path}: {line}" for line in told))

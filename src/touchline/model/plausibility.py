@@ -8,8 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
+from touchline.model.description import Load
 from touchline.model.mechanism import Inertia, Joint, Link, Mechanism
 from touchline.model.topology import outboard_links
+
+# Of the largest principal moment: figures that are given with three digits or more are so exact.
+ROUNDED = 1e-3
+# Times the mass of what moves of the arm itself. Light arms carry as much as they weigh at best
+# (DLR/KUKA LWR: 14 kg), all others less: twice that is a slip of the unit or of the keyboard.
+MOST_CARRIED = 2.0
+SHORTEST_REACH = 1.0  # m; a single joint has no length, and still may carry a tool of that length
 
 
 def mechanism_warnings(mechanism: Mechanism, path: Path) -> Mechanism:
@@ -56,14 +64,62 @@ def inertia_problem(body: Inertia) -> str | None:
     The principal moments are not negative, and none exceeds the sum of the two others.
     """
     moments = np.linalg.eigvalsh(body.inertia)
-    # Published figures are rounded: 1 % of the largest moment is no finding.
-    slack = 0.01 * max(abs(moments))
+    slack = ROUNDED * max(abs(moments))
     listed = ", ".join(f"{value:.3g}" for value in moments)
     if moments[0] < -slack:
         return f"the inertia has a negative principal moment: {listed} kg m2"
     if moments[2] > moments[0] + moments[1] + slack:
         return f"no body has these principal moments (the largest exceeds the sum): {listed} kg m2"
     return None
+
+
+def load_problem(load: Load, mechanism: Mechanism, loads: Collection[Load] = ()) -> str | None:
+    """Say why no arm carries this body, with the value and what is allowed; None if one can.
+
+    Args:
+        load: of finite numbers.
+        mechanism: that shall carry it.
+        loads: that are in the mechanism's masses already, and are no part of the arm itself.
+    """
+    moving = _moving_links(mechanism)
+    own = sum(mechanism.links[name].inertia.mass for name in moving)
+    most = MOST_CARRIED * (own - sum(x.mass for x in loads if x.link in moving))
+    if load.mass > most > 0.0:
+        return (
+            f"mass is {load.mass:.6g} kg, but at most {most:.3g} kg are allowed: "
+            f"{MOST_CARRIED:g} times what moves of the arm itself, and no arm carries as much"
+        )
+    distance, reach = float(np.linalg.norm(load.com)), max(_reach(mechanism), SHORTEST_REACH)
+    if distance > reach:
+        return (
+            f"com is {distance:.6g} m from the origin of {load.link}, but at most {reach:.3g} m "
+            "are allowed: the length of the stretched arm"
+        )
+    return None
+
+
+def _moving_links(mechanism: Mechanism) -> set[str]:
+    """Links that some joint moves."""
+    joints = mechanism.joints.values()
+    return {
+        name
+        for joint in joints
+        if joint.kind != "fixed"
+        for name in outboard_links(mechanism, joint.child, lambda _: True)
+    }
+
+
+def _reach(mechanism: Mechanism) -> float:
+    """From the root to the farthest link's frame if all were stretched [m]."""
+    lengths = {mechanism.root: 0.0}
+    for name in outboard_links(mechanism, mechanism.root, lambda _: True):
+        for joint in mechanism.joints.values():
+            if joint.parent == name:
+                travel = max(abs(joint.lower), abs(joint.upper))
+                far = travel if joint.kind == "prismatic" and np.isfinite(travel) else 0.0
+                own = float(np.linalg.norm(joint.T_parent_joint[:3, 3]))
+                lengths[joint.child] = lengths[name] + own + far
+    return max(lengths.values())
 
 
 def mesh_warnings(mechanism: Mechanism) -> Iterator[str]:

@@ -22,8 +22,9 @@ from touchline.localizer.localizer import (
 )
 from touchline.localizer.region import Region
 from touchline.localizer.skin import Skin
-from touchline.model.corrections import with_loads, with_offsets
+from touchline.model.corrections import load_inertia, with_loads, with_offsets
 from touchline.model.description import AXES, Load
+from touchline.model.plausibility import inertia_problem, load_problem
 from touchline.model.robot import Robot, load_robot
 from touchline.native import core
 from touchline.observer.observer import Estimate, Observer, require_seconds
@@ -35,11 +36,10 @@ from touchline.result.event import Event
 from touchline.result.fault import FaultChange, changes_of, channel_names
 from touchline.result.native import Names
 from touchline.result.reset import ResetChange, estimate_names, resets_in
-from touchline.result.standing import Standing
+from touchline.result.standing import Standing, doubtful_offset
 from touchline.suggest import unknown
 from touchline.tuning import DEFAULTS, Tuning, native_tuning
 
-ROUNDED = 1e-3  # relative; inertias are given with three digits or more
 REST = DEFAULTS["observer.rest_window"]  # s that an arm must have stood still before a tare
 
 
@@ -51,11 +51,18 @@ class Tare:
         time: of the last sample before [s].
         torque: (n,) felt at each joint [Nm]; NaN where none is measured.
         wrench: (k, 6) felt outboard of each sensor [N, Nm], in its frame, at its origin.
+        beyond: what stood on signals of the detector and exceeds the threshold of a touch.
     """
 
     time: float
     torque: Array
     wrench: Array
+    beyond: tuple[Standing, ...] = ()
+
+    @property
+    def doubt(self) -> str:
+        """That it may have been a touch, in a sentence; empty where nothing speaks for one."""
+        return doubtful_offset(self.beyond)
 
 
 class Pipeline:
@@ -265,20 +272,32 @@ class Pipeline:
 
         The mean of the last half second of rest goes into the biases of `robot`; the estimate
         starts anew. It holds for this posture: what gravity puts on a wrong model is no offset.
+        What has touched the arm since observation began, or since a `reset`, is no event. Such a
+        touch reads as an offset does: `Tare.doubt` says where one is as large as a touch.
 
         Raises:
-            ValueError: the arm has not been at rest, with all signals there, for half a second.
+            ValueError: something touches the arm, or it has not been at rest and untouched, with
+                all signals there, for half a second.
         """
+        touch = next((event for event in self.events if event.cleared is None), None)
+        if touch is not None:
+            raise ValueError(
+                f"tare would take a touch for an offset: {_lasting(touch)}. Let go and tare half a "
+                "second later. If nothing touches the arm, `reset` first: what stands then counts "
+                "as an offset"
+            )
         seconds, torque, wrench = self._core.rest()
         if seconds < REST:
             raise ValueError(
-                f"tare needs {REST:g} s of rest with all signals there; it was {seconds:.2f} s"
+                f"tare needs {REST:g} s of rest without a touch and with all signals there; "
+                f"it was {seconds:.2f} s"
             )
+        beyond = tuple(x for x in self.standing if x.now)
         torque, wrench = np.array(torque), np.array(wrench).reshape(-1, 6)
         before, time = self.robot, self._core.time
         description = with_offsets(before.description, torque, wrench)
         self._go_on_with(Robot(description, before.mechanism, before.assumed))
-        return Tare(time, torque, wrench)
+        return Tare(time, torque, wrench, beyond)
 
     def set_load(
         self,
@@ -286,11 +305,12 @@ class Pipeline:
         mass: float,
         com: ArrayLike = (0.0, 0.0, 0.0),
         inertia: ArrayLike = (0.0,) * 6,
-    ) -> None:
+    ) -> str:
         """From now on the arm carries a body there, as when a gripper has closed on something.
 
         It replaces what an earlier call gave that link; a mass of 0 takes it off. The estimate
-        starts anew.
+        starts anew. Events that last end: what the body does not explain of them counts as an
+        offset from then on, not as a touch.
 
         Args:
             link: that carries it.
@@ -298,8 +318,12 @@ class Pipeline:
             com: (3,) its centre in the link's frame [m].
             inertia: (6,) ixx ixy ixz iyy iyz izz about its centre [kg m2], in the link's axes.
 
+        Returns:
+            That something else may touch the arm, in a sentence; empty where no event lasted, or
+            the body's weight explains its force.
+
         Raises:
-            ValueError: there is no such link, or the body is not possible.
+            ValueError: there is no such link, or no body is so, or no arm carries it.
         """
         load = Load(link, float(mass), _numbers(com, 3, "com"), _numbers(inertia, 6, "inertia"))
         if link not in self.robot.mechanism.links:
@@ -309,17 +333,40 @@ class Pipeline:
             raise ValueError(f"mass is {mass}, but must be at least 0 kg")
         if not np.all(np.isfinite([*load.com, *load.inertia])):
             raise ValueError("com and inertia must be finite numbers [m, kg m2]")
-        ixx, ixy, ixz, iyy, iyz, izz = load.inertia
-        low, middle, high = np.linalg.eigvalsh([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-        if low < -ROUNDED * high or high > (1.0 + ROUNDED) * (low + middle):
-            raise ValueError(f"inertia {load.inertia} kg m2 is that of no body")
-        set_before = self._loads.get(link)
-        kept = tuple(x for x in self.robot.description.loads if x is not set_before)
-        loads = (*kept, load) if load.mass > 0.0 else kept
         robot = self.robot
+        problem = inertia_problem(load_inertia(load))
+        if problem:
+            raise ValueError(f"inertia {list(load.inertia)} kg m2: {problem}")
+        problem = load_problem(load, robot.mechanism, robot.description.loads)
+        if problem:
+            raise ValueError(problem)
+        set_before = self._loads.get(link)
+        kept = tuple(x for x in robot.description.loads if x is not set_before)
+        loads = (*kept, load) if load.mass > 0.0 else kept
+        more = load.mass - (0.0 if set_before is None else set_before.mass)
+        doubt = self._unexplained(more)
         changed = with_loads(robot.mechanism, robot.description, loads)
         self._go_on_with(Robot(*changed, robot.assumed))
         self._loads[link] = load
+        return doubt
+
+    def _unexplained(self, mass: float) -> str:
+        """What touches the arm beside the weight of so much more [kg], in a sentence."""
+        for event in self.events:
+            if event.cleared is not None:
+                continue
+            weight = mass * self.robot.gravity
+            number = self.robot.segment_names.index(event.segment)
+            rows = [r for r in self.thresholds.rows if r.segment == number]
+            limit = max((r.contact for r in rows if 0 <= r.component < 3), default=0.0)
+            if event.force is not None and np.linalg.norm(event.force - weight) <= limit:
+                continue
+            return (
+                f"while it was set {_lasting(event)}, and the weight of {mass:.3g} kg more is "
+                f"{np.linalg.norm(weight):.1f} N. What is left of it counts as an offset from now "
+                "on, not as a touch: let go, and set it again"
+            )
+        return ""
 
     def _go_on_with(self, robot: Robot) -> None:
         before, self.robot = self.robot, robot
@@ -404,6 +451,16 @@ class Pipeline:
                 alone; a `Contact` has `candidates` and `covariance` in any case.
         """
         return Region.of(self.skin, self._core.region())
+
+
+def _lasting(event: Event) -> str:
+    """Where something touches the arm, and since when."""
+    where = event.link or f"segment {event.segment}"
+    if event.force is None:
+        size = "" if event.torque_peak is None else f", up to {event.torque_peak:.1f} Nm"
+    else:
+        size = f", with {np.linalg.norm(event.force):.1f} N"
+    return f"something has touched {where} since {event.detected:.2f} s{size}"
 
 
 def _numbers(values: ArrayLike, count: int, name: str) -> tuple[float, ...]:

@@ -83,6 +83,16 @@ def standing_lines(all_signals: Sequence[Standing]) -> list[str]:
     return lines
 
 
+def doubtful_offset(taken: Sequence[Standing]) -> str:
+    """That a tare took off as much as a touch makes; empty where it took off less."""
+    if not taken:
+        return ""
+    return (
+        f"{_amounts(taken, 'now')} stood there since observation began, a reset or a touch. That "
+        "is an offset, or something that rests on the arm all the time: these read the same"
+    )
+
+
 def _amounts(signals: Sequence[Standing], key: Literal["start", "now", "drift"]) -> str:
     """One of the offsets of each signal; those that are largest in thresholds come first."""
     named: list[tuple[float, str]] = []

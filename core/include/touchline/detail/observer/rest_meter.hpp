@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is felt of an arm at rest: the mean external torques and wrenches since it stands still.
-// With nothing touching they are the offsets that a tare takes off. No allocation in `take`.
+// What is felt of an arm at rest: the mean external torques and wrenches since it stands still and
+// no touch is felt. They are the offsets that a tare takes off. No allocation in `take`.
 // Theory: docs/theory.md, section 2.5.
 #pragma once
 
@@ -24,13 +24,14 @@ class RestMeter {
         torque_(row.joints, 0.0),
         wrench_(6 * row.sensors, 0.0) {}
 
-  // The observer's row of an accepted sample, with the velocities (n) and the time [s] of it.
-  void take(const double* row, const double* qd, double time) {
+  // The observer's row of an accepted sample, with the velocities (n) and the time [s] of it; is a
+  // touch felt? The mean forgets slowly: of a touch just before, a third would still be in it.
+  void take(const double* row, const double* qd, double time, bool touched) {
     const double dt = time - time_;
     time_ = time;
     const Health health = static_cast<Health>(row[row_.health()]);
     const bool usable = dt > 0.0 && (health & (kSettling | kMissing | kNonFinite | kGap)) == 0;
-    if (!usable || !still(qd)) {
+    if (!usable || touched || !still(qd)) {
       seconds_ = 0.0;
       return;
     }
@@ -40,7 +41,7 @@ class RestMeter {
     follow(row + row_.sensor_wrench(), part, wrench_);
   }
 
-  // For how long the arm has been at rest and everything settled [s].
+  // For how long the arm has been at rest and untouched, and everything settled [s].
   double seconds() const { return seconds_; }
   const std::vector<double>& torque() const { return torque_; }  // (n) [Nm]; NaN: not measured
   // (k, 6) [N, Nm] on all outboard of each sensor, in its frame, at its origin.
