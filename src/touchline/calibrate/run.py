@@ -29,6 +29,7 @@ from touchline.detector.calibration import (
     with_methods,
 )
 from touchline.detector.tail import Tail
+from touchline.detector.thresholds import make_thresholds, share_of_rate
 from touchline.errors import InputError
 from touchline.folder import check_file
 from touchline.identify.choice import POSES
@@ -122,8 +123,7 @@ class Calibration:
     @property
     def share(self) -> float:
         """Of the rate, for each method in use on each segment [1/h]."""
-        tails = self.thresholds.tails if self.thresholds else {}
-        return self.rate / max(len(self.robot.description.detection.method) * len(tails), 1)
+        return share_of_rate(self.robot, make_thresholds(self.robot, self.period).rows)
 
 
 def calibrate(
@@ -328,7 +328,7 @@ def _find_thresholds(
         found, rows = _watch(robot, recordings, trust)
         suspicions = [] if trust else find_contacts(found, METHODS)
         if not suspicions:
-            share = rate / max(len(chosen) * len(robot.segment_names), 1)
+            share = share_of_rate(robot, make_thresholds(robot, recordings.period).rows)
             if robot.joint_names and recordings.travel < POSES and share * found.hours < 1.0:
                 raise StandsStill(
                     f"no joint moves by more than {recordings.travel:.2g} rad, and "
@@ -342,7 +342,6 @@ def _find_thresholds(
             _check_tails(robot, tails, chosen, found.hours)
             rows = grown(rows, more_elsewhere)
             description = describe(found.hours, recordings.period, rows, tails)
-            share = rate / max(len(chosen) * len(tails), 1)
             moments = find_moments(found, robot.segment_names, tails, chosen, share)
             return Thresholds(description, tails, held_out, train, test, parted, moments), left_out
         new = [(s.recording, s.start, s.end) for s in suspicions]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """When a residual counts as a contact: thresholds from the noise figures or from `detection`."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -92,7 +92,7 @@ def make_thresholds(robot: Robot, period: float = 1e-3) -> Thresholds:
             rows += _wrench_rows(g, segment, segment_sigma[segment], detection)
         rows += _joint_rows(robot, g, segment, joint_sigma, detection)
     counts = np.bincount([row.segment for row in rows], minlength=len(robot.segment_names))
-    share = detection.false_alarms / max(len(detection.method) * int((counts > 0).sum()), 1)
+    share = share_of_rate(robot, rows)
     if calibration is None:
         rows = [_at_least_calibrated(robot, row, share) for row in rows]
         limits = {m: theoretical(m, counts, share, period, detection) for m in detection.method}
@@ -107,6 +107,13 @@ def make_thresholds(robot: Robot, period: float = 1e-3) -> Thresholds:
     noise = theoretical("scaled", counts, share, period, detection) if beyond else rows_limit
     rows = [_calibrated_row(robot, row, calibration, rows_limit, noise) for row in rows]
     return Thresholds(tuple(rows), np.full(len(counts), np.inf), limits, calibrated=True)
+
+
+def share_of_rate(robot: Robot, rows: Sequence[RowThreshold]) -> float:
+    """Of the robot's false alarms, for each method in use on each segment with a row [1/h]."""
+    detection = robot.description.detection
+    segments = len({row.segment for row in rows})
+    return detection.false_alarms / max(len(detection.method) * segments, 1)
 
 
 def _calibration(robot: Robot, period: float) -> tuple[CalibrationDescription | None, str | None]:

@@ -6,10 +6,10 @@ import numpy as np
 from touchline.arrays import Array
 from touchline.identify.evidence import Evidence
 from touchline.identify.regressor import body_vector
+from touchline.localizer.localizer import MODEL_ERROR
 
-# As the localizer takes models, 1 sigma. Masses and inertias err by this part, centres by the same
-# part of a link's width.
-LINKS_OFF, LINK_WIDTH = 0.02, 0.1  # relative, m
+# Masses and inertias err by `MODEL_ERROR`, 1 sigma, centres by the same part of a link's width.
+LINK_WIDTH = 0.1  # m
 
 
 def usual_links(evidence: Evidence) -> Array:
@@ -18,7 +18,7 @@ def usual_links(evidence: Evidence) -> Array:
     for i, node in enumerate(evidence.robot.nodes):
         body = node.inertia
         if body.mass > 0.0:
-            columns.append(LINKS_OFF * evidence.model[:, :, i] @ body_vector(body))
-            shifts = evidence.model[:, :, i, 1:4] * (LINKS_OFF * LINK_WIDTH * body.mass)
+            columns.append(MODEL_ERROR * evidence.model[:, :, i] @ body_vector(body))
+            shifts = evidence.model[:, :, i, 1:4] * (MODEL_ERROR * LINK_WIDTH * body.mass)
             columns += list(np.moveaxis(shifts, -1, 0))
     return np.stack(columns, axis=-1) if columns else np.zeros((*evidence.reading.shape, 0))
