@@ -17,6 +17,7 @@ from touchline.identify.laws import SPEEDS, spread
 from touchline.identify.payload import payload_mass
 from touchline.identify.physical import PhysicalBody, pseudo_inertia
 from touchline.identify.regressor import body_vector
+from touchline.identify.summary import identification_lines
 from touchline.model.corrections import load_inertia
 from touchline.model.description import Friction, Load
 from touchline.model.perturbed import perturbed
@@ -196,6 +197,7 @@ def test_a_payload_is_found_and_the_written_robot_explains_the_motion():
     found = identify(gather(robot, [[recorded(loaded(robot, robot.mechanism))]]))
     mass, error = payload_mass(found.solution)
     assert mass == pytest.approx(1.2, abs=0.02) and error < 0.02
+    assert "or something that rested on it" in "\n".join(identification_lines(found))
     new = identified_robot(found)
     left = found.evidence.residual(new)
     np.testing.assert_allclose(left, found.left(), atol=1e-3)

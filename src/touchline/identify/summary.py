@@ -115,6 +115,10 @@ def _body_lines(found: Identification) -> list[str]:
             name = payload_link(found.evidence.robot, body.node)
             lines.append(f"  payload at {name}: {change[0]:.3f} +- {error[0]:.2g} kg, centre at")
             lines[-1] += f" [{centre}] m in the axes of its joint"
+            lines.append(
+                "    or something that rested on it, or pressed down on it, all through the "
+                "recording: these read the same. If nothing is mounted there, record again"
+            )
     if not own:
         return lines
     links = main_links(found.evidence.robot)
