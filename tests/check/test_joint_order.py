@@ -44,3 +44,19 @@ def test_reversed_joints_are_named(healthy, signals, tmp_path, capsys):
             assert CASES[signals] in told
         else:
             assert "reversed order" not in told
+
+
+@pytest.mark.parametrize("joint", [1, 3])
+def test_a_joint_that_is_turned_in_all_signals_is_named(healthy, joint, tmp_path, capsys):
+    robot, samples = healthy
+    values = {k: getattr(samples, k).copy() for k in ("time", "q", "qd", "tau", "wrench")}
+    for signal in ("q", "qd", "tau"):
+        values[signal][:, joint] *= -1.0
+    log = tmp_path / "log.parquet"
+    write_table(log, type(samples)(**values, row=0), robot.description)
+    main(["check", "sara", str(log)])
+    told = " ".join(capsys.readouterr().out.split())
+    name = robot.joint_names[joint]
+    assert f"position of {name} seems of opposite sign" in told
+    if robot.description.joints[joint].measured:
+        assert f"set the other sign ({name}: sign)" in told
