@@ -14,7 +14,8 @@ from touchline.model.topology import outboard_links
 
 # Of the largest principal moment: published figures are rounded, and three digits are right by
 # 0.5 % each. Half: thin plates of such figures are told. Double: moments that are 2 % off are not.
-ROUNDED = 1e-2
+PUBLISHED = 1e-2
+COMPUTED = 1e-3  # the same of a body that a program tells, with four digits or more
 # Times the mass of what moves of the arm itself. Light arms carry as much as they weigh at best
 # (DLR/KUKA LWR: 14 kg), all others less: twice that is a slip of the unit or of the keyboard.
 MOST_CARRIED = 2.0
@@ -59,13 +60,14 @@ def inertia_warnings(mechanism: Mechanism, locked: Collection[str] = ()) -> Iter
             yield f"link '{joint.child}': moves with joint '{joint.name}' but {what}"
 
 
-def inertia_problem(body: Inertia) -> str | None:
+def inertia_problem(body: Inertia, rounded: float = PUBLISHED) -> str | None:
     """Say why no rigid body has this inertia about its centre of mass; None if one can.
 
-    The principal moments are not negative, and none exceeds the sum of the two others.
+    The principal moments are not negative, and none exceeds the sum of the two others, but for
+    what they are `rounded` by, as a part of the largest one.
     """
     moments = np.linalg.eigvalsh(body.inertia)
-    slack = ROUNDED * max(abs(moments))
+    slack = rounded * max(abs(moments))
     listed = ", ".join(f"{value:.3g}" for value in moments)
     if moments[0] < -slack:
         return f"the inertia has a negative principal moment: {listed} kg m2"

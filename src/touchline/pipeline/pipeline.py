@@ -24,7 +24,7 @@ from touchline.localizer.region import Region
 from touchline.localizer.skin import Skin
 from touchline.model.corrections import load_inertia, with_loads, with_offsets
 from touchline.model.description import AXES, Load
-from touchline.model.plausibility import inertia_problem, load_problem
+from touchline.model.plausibility import COMPUTED, inertia_problem, load_problem
 from touchline.model.robot import Robot, load_robot
 from touchline.native import core
 from touchline.observer.observer import Estimate, Observer, require_seconds
@@ -334,7 +334,7 @@ class Pipeline:
         if not np.all(np.isfinite([*load.com, *load.inertia])):
             raise ValueError("com and inertia must be finite numbers [m, kg m2]")
         robot = self.robot
-        problem = inertia_problem(load_inertia(load))
+        problem = inertia_problem(load_inertia(load), COMPUTED)
         if problem:
             raise ValueError(f"inertia {list(load.inertia)} kg m2: {problem}")
         problem = load_problem(load, robot.mechanism, robot.description.loads)
