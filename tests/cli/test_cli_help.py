@@ -94,11 +94,17 @@ def test_help_has_no_default_that_tells_nothing(name, capsys):
     [
         (["check"], "Missing from touchline check: ROBOT"),
         (["reproduce", "fig9"], "invalid choice 'fig9'"),
+        (["simulate", "sara", "--out", "o", "--seconds", "x"], "--seconds takes a number, not 'x'"),
+        (
+            ["simulate", "sara", "--out", "o", "--seed", "1.5"],
+            "--seed takes a whole number, not '1.5'",
+        ),
         (["analyze", "a", "--robt", "sara", "--out", "o"], "Perhaps you meant: --robot"),
-        (["analyze", "a", "--out", "o", "--workers", "two"], "Error parsing --workers"),
+        (["analyze", "a", "--out", "o", "--workers", "two"], "--workers takes a whole number"),
     ],
 )
 def test_arguments_that_cannot_be_understood_are_told_in_one_line(arguments, words, capsys):
     assert main(arguments) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert words in line and line.endswith(f"see touchline {arguments[0]} --help")
+    assert "---" not in line and "full helptext" not in line

@@ -5,6 +5,7 @@ import contextlib
 import functools
 import inspect
 import io
+import re
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from itertools import takewhile
@@ -166,13 +167,26 @@ def _in_one_line(box: str, name: str) -> str:
         words = line.strip("\u2502 ")
         if not words or words[0] in "\u256d\u2570":
             continue
-        if words.strip("\u2500") == "":
+        if words.strip("-") == "" and len(parts) == 1:  # where a terminal has no lines: its title
+            parts = [[], []]
+        elif words.strip("-\u2500") == "":
             parts.append([])
         else:
             parts[-1].append(words)
     said = [" ".join(part) for part in parts if part and not part[0].startswith("For full")]
-    told = [words.replace(" (required)", "").rstrip(".") for words in said]
+    plain = [number for words in said if (number := _no_number(words))]
+    told = plain or [words.replace(" (required)", "").rstrip(".") for words in said]
     return f"{'; '.join(told) or 'arguments missing'}; see touchline {name} --help"
+
+
+def _no_number(words: str) -> str | None:
+    """What is wrong with a value that is no number, from what tyro says of it."""
+    quoted = r"""('[^']*'|"[^"]*")"""
+    found = re.match(rf"Error parsing ([^:]+): .*(base 10|to float): {quoted}", words)
+    if found is None:
+        return None
+    option, how, value = found.groups()
+    return f"{option} takes a {'whole ' if how == 'base 10' else ''}number, not {value}"
 
 
 def _usage() -> str:
