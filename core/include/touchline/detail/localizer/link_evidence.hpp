@@ -76,12 +76,13 @@ class LinkEvidence {
     ++revision_;
   }
 
-  // Takes a sample of the touch, which `measurement` has read.
-  void take(const double* row, const double* q, const Measurement& measurement) {
+  // Takes a sample of the touch, which `measurement` has read. `searched`: has a place been searched
+  // for in it? Then half the time is left.
+  void take(const double* row, const double* q, const Measurement& measurement, bool searched) {
     if (!resting_.known()) return;
     add(row + observer_.row_layout().segment_torque(), q);
     if (!walking_ && changed()) start(measurement);
-    if (walking_) walk();
+    if (walking_) walk(searched ? (each_ + 1) / 2 : each_);
   }
 
   // Has a walk been finished since the touch began?
@@ -93,6 +94,7 @@ class LinkEvidence {
   static constexpr double kNone = -std::numeric_limits<double>::infinity();
   // Of the way to where two bodies are alike, no unit: rounding must not decide which is the first.
   static constexpr double kShort = 0.95;
+  static constexpr std::size_t kExplains = 3;  // looks, by the time it takes
 
   struct Patch {
     int body, surface, sample;
@@ -165,8 +167,9 @@ class LinkEvidence {
     walking_ = true;
   }
 
-  void walk() {
-    for (std::size_t k = 0; k < each_ && next_ < patches_.size(); ++k) look(patches_[next_++]);
+  // Goes on for so many looks.
+  void walk(std::size_t looks) {
+    for (std::size_t k = 0; k < looks && next_ < patches_.size();) k += look(patches_[next_++]);
     if (next_ < patches_.size()) return;
     walking_ = false;
     double all = 0.0, even = 0.0;
@@ -227,7 +230,8 @@ class LinkEvidence {
     }
   }
 
-  void look(const Patch& patch) {
+  // How many looks it counts: its evidence is an integral where it explains.
+  std::size_t look(const Patch& patch) {
     const int node = surfaces_.bodies(segment_)[patch.body].node;
     if (patch.body != body_) {
       body_ = patch.body;
@@ -242,7 +246,7 @@ class LinkEvidence {
         evidence_.at(quadratic_, X.R * sample.point + X.p, X.R * sample.normal, grasped, radius,
                      best_ - settings_.negligible_patch - scale);
     double value = e.log_evidence + scale;
-    if (!(value > best_ - settings_.negligible_patch)) return;
+    if (!(value > best_ - settings_.negligible_patch)) return 1;
     const Vec3 force = transposed_times(X.R, e.force);
     if (!grasped) {  // as the arm stands now: other links may be in the way
       value += approach(surfaces_, surfaces_.to_world(sample.point, node),
@@ -259,6 +263,7 @@ class LinkEvidence {
     if (sums_[patch.body] == 0.0 || value > found.share)
       found = {node, patch.surface, value, sample.point, sample.normal, force, radius};
     sums_[patch.body] += weight;
+    return kExplains;
   }
 
   const Observer& observer_;

@@ -247,7 +247,7 @@ class Localizer {
 
   // What the step of the joint torques says of each body.
   void weigh_links(const double* row, const double* q) {
-    if (!measurement_.can_be_followed()) links_.take(row, q, measurement_);
+    if (!measurement_.can_be_followed()) links_.take(row, q, measurement_, tracks_.searched());
     shared_ = links_.known() && tracks_.share_out(links_.shares());
   }
 

@@ -25,13 +25,13 @@ struct Pair {
   int rank = 0;         // of the equations
 };
 
-// Are both points of two pairs nearer to each other than `distance`?
+// Are both points of two pairs nearer to each other than `distance`? Of the other one: its two points.
+inline bool near(const Pair& pair, const Vec3& first, const Vec3& second, double distance) {
+  const Vec3 a = pair.ends[0].point - first, b = pair.ends[1].point - second;
+  return dot(a, a) < distance * distance && dot(b, b) < distance * distance;
+}
 inline bool near(const Pair& a, const Pair& b, double distance) {
-  const auto close = [&](int k) {
-    const Vec3 d = a.ends[k].point - b.ends[k].point;
-    return dot(d, d) < distance * distance;
-  };
-  return close(0) && close(1);
+  return near(a, b.ends[0].point, b.ends[1].point, distance);
 }
 
 }  // namespace touchline

@@ -49,14 +49,15 @@ class PairDescent {
     while (done < units && working_) {
       looked_ = 0;
       working_ = improve();
-      done += (bound_ ? kBoundStep : kStep) + looked_;
+      done += (bound_ ? kBoundStep : kStep) + kLook * looked_ / kLooks;
     }
     return done;
   }
 
  private:
-  // Units of work of a step, beside those of looking for its surface; with friction cones.
-  static constexpr int kStep = 22, kBoundStep = 29;
+  // Units of work of a step, as measured; with friction cones; and of so many boxes looked into for its
+  // surface.
+  static constexpr int kStep = 14, kBoundStep = 20, kLook = 4, kLooks = 3;
   static constexpr double kHold = 5e-3;      // of an end that is held, one sigma of a step [m]
   static constexpr double kFall = 0.3;       // part of what a cost may be that is left by a step
   static constexpr double kFarthest = 0.04;  // that a step goes [m]

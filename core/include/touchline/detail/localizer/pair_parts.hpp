@@ -79,9 +79,9 @@ class PairParts {
 
  private:
   static constexpr int kWaiting = 4096, kSteps = 12;  // room: pairs that wait; steps of each
-  // Units of work: the beginning of a descent beside another one, or elsewhere; and of a place that is
-  // looked into for a neighbour, where no cache has it.
-  static constexpr int kBegin = 8, kElsewhere = 20, kLooked = 2;
+  // Units of work, as measured: the beginning of a descent; of passing by what is known; and of a place
+  // that is looked into for a neighbour, where no cache has it.
+  static constexpr int kBegin = 25, kPassedBy = 3, kLooked = 2;
   static constexpr double kHopeless = 100.0;  // cost from which nothing is brought to where it explains
   static constexpr double kLittle = 2.0;      // of cost: a part is told by its place, not by its cost
   static constexpr double kSoon = 5e4;        // cost of a beginning from which it soon explains
@@ -110,23 +110,22 @@ class PairParts {
   int begin_next() {
     Task task;
     task.held = -1;
-    int done = kElsewhere;
     if (next_solution_ < search_->count()) {
       task.pair = moved((*search_)[next_solution_++]);
     } else if (search_->starts().plausible(next_start_, task.pair, task.held)) {
       task.pair = moved(task.pair);
+      if (is_known(task.pair.ends[task.held], kBeside * apart_)) return kPassedBy;
     } else if (waits_ > 0) {
       task = waiting_[head_];
       head_ = (head_ + 1) % kWaiting;
       --waits_;
-      done = kBegin;
-      if (is_known(task.pair.ends[task.held], kBeside * apart_)) return done;
+      if (is_known(task.pair.ends[task.held], kBeside * apart_)) return kPassedBy;
     } else {
       stage_ = Stage::done;
-      return kBegin;
+      return kPassedBy;
     }
     descent_.begin(task.pair, {kSteps, kHopeless, kLittle, kSoon}, true, task.held);
-    return done;
+    return kBegin;
   }
 
   // Has a pair been met that explains, one end of which is so near [m]?

@@ -37,6 +37,7 @@ class PairSearch {
     drop();
     searched_ = view_.take(now.lag, measurement);
     begun_ = seen_ = now.time;
+    descended_ = 0;
     stage_ = searched_ ? Stage::starts : Stage::done;
     if (searched_) starts_.begin(view_);
   }
@@ -77,7 +78,8 @@ class PairSearch {
 
   // Units of work: the beginning of a descent; where a force enters its body; the evidence of a solution;
   // another view.
-  static constexpr int kBegin = 12, kEntries = 150, kWeight = 230, kView = 150;
+  static constexpr int kCold = 1000;  // units of descents after which caches have the meshes
+  static constexpr int kBegin = 20, kEntries = 60, kWeight = 100, kView = 150;
 
   // From points spread over the links, by descents, to solutions. What was measured in the meantime
   // moves them a little; with other entries of their forces they are weighed by that.
@@ -137,11 +139,14 @@ class PairSearch {
       descent_.begin(from[next_++], {kSteps, kHopeless, kLittle, kEver}, false);
       return kBegin;
     }
-    const int done = descent_.work(units);
+    int done = descent_.work(units);
     const Pair& s = descent_.pair();
     if (!descent_.working() && s.cost < chi2_limit(view_.rows(), settings_.pitch_limit) + kWindow)
       add(s);
-    return done;
+    // What no cache has yet takes as long again.
+    const int cold = std::min(done, kCold - descended_);
+    descended_ += cold;
+    return done + cold;
   }
 
   // From now on by what is measured now.
@@ -246,6 +251,7 @@ class PairSearch {
   // Where the work is: which of that stage's, and how many solutions it began with.
   Stage stage_ = Stage::none;
   int next_ = 0, renewed_ = 0, entered_ = 0;
+  int descended_ = 0;  // units of descents, as far as they are cold
   double begun_ = 0.0, seen_ = 0.0;
   bool searched_ = false;
 };

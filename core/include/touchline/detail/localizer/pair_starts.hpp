@@ -59,8 +59,7 @@ class PairStarts {
         if (!prepared_) next_bodies();
         continue;
       }
-      try_start(a, start_, b);
-      done += 2 + lanes_[1].count() / kTried;
+      done += kKept * try_start(a, start_, b) + 2 + lanes_[1].count() / kTried;
       if (++start_ < bodies_[a].count()) continue;
       for (int k = 0; k < kPerBodies; ++k) {
         if (!std::isfinite(best_[k].cost)) continue;
@@ -115,9 +114,10 @@ class PairStarts {
   static constexpr int kStarts = BodyStarts::kMost, kBlocks = (kStarts + kLanes - 1) / kLanes;
   static constexpr int kPerBodies = 4;         // pairs that are kept of two bodies
   static constexpr int kFollowed = 24;         // and of all
-  // Units of work: a pair of bodies that is given up, or prepared; and how many points of one body are
-  // a unit beside a point of the other. Not blocks: how wide they are depends on the processor.
-  static constexpr int kGivenUp = 10, kPrepared = 100, kTried = 2;
+  // Units of work, as measured: a pair of bodies that is given up, or prepared; a pair that is kept; and
+  // how many points of one body are a unit beside a point of the other. Not blocks: how wide they are
+  // depends on the processor.
+  static constexpr int kGivenUp = 10, kPrepared = 100, kKept = 3, kTried = 3;
   static constexpr double kSpacing = 0.02;     // of what a point stands for [m], one sigma
   static constexpr double kSoft = 0.3;         // of the friction cone of such a point [rad]
   static constexpr double kApart = 0.03;       // pairs nearer than this are one [m]
@@ -189,35 +189,49 @@ class PairStarts {
     return true;
   }
 
-  // Start i of body a beside all of body b; on one body, beside those that follow it.
-  void try_start(int a, int i, int b) {
+  // Start i of body a beside all of body b; on one body, beside those that follow it. First all costs,
+  // whatever they are: a branch on each would be guessed wrong more often than it saves.
+  // How many are kept.
+  int try_start(int a, int i, int b) {
     StartBeside one(lanes_[0], i, N_ + 6, kBoth, square_);
     const StartLanes& others = lanes_[1];
-    Lanes &own = costs_[at(a, b, i)], &partner = partners_[at(a, b, i)];
-    const int k = i % kLanes;
-    for (int block = a == b ? (i + 1) / kLanes : 0; block < others.blocks(); ++block) {
+    const int first = a == b ? (i + 1) / kLanes : 0, k = i % kLanes;
+    const Lanes normal[3] = {all_lanes(one.normal()[0]), all_lanes(one.normal()[1]),
+                             all_lanes(one.normal()[2])};
+    Lanes costs[kBlocks], f[6];
+    int kept = 0;
+    for (int block = first; block < others.blocks(); ++block) {
       Lanes cost = one.misfit(others, block);
+      one.forces(others, block, f);
+      cost += soft_cone(f, normal) + soft_cone(f + 3, others.normal(block));
       for (int j = 0; a == b && j < kLanes && block * kLanes + j <= i; ++j)
         set_lane(cost, j, kInfinity);
-      Lanes& reach = costs_[at(b, a, block * kLanes)];
+      Lanes &reach = costs_[at(b, a, block * kLanes)], &by = partners_[at(b, a, block * kLanes)];
+      const auto nearer = cost < reach;
+      by = nearer ? all_lanes(i) : by;
+      reach = nearer ? cost : reach;
+      costs[block] = cost;
+    }
+    Lanes &own = costs_[at(a, b, i)], &partner = partners_[at(a, b, i)];
+    for (int block = first; block < others.blocks(); ++block) {
+      const Lanes cost = costs[block];
       const double enough = std::max(best_[kPerBodies - 1].cost, lane(own, k));
-      if (!any_below(cost, larger(reach, all_lanes(enough)))) continue;
-      Lanes f[6], n[3];
-      one.forces(others, block, f);
-      for (int c = 0; c < 3; ++c) n[c] = all_lanes(one.normal()[c]);
-      cost += soft_cone(f, n) + soft_cone(f + 3, others.normal(block));
-      Lanes& theirs = partners_[at(b, a, block * kLanes)];
-      theirs = cost < reach ? all_lanes(i) : theirs;
-      reach = smaller(reach, cost);
+      if (!any_below(cost, all_lanes(enough))) continue;
       for (int j = 0; j < kLanes; ++j) {
         if (lane(cost, j) < lane(own, k)) {
           set_lane(own, k, lane(cost, j));
           set_lane(partner, k, block * kLanes + j);
         }
-        if (lane(cost, j) < best_[kPerBodies - 1].cost)
-          keep(make(a, i, b, block * kLanes + j, f, lane(cost, j)));
+        if (!(lane(cost, j) < best_[kPerBodies - 1].cost)) continue;
+        const int at = place_among_best(a, i, b, block * kLanes + j, lane(cost, j));
+        if (at < 0) continue;
+        ++kept;
+        one.misfit(others, block);
+        one.forces(others, block, f);
+        keep(make(a, i, b, block * kLanes + j, f, lane(cost, j)), at);
       }
     }
+    return kept;
   }
 
   // Where the costs of start i of body a with those of body b stand.
@@ -229,12 +243,17 @@ class PairStarts {
     const Lanes beyond =
         larger(arc_cosine(-along / larger(size, all_lanes(1e-9))) - cone_, all_lanes(0.0));
     return size < all_lanes(settings_.least_force) ? all_lanes(kForceless)
-                                                   : beyond * beyond / (kSoft * kSoft);
+                                                   : (1.0 / (kSoft * kSoft)) * beyond * beyond;
   }
 
+  // While the starts stand where they were posed.
   Pair make(int a, int i, int b, int j, const Lanes* f, double cost) const {
-    Pair rough = placed(a, i, b, j);
+    Pair rough = indexed(a, i, b, j);
     rough.cost = cost;
+    rough.ends[0].point = bodies_[a].points()[i];
+    rough.ends[1].point = bodies_[b].points()[j];
+    rough.ends[0].normal = bodies_[a].normals()[i];
+    rough.ends[1].normal = bodies_[b].normals()[j];
     for (int e = 0; e < 2; ++e) {
       const Lanes* own = f + 3 * e;
       const int k = j % kLanes;
@@ -243,7 +262,21 @@ class PairStarts {
     return rough;
   }
 
+  // By the view as it is.
   Pair placed(int a, int i, int b, int j) const {
+    Pair pair = indexed(a, i, b, j);
+    const int starts[2] = {i, j};
+    for (int e = 0; e < 2; ++e) {
+      PairEnd& end = pair.ends[e];
+      const BodyStarts& of = bodies_[end.body];
+      end.point = view_->to_world(of.own_point(starts[e]), end.body);
+      end.normal = view_->turn_to_world(of.own_normal(starts[e]), end.body);
+    }
+    return pair;
+  }
+
+  // Without points and normals.
+  Pair indexed(int a, int i, int b, int j) const {
     Pair pair;
     const int bodies[2] = {a, b}, starts[2] = {i, j};
     for (int e = 0; e < 2; ++e) {
@@ -253,21 +286,21 @@ class PairStarts {
       end.body = bodies[e];
       end.node = view_->node(bodies[e]);
       end.place = of.place(starts[e]);
-      end.point = view_->to_world(of.own_point(starts[e]), bodies[e]);
-      end.normal = view_->turn_to_world(of.own_normal(starts[e]), bodies[e]);
     }
     return pair;
   }
 
-  // Keeps the best few of two bodies, apart from each other.
-  void keep(const Pair& rough) {
-    int at = kPerBodies - 1;
+  // The best few of two bodies are apart from each other: whose place would a pair take of that cost?
+  // -1: nobody's.
+  int place_among_best(int a, int i, int b, int j, double cost) const {
+    const Vec3 &first = bodies_[a].points()[i], &second = bodies_[b].points()[j];
     for (int k = 0; k < kPerBodies; ++k) {
-      if (!std::isfinite(best_[k].cost) || !near(best_[k], rough, kApart)) continue;
-      if (best_[k].cost <= rough.cost) return;
-      at = k;
-      break;
+      if (!std::isfinite(best_[k].cost) || !near(best_[k], first, second, kApart)) continue;
+      return best_[k].cost <= cost ? -1 : k;
     }
+    return kPerBodies - 1;
+  }
+  void keep(const Pair& rough, int at) {
     best_[at] = rough;
     for (; at > 0 && best_[at].cost < best_[at - 1].cost; --at) std::swap(best_[at], best_[at - 1]);
   }

@@ -17,16 +17,20 @@ class StartBeside {
   // wrenches on its body with those on the other; `square`: of what is measured.
   StartBeside(const StartLanes& own, int i, const double* N, int stride, double square) {
     const int block = i / kLanes, k = i % kLanes;
-    const Lanes* wrenches = own.wrenches(block);
+    for (int c = 0; c < 6; ++c) turn_[c] = lane(own.turn(block)[c], k);
+    const Lanes* p = own.point(block);
+    const Vec3 point{lane(p[0], k), lane(p[1], k), lane(p[2], k)};
+    const Vec3 forces[3] = {
+        {turn_[0], 0.0, 0.0}, {turn_[1], turn_[2], 0.0}, {turn_[3], turn_[4], turn_[5]}};
     for (int q = 0; q < 3; ++q) {
-      double w[6];
-      for (int r = 0; r < 6; ++r) w[r] = lane(wrenches[3 * r + q], k);
+      const Vec3 moment = cross(point, forces[q]);
       for (int c = 0; c < 6; ++c) {
-        double& sum = load_[3 * c + q] = 0.0;
-        for (int r = 0; r < 6; ++r) sum += w[r] * N[stride * r + c];
+        double& sum = load_[6 * q + c] = 0.0;
+        for (int r = 0; r < 3; ++r)
+          sum += component(forces[q], r) * N[stride * r + c] +
+                 component(moment, r) * N[stride * (r + 3) + c];
       }
     }
-    for (int c = 0; c < 6; ++c) turn_[c] = lane(own.turn(block)[c], k);
     rest_ = square + lane(own.beyond(block), k);
     for (int c = 0; c < 3; ++c) {
       target_[c] = lane(own.target(block)[c], k);
@@ -37,12 +41,16 @@ class StartBeside {
 
   // The misfit with each of a block of others, with the best forces in any direction.
   Lanes misfit(const StartLanes& others, int block) {
-    const Lanes *v = others.wrenches(block), *g = others.target(block);
-    for (Lanes& c : coupling_) c = all_lanes(0.0);
-    for (int r = 0; r < 6; ++r) {
-      for (int p = 0; p < 3; ++p) {
-        for (int q = 0; q < 3; ++q) coupling_[3 * p + q] += v[3 * r + p] * load_[3 * r + q];
-      }
+    const Lanes *turn = others.turn(block), *at = others.point(block), *g = others.target(block);
+    // A force f there meets a load (m, l) of this start as f . (m + l x p).
+    for (int q = 0; q < 3; ++q) {
+      const double* l = load_ + 6 * q;
+      const Lanes x = l[0] + (l[4] * at[2] - l[5] * at[1]);
+      const Lanes y = l[1] + (l[5] * at[0] - l[3] * at[2]);
+      const Lanes z = l[2] + (l[3] * at[1] - l[4] * at[0]);
+      coupling_[q] = turn[0] * x;
+      coupling_[3 + q] = turn[1] * x + turn[2] * y;
+      coupling_[6 + q] = turn[3] * x + turn[4] * y + turn[5] * z;
     }
     // What the other's force explains of what is left beside this one.
     Lanes y[3], S[6];
@@ -92,7 +100,9 @@ class StartBeside {
     out[2] = lower[5] * x[2];
   }
 
-  double load_[18], target_[3], turn_[6], normal_[3], rest_;
+  // What a wrench (force, moment) on the other body meets of each of this start's three forces.
+  double load_[18];
+  double target_[3], turn_[6], normal_[3], rest_;
   Lanes coupling_[9], other_[3];
 };
 

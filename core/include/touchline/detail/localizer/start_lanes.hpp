@@ -20,7 +20,7 @@ class StartLanes {
  public:
   explicit StartLanes(std::size_t starts) {
     const std::size_t blocks = (starts + kLanes - 1) / kLanes;
-    wrenches_.resize(blocks * 18);
+    points_.resize(blocks * 3);
     targets_.resize(blocks * 3);
     turns_.resize(blocks * 6);
     normals_.resize(blocks * 3);
@@ -39,9 +39,10 @@ class StartLanes {
 
   int count() const { return count_; }
   int blocks() const { return (count_ + kLanes - 1) / kLanes; }
-  // (6, 3)
-  const Lanes* wrenches(int block) const { return wrenches_.data() + block * 18; }
+  // Where it was [m].
+  const Lanes* point(int block) const { return points_.data() + block * 3; }
   const Lanes* target(int block) const { return targets_.data() + block * 3; }
+  // The lower triangle of `turn`, row by row: row c is the force of z_c.
   const Lanes* turn(int block) const { return turns_.data() + block * 6; }
   const Lanes* normal(int block) const { return normals_.data() + block * 3; }
   // Infinite for what is no start.
@@ -50,8 +51,8 @@ class StartLanes {
  private:
   void clear(int i) {
     const int block = i / kLanes, k = i % kLanes;
-    for (int r = 0; r < 18; ++r) set_lane(wrenches_[18 * block + r], k, 0.0);
     for (int c = 0; c < 3; ++c) {
+      set_lane(points_[3 * block + c], k, 0.0);
       set_lane(targets_[3 * block + c], k, 0.0);
       set_lane(normals_[3 * block + c], k, 0.0);
     }
@@ -83,13 +84,7 @@ class StartLanes {
     const double turn[6] = {T[0], T[3], T[4], T[6], T[7], T[8]};
     for (int c = 0; c < 6; ++c) set_lane(turns_[6 * block + c], k, turn[c]);
     for (int c = 0; c < 3; ++c) {
-      const Vec3 force{T[3 * c], T[3 * c + 1], T[3 * c + 2]}, moment = cross(p, force);
-      for (int r = 0; r < 3; ++r) {
-        set_lane(wrenches_[18 * block + 3 * r + c], k, component(force, r));
-        set_lane(wrenches_[18 * block + 9 + 3 * r + c], k, component(moment, r));
-      }
-    }
-    for (int c = 0; c < 3; ++c) {
+      set_lane(points_[3 * block + c], k, component(p, c));
       set_lane(targets_[3 * block + c], k, times(turn, g, c));
       set_lane(normals_[3 * block + c], k, component(normal, c));
     }
@@ -103,7 +98,7 @@ class StartLanes {
     return lower[3] * x[0] + lower[4] * x[1] + lower[5] * x[2];
   }
 
-  std::vector<Lanes> wrenches_, targets_, turns_, normals_, beyond_;
+  std::vector<Lanes> points_, targets_, turns_, normals_, beyond_;
   int count_ = 0;
 };
 

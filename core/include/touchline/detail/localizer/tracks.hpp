@@ -73,6 +73,9 @@ class Tracks {
   // What is said after the last sample.
   const Reports& reports() const { return reports_; }
 
+  // Has a place been searched for in the last sample?
+  bool searched() const { return share_.searched(); }
+
   // Gives each body the probability that the evidence for links gives it, where one contact stands for
   // all that joint torques show.
   bool share_out(const std::vector<BodyShare>& shares) {

@@ -141,10 +141,10 @@ struct LocalizerTuning {
   double negligible_patch = 12.0;
 
   // ---- Two contacts that begin together ----
-  // Work on them in a second of the sensors' clock: a unit is two pairs of points that are tried, or a
-  // box of a mesh that is looked into, some 0.04 us. A sample has its share: 67 us at 1 kHz, 8 us at 8 kHz.
+  // Work on them in a second of the sensors' clock: a unit is three pairs of points that are tried, or a
+  // box of a mesh that is looked into, some 0.04 us. A sample has its share: 62 us at 1 kHz, 8 us at 8 kHz.
   // Half: fewer places are narrowed within 0.1 s of the onset. Double: samples are late.
-  int pair_work = 1680000;
+  int pair_work = 1540000;
   // Times 1 / K until forces are worth a second search, and a walk from it. Half: it walks on a force
   // of 63 %. Double: later.
   double risen = 2.0;

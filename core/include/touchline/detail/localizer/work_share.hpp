@@ -34,6 +34,8 @@ class WorkShare {
     if (first_) left_first_ = std::max(0, left_first_ - units);
     searching_ += units > units_ / kLittle ? 1 : 0;
   }
+  // Has a search been at work in the sample at hand?
+  bool searched() const { return searching_ > 0; }
 
  private:
   static constexpr int kLittle = 16;  // so small a part of a sample's work is no search
