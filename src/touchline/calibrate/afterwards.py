@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.calibrate.beforehand import named
+from touchline.calibrate.resting import find_resting
 from touchline.errors import InputError
 from touchline.identify.choice import Chooser
 from touchline.identify.fit import applied
@@ -120,6 +121,25 @@ def refuse_touched(found: Identification, logs: list[Path]) -> None:
             "a minute of motion of all joints in which nothing touches the robot, or cut the "
             f"touches out; {KEPT}"
         )
+
+
+def refuse_resting(found: Identification, logs: list[Path]) -> None:
+    """Refuses recordings in which a force rests on the arm throughout: parameters would take it.
+
+    Raises:
+        InputError: how large it is, where, and what to record instead.
+    """
+    force = find_resting(found)
+    if force is None or not force.there:
+        return
+    where = f"frame of {force.frame}" if force.frame else "world"
+    raise InputError(
+        f"{named(logs)}: something seems to rest on the arm throughout: a force of about "
+        f"{force.size:.2g} N at {force.link}, constant in the {where}, explains "
+        f"{100 * force.explained:.0f} % of what is left without it. No payload, offset or friction "
+        "does. Record a minute of motion of all joints in which nothing touches the arm: no hand, "
+        f"no table, no cable that pulls; {KEPT}"
+    )
 
 
 def _apart(found: Identification, number: int, log: Path) -> str:

@@ -8,7 +8,12 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from touchline.calibrate.afterwards import refuse_touched, refuse_two_robots, refuse_unexplained
+from touchline.calibrate.afterwards import (
+    refuse_resting,
+    refuse_touched,
+    refuse_two_robots,
+    refuse_unexplained,
+)
 from touchline.calibrate.beforehand import naming, refuse_one_pose, refuse_wrong_signals
 from touchline.calibrate.blame import find_blame, often_off
 from touchline.calibrate.causes import causes_told
@@ -219,6 +224,7 @@ def calibrate(
                 with causes_told(described, logs):
                     refuse_unexplained(found, logs)
                 refuse_touched(found, logs)
+                refuse_resting(found, logs)
             left_out = found.touches()
             if learn:
                 grids = grids_of(evidence)

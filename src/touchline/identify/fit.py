@@ -304,10 +304,15 @@ def _solved(H: Array, g: Array) -> Array:
 
 
 def gradient_of(e: Evidence, problem: Problem, column: Array, weight: Array, use: Mask) -> Array:
-    """The gradient of half the weighed sum of squares of a column (N, R), as of `Equations`."""
-    gradient = np.zeros(len(problem.columns) + PARAMETERS * len(problem.bodies))
+    """The gradient of half the weighed sum of squares of a column (N, R), as of `Equations`.
+
+    Of several columns (N, R, K) those of all, (free numbers, K).
+    """
+    size = len(problem.columns) + PARAMETERS * len(problem.bodies)
+    gradient = np.zeros((size, *column.shape[2:]))
     for r, index, A in _rows_of(e, problem, use):
-        gradient[index] += A.T @ (weight[use, r] * column[use, r])
+        weighed = A * weight[use, r, None]
+        gradient[index] += weighed.T @ column[use, r]
     return gradient
 
 
