@@ -2,8 +2,8 @@
 """A force that rests on the arm throughout a recording.
 
 It neither begins nor ends, so nothing of it stands out; a payload, offsets and gains take a part of
-it. Here it is fitted beside all of these and a base that leans: constant in the world, as a hand
-that leans on the arm, or in the frame of a link, as a cable that pulls along it.
+it. Here it is fitted beside all of these and a base that leans. It is constant in the world, as a
+hand's, or in the frame of a link, as that of a cable along it.
 """
 
 from dataclasses import dataclass
