@@ -23,7 +23,7 @@ from touchline.identify.fit import (
     main_links,
 )
 from touchline.identify.identification import Identification, rms
-from touchline.identify.leaning import level_axes, turned
+from touchline.identify.leaning import lean_columns
 from touchline.identify.payload import RADIUS, SIGMA, seen_leaves
 from touchline.identify.regressor import PARAMETERS, body_vector, outboard_nodes, row_twists
 from touchline.model.mechanism import Inertia
@@ -37,7 +37,6 @@ INSTANTS = 2000  # that are enough for a force that never changes
 GAIN = 0.1  # 1 sigma of how far a torque's gain may be off, as a part of it
 LARGE = 100.0  # N, 1 sigma of the force before any data
 REACH = 0.2  # m, 1 sigma of how far from the link's origin it acts
-LEANING = np.radians(0.5)  # 1 sigma of how far the base may lean; `check` names 1.5 degrees
 TURNS = 20  # of fitting the force, then its place: each is linear while the other is held
 TERMS = 12  # linear numbers of one force: see `_columns`
 
@@ -110,7 +109,7 @@ class _Beside:
         ball = body_vector(Inertia(1.0, np.zeros(3), RADIUS**2 * np.eye(3)))
         loads = [BodyChange(i, ball, SIGMA, added=True) for i in seen_leaves(e)] if links else []
         gains = [Column("gain", r) for r in range(e.joints) if e.used[r]]
-        self._problem = Problem((*chooser.rich, *gains), (*links, *loads))
+        self._problem = Problem((*chooser.rich, *gains, *lean_columns(e)), (*links, *loads))
         equations = Equations.of(e, self._problem, left, self._weight, every)
         prior, J = equations.whole_prior(), equations.jacobian_at_start()
         for i, column in enumerate(self._problem.columns):
@@ -119,15 +118,8 @@ class _Beside:
         first = len(self._problem.columns) + PARAMETERS * len(links)
         J[first:, first:] = np.eye(len(J) - first)  # a load may go altogether, or be less than none
         self._J = J
-        H = J.T @ equations.normal @ J + np.diag(prior)
-        g = J.T @ equations.gradient
-        # The lean of the base is no part of a `Problem`: it is added to its equations here.
-        axes = level_axes(e.robot)
-        self._lean = np.stack([turned(e, e.robot, np.cross(x, e.robot.gravity)) for x in axes], -1)
-        own, cross = self._normal(self._lean, self._lean), self._crossed(self._lean)
-        own = own + LEANING**-2.0 * np.eye(len(axes))
-        self._H = np.block([[H, cross], [cross.T, own]])
-        self._gradient = np.concatenate([g, self._normal(self._lean, left[..., None])[:, 0]])
+        self._H = J.T @ equations.normal @ J + np.diag(prior)
+        self._gradient = J.T @ equations.gradient
         taken = np.linalg.solve(self._H, self._gradient)
         whole = float((self._weight * left**2)[:, e.used].sum())
         self._without = whole - float(self._gradient @ taken)
@@ -138,7 +130,7 @@ class _Beside:
         Args:
             columns: (N, R, TERMS) as of `_columns`.
         """
-        C = np.concatenate([self._crossed(columns), self._normal(self._lean, columns)])
+        C = self._crossed(columns)
         held = np.linalg.solve(self._H, C)
         A = self._normal(columns, columns) - C.T @ held
         b = self._normal(columns, self._left[..., None])[:, 0] - held.T @ self._gradient

@@ -44,6 +44,7 @@ from touchline.identify.evidence import filtered, gather
 from touchline.identify.frame import FrameError, find_frames, frames_left, joined, with_frames
 from touchline.identify.gain import Gain, find_gains, motor_joints, multiplied, with_gains
 from touchline.identify.identification import Identification, identify
+from touchline.identify.leaning import Lean, find_lean, with_lean
 from touchline.identify.rest import Rest, grids_of, with_rest
 from touchline.identify.rest import learn as learn_rest
 from touchline.model.description import CalibrationDescription, Noise, RowCalibration
@@ -106,6 +107,7 @@ class Calibration:
         gains: of motor currents that were found to be off; None if that was not asked for.
         rest: what was learned of what is left; None if that was not asked for.
         losses: what is said of parts of the recordings that cannot be read.
+        lean: of the base, that was found beside the described gravity.
     """
 
     robot: Robot
@@ -124,6 +126,7 @@ class Calibration:
     gains: tuple[Gain, ...] | None = None
     rest: Rest | None = None
     losses: tuple[str, ...] = ()
+    lean: Lean | None = None
 
     @property
     def share(self) -> float:
@@ -186,6 +189,7 @@ def calibrate(
     delays: list[Delay] = []
     factors: list[Gain] = []
     frames: list[FrameError] = []
+    lean: Lean | None = None
     rest: Rest | None = None
     if identification:
         with threadpool_limits(1, "blas"):  # of small matrices: threads would wait for each other
@@ -207,6 +211,11 @@ def calibrate(
                 evidence = gather(prompt, Recordings(prompt, logs).all("equations"))
                 delays = refined(delays, evidence)
                 model = with_delays(model, delays)
+                recordings = Recordings(model, logs)
+                evidence = gather(model, recordings.all("equations"))
+            lean = find_lean(evidence)
+            if lean is not None:
+                model = with_lean(model, lean)
                 recordings = Recordings(model, logs)
                 evidence = gather(model, recordings.all("equations"))
             for look in (*(find_frames,) * TURNS, frames_left):
@@ -290,6 +299,7 @@ def calibrate(
         tuple(factors) if gains else None,
         rest,
         tuple(losses),
+        lean,
     )
 
 

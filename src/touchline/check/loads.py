@@ -12,10 +12,17 @@ from touchline.check.averages import averaged
 from touchline.check.findings import Findings
 from touchline.check.fit import unit_errors
 from touchline.check.joints import GAIN_OFF, UNEVEN
-from touchline.identify.evidence import WIDTHS, Evidence, gather
+from touchline.identify.evidence import (
+    WIDTHS,
+    Evidence,
+    gather,
+    held_weights,
+    level_axes,
+    turned,
+)
 from touchline.identify.fit import main_links
 from touchline.identify.identification import MOST_TOUCHED, touched_instants
-from touchline.identify.leaning import held_weights, level_axes, turned
+from touchline.identify.leaning import leaned
 from touchline.identify.payload import payload_link
 from touchline.identify.touches import usual_scatter
 from touchline.identify.usual import usual_links
@@ -276,15 +283,10 @@ def _leaning(
     evidence: Evidence, robot: Robot, left: Array, sigma: Array
 ) -> tuple[Array, float, float, float]:
     """Gravity turned about the two level axes, its error [rad], share and cost."""
-    g = robot.gravity
-    level = level_axes(robot)
-    A = np.stack([turned(evidence, robot, np.cross(axis, g)) for axis in level], axis=-1)
+    ways = [np.cross(axis, robot.gravity) for axis in level_axes(robot)]
+    A = np.stack([turned(evidence, robot, way) for way in ways], axis=-1)
     values, errors, share, cost = _fit(A, left, sigma, evidence, np.zeros(2))
-    # Loads are linear in gravity, whose level part is the sine of the angle.
-    sine = min(1.0, float(np.linalg.norm(values)))
-    new = np.sqrt(1.0 - sine**2) * g
-    for value, axis in zip(values, level, strict=True):
-        new = new + value * np.cross(axis, g)
+    new = leaned(robot, values)
     return new, float(np.linalg.norm(errors)), share, cost
 
 

@@ -1,39 +1,84 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a base that leans does to readings: gravity points otherwise than described."""
+"""A base that leans a little otherwise than described.
 
-from dataclasses import replace
+`check` tells a tilted base as well as links that are off let it. Here offsets, a payload and
+inertias are free beside it. Only a gravity that the description names is refined: where none is,
+what friction leaves of a level base would be taken for a lean.
+"""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from touchline.arrays import Array
-from touchline.identify.evidence import Evidence
+from touchline.identify.choice import Chooser
+from touchline.identify.evidence import Evidence, level_axes
+from touchline.identify.fit import Column
 from touchline.model.robot import Robot
-from touchline.observer.dynamics import gravity_loads
 
-EDGE = 1e-4  # rad; residuals change linearly with so small a tilt
-
-
-def level_axes(robot: Robot) -> Array:
-    """(2, 3) world axes that are level, about which a base may lean."""
-    return np.linalg.svd(robot.gravity[None])[2][1:]
+SURE = 5.0  # standard errors
+LEAST = np.radians(0.05)  # rad; 0.1 N of 100 N that an arm weighs
+DIGITS = 6  # of a written figure: 1e-6 m/s2
 
 
-def turned(evidence: Evidence, robot: Robot, change: Array) -> Array:
-    """(N, R) what a small change (3,) of gravity, per unit, adds to the residual [N or Nm].
+@dataclass(frozen=True)
+class Lean:
+    """How far the base leans.
 
-    Args:
-        evidence: the instants.
-        robot: with the weights that gravity acts on.
-        change: of gravity in world axes [m/s2] per unit.
+    Attributes:
+        turn: (2,) about each of `level_axes` of the described gravity [rad].
+        error: (2,) one standard error [rad].
+        gravity: (3,) in world axes [m/s2], as it then is.
     """
-    now, then = robot.gravity, robot.gravity + EDGE * change
-    return (held_weights(evidence, robot, then) - held_weights(evidence, robot, now)) / EDGE
+
+    turn: Array
+    error: Array
+    gravity: Array
+
+    @property
+    def angle(self) -> float:
+        """Of the lean [rad]."""
+        return float(np.linalg.norm(self.turn))
 
 
-def held_weights(evidence: Evidence, robot: Robot, gravity: Array) -> Array:
-    """(N, R) what holds the robot at rest, as far as the readings show it."""
-    moved = Robot(robot.description, replace(robot.mechanism, gravity=gravity))
-    found = gravity_loads(moved, evidence.q)
-    loads = np.concatenate([found.torque, found.wrench.reshape(len(evidence), -1)], axis=1)
-    shown = evidence.used & ~evidence.rows.silent & ~evidence.rows.weightless
-    return np.where(shown, loads, 0.0)
+def find_lean(evidence: Evidence) -> Lean | None:
+    """The lean of a base whose gravity is described; None where the data are not sure of any."""
+    robot = evidence.robot
+    if robot.description.gravity is None or not robot.gravity.any():
+        return None
+    chooser = Chooser(evidence, np.ones(len(evidence), dtype=bool))
+    columns = lean_columns(evidence)
+    found = chooser.choose_beside([(), columns])
+    at = [found.problem.columns.index(c) for c in columns if c in found.problem.columns]
+    if not at:
+        return None
+    turn, error = found.values[at], found.errors[at]
+    if not (np.abs(turn) > np.maximum(SURE * error, LEAST)).any():
+        return None
+    return Lean(turn, error, leaned(robot, turn))
+
+
+def lean_columns(evidence: Evidence) -> tuple[Column, ...]:
+    """What a base that leans about each level axis would do."""
+    return tuple(Column("lean", 0, axis=a, count=len(evidence.rows)) for a in range(2))
+
+
+def leaned(robot: Robot, turn: Array) -> Array:
+    """Gravity (3,) [m/s2] where the base leans by `turn` (2,) about the level axes [rad].
+
+    Loads are linear in gravity, whose level part is the sine of the angle.
+    """
+    g = robot.gravity
+    sine = min(1.0, float(np.linalg.norm(turn)))
+    new = np.sqrt(1.0 - sine**2) * g
+    for angle, axis in zip(turn, level_axes(robot), strict=True):
+        new = new + angle * np.cross(axis, g)
+    return new
+
+
+def with_lean(robot: Robot, lean: Lean) -> Robot:
+    """The robot whose gravity is as it was found."""
+    gravity = np.round(lean.gravity, DIGITS) + 0.0
+    x, y, z = gravity.tolist()
+    description = replace(robot.description, gravity=(x, y, z))
+    return Robot(description, replace(robot.mechanism, gravity=gravity))
