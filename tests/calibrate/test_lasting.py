@@ -9,7 +9,7 @@ from free_motion import pushed
 
 from touchline.calibrate.afterwards import refuse_resting
 from touchline.calibrate.lasting import lasting_lines
-from touchline.calibrate.resting import find_resting
+from touchline.calibrate.resting import find_changing, find_resting
 from touchline.cli.main import main
 from touchline.errors import InputError
 from touchline.identify.evidence import gather
@@ -86,6 +86,29 @@ def test_a_cable_that_pulls_along_a_link_is_refused():
 def test_a_base_that_leans_is_no_hand(arm):
     robot = described_arm(arm)
     refuse_resting(found_in(robot, moving(robot, 7, LEANING)), [])
+
+
+@pytest.mark.parametrize(("share", "refused"), [(0.35, False), (0.8, True), (1.0, True)])
+def test_touches_of_some_seconds_most_of_the_time_are_refused(share, refused):
+    """Few of them begin or end, so that little jumps."""
+    robot, rng = described_arm("panda-torques"), np.random.default_rng(3)
+    s, at = moving(robot, 9), 0.0
+    while at < s.time[-1]:
+        at += 6.0 * (1.0 / share - 1.0) * rng.uniform(0.5, 1.5)
+        end = at + 6.0 * rng.uniform(0.5, 1.5)
+        way, rows = rng.normal(size=3), np.flatnonzero((s.time >= at) & (s.time < end))
+        if len(rows):
+            force = way / np.linalg.norm(way) * rng.uniform(10.0, 25.0)
+            s = pushed(robot, s, str(rng.choice(last_links(robot))), rows, force)
+        at = end
+    found = found_in(robot, s)
+    changing = find_changing(found)
+    assert changing.there == refused
+    if refused:
+        with pytest.raises(InputError, match=r"most of the time: forces of about [\d.]+ N, one"):
+            refuse_resting(found, [])
+    else:
+        refuse_resting(found, [])
 
 
 def test_nothing_is_written_unless_the_recording_is_trusted(tmp_path, capsys):

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.calibrate.beforehand import named
-from touchline.calibrate.resting import find_resting
+from touchline.calibrate.resting import PIECE, find_changing, find_resting
 from touchline.errors import InputError
 from touchline.identify.choice import Chooser
 from touchline.identify.fit import applied
@@ -131,6 +131,7 @@ def refuse_resting(found: Identification, logs: list[Path]) -> None:
     """
     force = find_resting(found)
     if force is None or not force.there:
+        _refuse_changing(found, logs)
         return
     where = f"frame of {force.frame}" if force.frame else "world"
     raise InputError(
@@ -140,6 +141,18 @@ def refuse_resting(found: Identification, logs: list[Path]) -> None:
         "does. Record a minute of motion of all joints in which nothing touches the arm: no hand, "
         f"no table, no cable that pulls; {KEPT}"
     )
+
+
+def _refuse_changing(found: Identification, logs: list[Path]) -> None:
+    """Refuses recordings whose touches are so long that few of them begin or end."""
+    changing = find_changing(found)
+    if changing is not None and changing.there:
+        raise InputError(
+            f"{named(logs)}: something seems to touch the robot most of the time: forces of about "
+            f"{changing.force:.2g} N, one for every {PIECE:g} s, explain "
+            f"{100 * changing.explained:.0f} % of what is left. Record a minute of motion of all "
+            f"joints in which nothing touches the robot, or cut the touches out; {KEPT}"
+        )
 
 
 def _apart(found: Identification, number: int, log: Path) -> str:
