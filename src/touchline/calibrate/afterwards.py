@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from touchline.calibrate.beforehand import named
+from touchline.calibrate.resting import PIECE, find_changing, find_resting
 from touchline.errors import InputError
 from touchline.identify.choice import Chooser
 from touchline.identify.fit import applied
@@ -119,6 +120,38 @@ def refuse_touched(found: Identification, logs: list[Path]) -> None:
             f"{found.evidence.rows.names[row]} jumps again and again where nothing should. Record "
             "a minute of motion of all joints in which nothing touches the robot, or cut the "
             f"touches out; {KEPT}"
+        )
+
+
+def refuse_resting(found: Identification, logs: list[Path]) -> None:
+    """Refuses recordings in which a force rests on the arm throughout: parameters would take it.
+
+    Raises:
+        InputError: how large it is, where, and what to record instead.
+    """
+    force = find_resting(found)
+    if force is None or not force.there:
+        _refuse_changing(found, logs)
+        return
+    where = f"frame of {force.frame}" if force.frame else "world"
+    raise InputError(
+        f"{named(logs)}: something seems to rest on the arm throughout: a force of about "
+        f"{force.size:.2g} N at {force.link}, constant in the {where}, explains "
+        f"{100 * force.explained:.0f} % of what is left without it. No payload, offset or friction "
+        "does. Record a minute of motion of all joints in which nothing touches the arm: no hand, "
+        f"no table, no cable that pulls; {KEPT}"
+    )
+
+
+def _refuse_changing(found: Identification, logs: list[Path]) -> None:
+    """Refuses recordings whose touches are so long that few of them begin or end."""
+    changing = find_changing(found)
+    if changing is not None and changing.there:
+        raise InputError(
+            f"{named(logs)}: something seems to touch the robot most of the time: forces of about "
+            f"{changing.force:.2g} N, one for every {PIECE:g} s, explain "
+            f"{100 * changing.explained:.0f} % of what is left. Record a minute of motion of all "
+            f"joints in which nothing touches the robot, or cut the touches out; {KEPT}"
         )
 
 

@@ -8,7 +8,12 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from touchline.calibrate.afterwards import refuse_touched, refuse_two_robots, refuse_unexplained
+from touchline.calibrate.afterwards import (
+    refuse_resting,
+    refuse_touched,
+    refuse_two_robots,
+    refuse_unexplained,
+)
 from touchline.calibrate.beforehand import naming, refuse_one_pose, refuse_wrong_signals
 from touchline.calibrate.blame import find_blame, often_off
 from touchline.calibrate.causes import causes_told
@@ -39,6 +44,7 @@ from touchline.identify.evidence import filtered, gather
 from touchline.identify.frame import FrameError, find_frames, frames_left, joined, with_frames
 from touchline.identify.gain import Gain, find_gains, motor_joints, multiplied, with_gains
 from touchline.identify.identification import Identification, identify
+from touchline.identify.leaning import Lean, find_lean, with_lean
 from touchline.identify.rest import Rest, grids_of, with_rest
 from touchline.identify.rest import learn as learn_rest
 from touchline.model.description import CalibrationDescription, Noise, RowCalibration
@@ -101,6 +107,7 @@ class Calibration:
         gains: of motor currents that were found to be off; None if that was not asked for.
         rest: what was learned of what is left; None if that was not asked for.
         losses: what is said of parts of the recordings that cannot be read.
+        lean: of the base, that was found beside the described gravity.
     """
 
     robot: Robot
@@ -119,6 +126,7 @@ class Calibration:
     gains: tuple[Gain, ...] | None = None
     rest: Rest | None = None
     losses: tuple[str, ...] = ()
+    lean: Lean | None = None
 
     @property
     def share(self) -> float:
@@ -181,6 +189,7 @@ def calibrate(
     delays: list[Delay] = []
     factors: list[Gain] = []
     frames: list[FrameError] = []
+    lean: Lean | None = None
     rest: Rest | None = None
     if identification:
         with threadpool_limits(1, "blas"):  # of small matrices: threads would wait for each other
@@ -204,6 +213,11 @@ def calibrate(
                 model = with_delays(model, delays)
                 recordings = Recordings(model, logs)
                 evidence = gather(model, recordings.all("equations"))
+            lean = find_lean(evidence)
+            if lean is not None:
+                model = with_lean(model, lean)
+                recordings = Recordings(model, logs)
+                evidence = gather(model, recordings.all("equations"))
             for look in (*(find_frames,) * TURNS, frames_left):
                 off = look(evidence, frames)
                 if not off:
@@ -219,6 +233,7 @@ def calibrate(
                 with causes_told(described, logs):
                     refuse_unexplained(found, logs)
                 refuse_touched(found, logs)
+                refuse_resting(found, logs)
             left_out = found.touches()
             if learn:
                 grids = grids_of(evidence)
@@ -284,6 +299,7 @@ def calibrate(
         tuple(factors) if gains else None,
         rest,
         tuple(losses),
+        lean,
     )
 
 

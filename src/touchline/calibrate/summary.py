@@ -12,6 +12,7 @@ from touchline.detector.residual_noise import residual_noise
 from touchline.detector.thresholds import make_thresholds, row_name
 from touchline.identify.frame import FrameError
 from touchline.identify.gain import LEAST, Gain
+from touchline.identify.leaning import Lean
 from touchline.identify.summary import identification_lines, rest_lines
 from touchline.model.robot import Robot
 from touchline.model.values import METHODS
@@ -34,6 +35,7 @@ def summary_text(result: Calibration) -> str:
             + " than the positions"
             for x in result.delays
         ]
+        late += _lean_lines(result.lean)
         off = [line for frame in result.frames for line in _frame_lines(frame)]
         gains = [] if result.gains is None else _gain_lines(result.gains)
         parts.append(identification_lines(result.identification, gains + late + off))
@@ -65,6 +67,14 @@ def _gain_lines(gains: tuple[Gain, ...]) -> list[str]:
             )
         lines.append(f"  {gain.name}: gain {told}")
     return lines
+
+
+def _lean_lines(lean: Lean | None) -> list[str]:
+    """How far the base leans otherwise than described."""
+    if lean is None:
+        return []
+    angle, error = np.degrees(lean.angle), np.degrees(np.linalg.norm(lean.error))
+    return [f"  the base leans by {angle:.2f} +- {error:.2g} degrees more than described: gravity"]
 
 
 def _frame_lines(frame: FrameError) -> list[str]:

@@ -12,9 +12,17 @@ from touchline.check.averages import averaged
 from touchline.check.findings import Findings
 from touchline.check.fit import unit_errors
 from touchline.check.joints import GAIN_OFF, UNEVEN
-from touchline.identify.evidence import WIDTHS, Evidence, gather
+from touchline.identify.evidence import (
+    WIDTHS,
+    Evidence,
+    gather,
+    held_weights,
+    level_axes,
+    turned,
+)
 from touchline.identify.fit import main_links
 from touchline.identify.identification import MOST_TOUCHED, touched_instants
+from touchline.identify.leaning import leaned
 from touchline.identify.payload import payload_link
 from touchline.identify.touches import usual_scatter
 from touchline.identify.usual import usual_links
@@ -23,7 +31,6 @@ from touchline.model.description import Load, RobotDescription
 from touchline.model.mechanism import Inertia
 from touchline.model.robot import Robot
 from touchline.model.transforms import combine_inertias
-from touchline.observer.dynamics import gravity_loads
 from touchline.observer.samples import Samples
 
 MOST = 400_000  # samples that are looked at
@@ -49,7 +56,6 @@ COULOMB_WIDTH, MOVED = 0.02, 0.02  # rad/s
 # against, gains differ by a tenth. Both err alike in all poses, so more poses tell no more.
 GAIN = 0.1
 LIGHT = 0.02  # of a body that is left, and no less, has a centre that can be told
-EDGE = 1e-4  # rad; residuals change linearly with so small a tilt
 
 
 @dataclass(frozen=True)
@@ -152,7 +158,7 @@ def _off(evidence: Evidence, robot: Robot) -> tuple[Array, Array]:
     left = evidence.residual(robot)
     first = evidence.robot.gravity  # that the equations were made with
     if not np.array_equal(first, robot.gravity):
-        left += _weights(evidence, robot, robot.gravity) - _weights(evidence, robot, first)
+        left += held_weights(evidence, robot, robot.gravity) - held_weights(evidence, robot, first)
     largest = np.abs(evidence.reading).max(axis=0)
     noise = usual_scatter(left, evidence.used)
     return left, np.sqrt(np.maximum(OFFSET, OFFSET_SHARE * largest) ** 2 + noise**2)
@@ -277,15 +283,10 @@ def _leaning(
     evidence: Evidence, robot: Robot, left: Array, sigma: Array
 ) -> tuple[Array, float, float, float]:
     """Gravity turned about the two level axes, its error [rad], share and cost."""
-    g = robot.gravity
-    level = np.linalg.svd(g[None])[2][1:]
-    A = np.stack([_turned(evidence, robot, np.cross(axis, g)) for axis in level], axis=-1)
+    ways = [np.cross(axis, robot.gravity) for axis in level_axes(robot)]
+    A = np.stack([turned(evidence, robot, way) for way in ways], axis=-1)
     values, errors, share, cost = _fit(A, left, sigma, evidence, np.zeros(2))
-    # Loads are linear in gravity, whose level part is the sine of the angle.
-    sine = min(1.0, float(np.linalg.norm(values)))
-    new = np.sqrt(1.0 - sine**2) * g
-    for value, axis in zip(values, level, strict=True):
-        new = new + value * np.cross(axis, g)
+    new = leaned(robot, values)
     return new, float(np.linalg.norm(errors)), share, cost
 
 
@@ -298,7 +299,7 @@ def _mounted(
     tilt, with what is off then.
     """
     size = float(np.linalg.norm(robot.gravity))
-    A = np.stack([_turned(evidence, robot, axis) for axis in np.eye(3)], axis=-1)
+    A = np.stack([turned(evidence, robot, axis) for axis in np.eye(3)], axis=-1)
     values, _, share, cost = _fit(A, left, sigma, evidence, np.zeros(3))
     new = robot.gravity + values
     length = float(np.linalg.norm(new))
@@ -352,21 +353,6 @@ def _gains(evidence: Evidence, robot: Robot) -> Explanation | None:
         return None
     told = ", ".join(f"{1.0 + values[k]:.2f} ({joints[motors[k]].name})" for k in off)
     return Explanation("", f"gains of {told}", share, cost, robot, {})
-
-
-def _turned(evidence: Evidence, robot: Robot, change: Array) -> Array:
-    """(N, R) what a small change of gravity, per unit, adds to the residual."""
-    now, then = robot.gravity, robot.gravity + EDGE * change
-    return (_weights(evidence, robot, then) - _weights(evidence, robot, now)) / EDGE
-
-
-def _weights(evidence: Evidence, robot: Robot, gravity: Array) -> Array:
-    """(N, R) what holds the robot at rest, as far as the readings show it."""
-    moved = Robot(robot.description, replace(robot.mechanism, gravity=gravity))
-    found = gravity_loads(moved, evidence.q)
-    loads = np.concatenate([found.torque, found.wrench.reshape(len(evidence), -1)], axis=1)
-    shown = evidence.used & ~evidence.rows.silent & ~evidence.rows.weightless
-    return np.where(shown, loads, 0.0)
 
 
 def _fit(

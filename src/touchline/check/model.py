@@ -5,6 +5,7 @@ import numpy as np
 
 from touchline.check.findings import Findings
 from touchline.check.parity import parity_of
+from touchline.identify.regressor import outboard_nodes
 from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
 from touchline.model.surface import mechanism_surfaces
@@ -39,15 +40,6 @@ def _surfaces(robot: Robot, findings: Findings) -> None:
     for line in skin.lost:
         findings.find(line)
     findings.note("surfaces", *(f"  {line}" for line in skin.doubts))
-
-
-def outboard_nodes(robot: Robot, node: int) -> list[int]:
-    """The node and all that it carries."""
-    inside = {node}
-    for i, other in enumerate(robot.nodes):
-        if other.parent in inside:
-            inside.add(i)
-    return sorted(inside)
 
 
 def sensor_node(robot: Robot, sensor: str) -> int:

@@ -37,7 +37,8 @@ def calibrate(
     these hold for the sample rate of the recordings. All other keys and comments stay.
 
     Stretches in which something seems to touch the robot are left out and listed. Where most of a
-    recording seems touched it is refused, with the row that stands out.
+    recording seems touched it is refused, with the row that stands out. So is one in which a force
+    rests on the arm throughout, with its size and link.
 
     With --plan ROBOT it proposes a motion of a minute instead, and predicts what that will
     identify. The motion keeps the limits of joints, speeds and torques, and the arm's links do not

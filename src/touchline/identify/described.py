@@ -81,7 +81,7 @@ def added_loads(robot: Robot, solution: Solution) -> tuple[Load, ...]:
 
 
 def description_changes(robot: Robot, new: Robot) -> dict[str, Any]:
-    """Top-level keys of `robot.yaml` whose values changed: joints, sensors, links and loads.
+    """Top-level keys of `robot.yaml` whose values changed: joints, sensors, links, loads, gravity.
 
     `joints` and `force_torque_sensors` come as {name: {key: value}} with what is new of each; of
     the joints all are named, because those that a file does not name are not observed.
@@ -111,6 +111,8 @@ def description_changes(robot: Robot, new: Robot) -> dict[str, Any]:
     }
     if links:
         changes["links"] = links
+    if new.description.gravity != robot.description.gravity:
+        changes["gravity"] = list(new.description.gravity or ())
     if new.description.loads != robot.description.loads:
         changes["loads"] = [
             {

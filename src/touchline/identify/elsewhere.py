@@ -32,7 +32,7 @@ class Elsewhere:
         robot, rng = evidence.robot, np.random.default_rng(0)
         q = rng.uniform(*robot.ranges, (POSTURES, len(robot.joint_names)))
         self._model = momentum_regressors(robot, evidence.rows, q, np.zeros_like(q))[1]
-        self._groups = _groups(evidence)
+        self._groups = row_groups(evidence)
         J = Problem((), links)
         size = PARAMETERS * len(links)
         nothing = Equations(evidence, J, np.zeros((size, size)), np.zeros(size))
@@ -80,7 +80,7 @@ class Elsewhere:
         return np.array([float(size[group].sum()) for group in self._groups])
 
 
-def _groups(evidence: Evidence) -> list[Index]:
+def row_groups(evidence: Evidence) -> list[Index]:
     """Rows that are judged together: the torques, the forces and the moments."""
     rows = np.flatnonzero(evidence.used)
     joint, moment = rows < evidence.joints, (rows - evidence.joints) % 6 > 2

@@ -20,7 +20,7 @@ from touchline.identify.regressor import Rows, body_vector, momentum_regressors,
 from touchline.identify.smoothing import Steps, derivative, make_steps, mean, settled, smooth
 from touchline.model.description import Friction
 from touchline.model.robot import Robot
-from touchline.observer.dynamics import posture
+from touchline.observer.dynamics import gravity_loads, posture
 from touchline.observer.readings import read_torque, read_wrench
 from touchline.observer.samples import Samples
 
@@ -30,6 +30,7 @@ WIDTHS = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8)  # rad/s, of the Coulomb 
 PIECE = 512  # samples worked on at once: 40 MB with 11 bodies and 25 rows
 MOST = 8000  # equations in time that are kept; longer recordings are thinned
 LEAST = 10  # samples of a recording
+EDGE = 1e-4  # rad; residuals change linearly with so small a lean of the base
 PRESENT = 0.5  # of the samples a row must have, or it counts as not measured
 
 
@@ -124,6 +125,13 @@ class Evidence:
         bodies = np.array([body_vector(node.inertia) for node in robot.nodes])
         return np.einsum("nrbk,bk->nr", self.model, bodies)
 
+    @cached_property
+    def leaning(self) -> Array:
+        """What a base that leans about each of `level_axes` adds (N, R, 2) [N or Nm per rad]."""
+        robot = self.robot
+        ways = [np.cross(axis, robot.gravity) for axis in level_axes(robot)]
+        return np.stack([turned(self, robot, way) for way in ways], axis=-1)
+
     def coulomb(self, joint: int, width: float) -> Array:
         """The column (N,) of Coulomb friction of a width [rad/s]."""
         own = self.robot.description.joints[joint].friction.coulomb_width
@@ -136,6 +144,32 @@ class Evidence:
         """The column (N,) of what falls from there with a speed [rad/s]."""
         law = Friction(coulomb_width=width, stribeck=1.0, stribeck_speed=speed)
         return self.laws[:, joint] @ law.dry(SPEEDS)
+
+
+def level_axes(robot: Robot) -> Array:
+    """(2, 3) world axes that are level, about which a base may lean."""
+    return np.linalg.svd(robot.gravity[None])[2][1:]
+
+
+def turned(evidence: Evidence, robot: Robot, change: Array) -> Array:
+    """(N, R) what a small change (3,) of gravity, per unit, adds to the residual [N or Nm].
+
+    Args:
+        evidence: the instants.
+        robot: with the weights that gravity acts on.
+        change: of gravity in world axes [m/s2] per unit.
+    """
+    now, then = robot.gravity, robot.gravity + EDGE * change
+    return (held_weights(evidence, robot, then) - held_weights(evidence, robot, now)) / EDGE
+
+
+def held_weights(evidence: Evidence, robot: Robot, gravity: Array) -> Array:
+    """(N, R) what holds the robot at rest, as far as the readings show it."""
+    moved = Robot(robot.description, replace(robot.mechanism, gravity=gravity))
+    found = gravity_loads(moved, evidence.q)
+    loads = np.concatenate([found.torque, found.wrench.reshape(len(evidence), -1)], axis=1)
+    shown = evidence.used & ~evidence.rows.silent & ~evidence.rows.weightless
+    return np.where(shown, loads, 0.0)
 
 
 def gather(

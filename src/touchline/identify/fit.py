@@ -17,6 +17,7 @@ from touchline.model.robot import Robot
 from touchline.model.transforms import move_inertia
 
 BIAS, BIAS_SHARE = 1.0, 0.1  # 1 sigma of a bias: N or Nm, or this part of the largest reading
+LEAN = np.radians(0.5)  # 1 sigma of how far a base leans otherwise than described: check names 1.5
 FRAME = {"turn": 0.1, "shift": 0.02}  # rad, m: 1 sigma of how far a sensor's frame is off
 STEPS = 30  # of Gauss and Newton at most
 SLIGHTLY = 1.05  # factor of a width or speed, to see what it does
@@ -28,13 +29,15 @@ class Column:
     """One free number that enters the equations linearly.
 
     Attributes:
-        kind: "bias", "viscous", "coulomb", "stribeck", "rotor", "turn" or "shift"; "gain" for what
-            is expected more, as a part of it; for what it does to errors, "width" and "speed" of
-            friction, per unit of their logarithm.
+        kind: "bias", "viscous", "coulomb", "stribeck", "rotor", "turn", "shift" or "lean"; "gain"
+            for what is expected more, as a part of it; for what it does to errors, "width" and
+            "speed" of friction, per unit of their logarithm.
         row: of the joint or of the sensor's axis; of `turn` and `shift` the sensor's first.
         width: of the Coulomb friction [rad/s], or of what it has more at slow speeds.
         speed: with which that falls [rad/s].
-        axis: of the sensor's frame that it turns about, or is shifted along.
+        axis: of the sensor's frame that it turns about, or is shifted along; of a lean, which of
+            the level ones.
+        count: of the rows that a lean enters, which are all.
         rows: all that it enters.
         positive: may the value not be below zero?
     """
@@ -44,13 +47,14 @@ class Column:
     width: float = 0.0
     axis: int = 0
     speed: float = 0.0
+    count: int = 1
 
     @property
     def rows(self) -> range:
         """The rows that it enters."""
         if self.kind in FRAME:
             return range(self.row, self.row + 6)
-        return range(self.row, self.row + 1)
+        return range(self.row, self.row + self.count)
 
     @property
     def positive(self) -> bool:
@@ -228,6 +232,8 @@ class Equations:
                 prior[i] += max(BIAS, BIAS_SHARE * largest) ** -2.0
             elif column.kind in FRAME:
                 prior[i] += FRAME[column.kind] ** -2.0
+            elif column.kind == "lean":
+                prior[i] += LEAN**-2.0
         return prior
 
     def whole_prior(self) -> Array:
@@ -304,10 +310,15 @@ def _solved(H: Array, g: Array) -> Array:
 
 
 def gradient_of(e: Evidence, problem: Problem, column: Array, weight: Array, use: Mask) -> Array:
-    """The gradient of half the weighed sum of squares of a column (N, R), as of `Equations`."""
-    gradient = np.zeros(len(problem.columns) + PARAMETERS * len(problem.bodies))
+    """The gradient of half the weighed sum of squares of a column (N, R), as of `Equations`.
+
+    Of several columns (N, R, K) those of all, (free numbers, K).
+    """
+    size = len(problem.columns) + PARAMETERS * len(problem.bodies)
+    gradient = np.zeros((size, *column.shape[2:]))
     for r, index, A in _rows_of(e, problem, use):
-        gradient[index] += A.T @ (weight[use, r] * column[use, r])
+        weighed = A * weight[use, r, None]
+        gradient[index] += weighed.T @ column[use, r]
     return gradient
 
 
@@ -338,6 +349,8 @@ def column_of(e: Evidence, column: Column, r: int) -> Array:
         return e.speed[:, r]
     if column.kind == "rotor":
         return e.rotor[:, r]
+    if column.kind == "lean":
+        return e.leaning[:, r, column.axis]
     if column.kind in FRAME:
         return _frame_column(e, column, r - column.row)
     if column.kind == "stribeck":

@@ -11,6 +11,7 @@ parameters `m, m c, I` (inertia about the origin of the node's frame, in its axe
 no code in common with the native core.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,25 +101,34 @@ def momentum_regressors(robot: Robot, rows: Rows, q: Array, qd: Array) -> tuple[
     bodies = [_body_terms(robot, placed, twists, i) for i in range(len(robot.nodes))]
     shape = (len(q), len(rows), len(robot.nodes), PARAMETERS)
     P, B = np.zeros(shape), np.zeros(shape)
-    sensor_row = 0
-    for r, nodes in enumerate(rows.nodes):
+    for r, node, S in row_twists(robot, rows, placed):
         if rows.silent[r]:
             continue
-        is_joint = r < len(robot.joint_names)
-        for node in nodes:
-            S = placed.subspace[node] if is_joint else _unit_twist(placed, node, sensor_row % 6)
-            Sdot = _cross_motion(twists[node], S)
-            for body in _outboard(robot, node):
-                momentum, weight = bodies[body]
-                P[:, r, body] += np.einsum("ni,nik->nk", S, momentum)
-                B[:, r, body] -= np.einsum("ni,nik->nk", Sdot, momentum)
-                if not rows.weightless[r]:
-                    B[:, r, body] -= np.einsum("ni,nik->nk", S, weight)
-        sensor_row += not is_joint
+        Sdot = _cross_motion(twists[node], S)
+        for body in outboard_nodes(robot, node):
+            momentum, weight = bodies[body]
+            P[:, r, body] += np.einsum("ni,nik->nk", S, momentum)
+            B[:, r, body] -= np.einsum("ni,nik->nk", Sdot, momentum)
+            if not rows.weightless[r]:
+                B[:, r, body] -= np.einsum("ni,nik->nk", S, weight)
     return P, B
 
 
-def _outboard(robot: Robot, node: int) -> list[int]:
+def row_twists(robot: Robot, rows: Rows, placed: Posture) -> Iterator[tuple[int, int, Array]]:
+    """Each row with a node that moves with it and the motion subspace S (N, 6) of both.
+
+    World axes about the world's origin; a wrench W there on what the node carries adds S^T W.
+    """
+    joints = len(robot.joint_names)
+    for r, nodes in enumerate(rows.nodes):
+        for node in nodes:
+            joint = r < joints
+            S = placed.subspace[node] if joint else _unit_twist(placed, node, (r - joints) % 6)
+            yield r, node, S
+
+
+def outboard_nodes(robot: Robot, node: int) -> list[int]:
+    """Numbers of the nodes that move with a node, its own first."""
     inside = {node}
     for i, other in enumerate(robot.nodes):
         if other.parent in inside:
