@@ -94,7 +94,7 @@ class LinkEvidence {
   static constexpr double kNone = -std::numeric_limits<double>::infinity();
   // Of the way to where two bodies are alike, no unit: rounding must not decide which is the first.
   static constexpr double kShort = 0.95;
-  static constexpr std::size_t kExplains = 3;  // looks, by the time it takes
+  static constexpr std::size_t kExplains = 2;  // looks, by the time it takes
 
   struct Patch {
     int body, surface, sample;
