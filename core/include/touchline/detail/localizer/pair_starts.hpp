@@ -114,8 +114,8 @@ class PairStarts {
   static constexpr int kStarts = BodyStarts::kMost, kBlocks = (kStarts + kLanes - 1) / kLanes;
   static constexpr int kPerBodies = 4;         // pairs that are kept of two bodies
   static constexpr int kFollowed = 24;         // and of all
-  // Units of work, as measured: a pair of bodies that is given up, or prepared; a pair that is kept; and
-  // how many points of one body are a unit beside a point of the other. Not blocks: how wide they are
+  // Units of work, as measured: a pair of bodies that is given up, or prepared; and a pair that is kept.
+  // So many points of one body are a unit beside a point of the other. Not blocks: how wide they are
   // depends on the processor.
   static constexpr int kGivenUp = 10, kPrepared = 100, kKept = 3, kTried = 3;
   static constexpr double kSpacing = 0.02;     // of what a point stands for [m], one sigma
