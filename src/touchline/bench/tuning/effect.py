@@ -89,6 +89,7 @@ def judge(recording: Recording, events: Sequence[Event], into: Outcome) -> None:
         pairs = match(
             np.array([[t.begin, t.end] for t in touches]).reshape(-1, 2),
             np.array([[e.detected, end] for e, end in zip(own, ends, strict=True)]).reshape(-1, 2),
+            alike=np.array([[t.body == e.body for e in own] for t in touches]),
         )
         into.found += len(pairs)
         into.false += len(own) - len(pairs)

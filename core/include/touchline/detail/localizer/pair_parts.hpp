@@ -94,6 +94,8 @@ class PairParts {
   // So near to a part, in parts of what they are apart, a walk need not go: what else goes with it is
   // met by way of its other end.
   static constexpr double kBeside = 1.0;
+  // And a start, which stands for all around it.
+  static constexpr double kWithin = 0.5;
   static constexpr double kReach = 0.03;  // around each part there may be more, at least so far [m]
   static constexpr double kWider = 1.5;  // each time there are too many parts
   static constexpr double kWide = 1.5;   // times what parts are apart: between them there are more
@@ -114,7 +116,7 @@ class PairParts {
       task.pair = moved((*search_)[next_solution_++]);
     } else if (search_->starts().plausible(next_start_, task.pair, task.held)) {
       task.pair = moved(task.pair);
-      if (is_known(task.pair.ends[task.held], kBeside * apart_)) return kPassedBy;
+      if (is_known(task.pair.ends[task.held], kWithin * apart_)) return kPassedBy;
     } else if (waits_ > 0) {
       task = waiting_[head_];
       head_ = (head_ + 1) % kWaiting;
