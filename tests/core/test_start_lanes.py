@@ -53,7 +53,7 @@ def test_pairs_have_the_forces_of_least_squares(lines):
 
 def test_angles_are_those_of_the_arc_cosine(lines):
     x, angle = np.array([line[1:] for line in lines if line[0] == "angle"], dtype=float).T
-    np.testing.assert_allclose(angle, np.arccos(np.clip(x, -1.0, 1.0)), atol=7e-5)
+    np.testing.assert_allclose(angle, np.arccos(np.clip(x, -1.0, 1.0)), atol=3e-8)
 
 
 def _cpu():

@@ -30,7 +30,7 @@ from touchline.identify.regressor import PARAMETERS, body_vector, outboard_nodes
 from touchline.model.mechanism import Inertia
 from touchline.observer.dynamics import posture
 
-# A hand of 12 N explains 92 to 100 % on simulated arms, nothing explains more than 3 % where
+# A hand of 12 N explains 72 to 100 % on simulated arms, nothing explains more than 3 % where
 # nothing touches. Of real arms, what friction leaves looks like some force, too: see docs.
 FORCE = 4.0  # N
 SHARE = 0.35  # of the squares that are left without it

@@ -76,9 +76,9 @@ class PairSearch {
   static constexpr double kLittle = 0.02;     // of cost: not worth a step
   static constexpr double kEver = std::numeric_limits<double>::infinity();  // any cost may still fall
 
-  // Units of work: the beginning of a descent; where a force enters its body; the evidence of a solution;
-  // another view.
   static constexpr int kCold = 1000;  // units of descents after which caches have the meshes
+  // Units of work, as measured: the beginning of a descent; where a force enters its body; the evidence of
+  // a solution; another view.
   static constexpr int kBegin = 20, kEntries = 60, kWeight = 100, kView = 150;
 
   // From points spread over the links, by descents, to solutions. What was measured in the meantime
@@ -139,7 +139,7 @@ class PairSearch {
       descent_.begin(from[next_++], {kSteps, kHopeless, kLittle, kEver}, false);
       return kBegin;
     }
-    int done = descent_.work(units);
+    const int done = descent_.work(units);
     const Pair& s = descent_.pair();
     if (!descent_.working() && s.cost < chi2_limit(view_.rows(), settings_.pitch_limit) + kWindow)
       add(s);

@@ -157,9 +157,10 @@ inline bool any_below(const Lanes& a, const Lanes& b) {
 #endif
 }
 
-// To 7e-5 rad (Abramowitz and Stegun, Handbook of Mathematical Functions, 4.4.45).
+// To 2e-8 (Abramowitz and Stegun, Handbook of Mathematical Functions, 4.4.46).
 inline Lanes arc_cosine(const Lanes& x) {
-  constexpr double kTerms[] = {-0.0187293, 0.0742610, -0.2121144, 1.5707288};
+  constexpr double kTerms[] = {-0.0012624911, 0.0066700901, -0.0170881256, 0.0308918810,
+                               -0.0501743046, 0.0889789874, -0.2145988016, 1.5707963050};
   const Lanes size = smaller(larger(x, -x), all_lanes(1.0));
   Lanes sum = all_lanes(0.0);
   for (double term : kTerms) sum = sum * size + term;
