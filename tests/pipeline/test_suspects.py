@@ -17,6 +17,8 @@ from touchline.simulation.scenario import scripted
 from touchline.simulation.scene import Run
 from touchline.trials.faults import FAULTS, channels_of, injected
 from touchline.trials.recordings import PUSHED, RELEASED, record, robot_named
+from touchline.trials.scene import arm_and_skin
+from touchline.trials.touches import TouchSampler, resting_signals, touch_loads
 
 BEGIN = 0.6  # s
 HIT = 2.2  # s
@@ -326,3 +328,29 @@ def test_of_what_a_push_leaves_only_more_than_a_threshold_is_a_fault(part, told)
     _, faults, events = heard(pipeline, samples)
     assert len(events) == 1
     assert {change.channel for change in faults} == ({"tau.joint4"} if told else set())
+
+
+def test_a_sudden_push_that_only_one_axis_shows_at_first_is_a_sure_place():
+    """Noise hides what the other channels have of it in the sample in which it begins."""
+    robot, skin = arm_and_skin("panda", 3)
+    rng = np.random.default_rng(5)
+    sampler, doubted, right = TouchSampler(skin, rng), 0, 0
+    while doubted < 4:
+        touch = sampler.sample(20.0)
+        load = touch_loads(robot, touch.q, touch.patch.node, touch.position, touch.force)
+        force, others = np.sort(np.abs(load[-6:-3])), np.append(load[:-6], load[-3:])
+        if force[1] > 2.0 or np.abs(others).max() > 1.2:
+            continue
+        s = resting_signals(robot, touch.q, [(touch, BEGIN)], BEGIN + 0.1, rng)
+        pipeline = tl.Pipeline(robot, skin=skin)
+        pipeline.run(s.time[:-1], s.q[:-1], s.qd[:-1], s.tau[:-1], s.wrench[:-1])
+        last = pipeline.update(s.time[-1], s.q[-1], s.qd[-1], s.tau[-1], s.wrench[-1])
+        jumps = [f for f in pipeline.faults if f.fault == Fault.SPIKE and s.time[f.sample] >= BEGIN]
+        if not jumps:
+            continue
+        doubted += 1
+        (contact,) = last.contacts
+        assert contact.level == "contact"  # it may yet be the sensor that has jumped
+        assert contact.status == "located" and contact.body == touch.patch.body
+        right += np.linalg.norm(contact.position - touch.position) < 0.0225
+    assert right >= 3

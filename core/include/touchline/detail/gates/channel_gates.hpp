@@ -42,7 +42,7 @@ enum class Passes { no, begins, goes_on };
 // A channel is at another level, and no other one bears that out.
 enum class Moved {
   no,
-  alone,   // a joint torque: a push may do that, but not within one sample as a blow
+  alone,   // a push may do that, but not within one sample as a blow
   wrongly  // a contact would have moved others too
 };
 
@@ -455,11 +455,7 @@ class ChannelGates {
     return true;
   }
 
-  // Would a contact that moves it move others, too? Of joint torques alone a push may load one: its
-  // line meets the axes of the others.
-  Moved moved(std::size_t c) const {
-    return c < at_.tau() || c >= at_.wrench() || limits_.witness(c) >= 0 ? Moved::wrongly : Moved::alone;
-  }
+  Moved moved(std::size_t c) const { return limits_.pushable(c) ? Moved::alone : Moved::wrongly; }
 
   // Has a position gone on after a whole turn?
   bool wraps(std::size_t j, double dt) const {

@@ -23,6 +23,7 @@ class GateLimits {
   GateLimits(const Robot& robot, const ChannelLayout& at, double period, const GatesTuning& tuning)
       : floors_(at.count(), std::numeric_limits<double>::infinity()),
         witnesses_(at.count(), -1),
+        pushable_(at.count(), 0),
         wraps_(at.joints, 0),
         early_(at.count(), 0) {
     const auto share = [period](double bandwidth) { return 1.0 - std::exp(-bandwidth * period); };
@@ -48,6 +49,7 @@ class GateLimits {
       const double least = std::max(contact[at.tau() + j], tuning.least_step_torque);
       if (joint.measured())
         floors_[at.tau() + j] = least / share(joint.bandwidth) / std::fabs(joint.gain);
+      pushable_[at.tau() + j] = witnesses_[at.tau() + j] < 0;
       early_[at.tau() + j] = early(joint.bandwidth);
     }
     for (std::size_t c = at.wrench(); c < at.count(); c += 3) {  // axes of the log may be turned
@@ -62,6 +64,7 @@ class GateLimits {
       }
       const double smallest = axis == 0 ? tuning.least_step_force : tuning.least_step_torque;
       for (int i = 0; i < 3; ++i) {
+        pushable_[c + i] = axis == 0 && !sensor.turned && witnesses_[c + i] < 0;
         early_[c + i] = early(sensor.bandwidth);
         if (sensor.axes[axis + i]) floors_[c + i] = std::max(least, smallest) / share(sensor.bandwidth);
       }
@@ -76,6 +79,10 @@ class GateLimits {
   }
   // The sensor that feels all that a torque or wrench feels; -1: none.
   int witness(std::size_t c) const { return witnesses_[c]; }
+  // May a push move it alone? A torque, if its line meets the axes of the others, or a force, if it runs
+  // along that axis through the sensor. What stays is judged by all rows then (3.6). No push loads a moment
+  // alone, and of a sensor whose log has other axes (3.6) judges none.
+  bool pushable(std::size_t c) const { return pushable_[c] != 0; }
   // May joint j turn without end?
   bool wraps(std::size_t j) const { return wraps_[j] != 0; }
   // May a torque or an axis reach the filters before it counts, since they wait for longer?
@@ -86,6 +93,7 @@ class GateLimits {
 
   std::vector<double> floors_;
   std::vector<int> witnesses_;
+  std::vector<char> pushable_;
   std::vector<char> wraps_;  // per joint
   std::vector<char> early_;
 };
