@@ -18,14 +18,18 @@ from touchline.simulation.scenario import scripted
 from touchline.simulation.scene import Run
 from touchline.trials.faults import FAULTS, channels_of, injected
 from touchline.trials.recordings import (
+    EVERY,
     FORCE,
+    LASTS,
     MODEL_ERROR,
     PHASES,
     PUSHED,
     RELEASED,
     SECONDS,
     SPEED,
+    prescribed_pushes,
     record,
+    robot_named,
 )
 
 AT_ONCE = ("spike", "spikes", "rail", "NaN", "infinite", "absurd")
@@ -198,17 +202,29 @@ def test_the_tables_count_what_was_missed(listened):
         judge(pipeline, recording, healthy, fault_named(name), channel, ("free", PHASES["free"]))
         for name in ("spike", "delay")
     ]
-    text, missed = tables(outcomes, Health(1.0, 40, ("sara: tau.joint1 stuck",) * 2))
+    text, missed = tables(outcomes, [Health("simulated", 1.0, 40, ("sara: tau.joint1 stuck",) * 2)])
     assert "delay, tau" in text and "spike, tau" in text
-    assert "false reports in 1.00 h of healthy motion, 40 pushes" in text
+    assert "false reports in 1.00 h of simulated motion, 40 pushes" in text
     assert missed
 
 
 def test_healthy_arms_are_pushed_every_few_seconds(monkeypatch):
     monkeypatch.setattr("touchline.trials.recordings.ROBOTS", ("sara",))
-    healthy = healthy_motion(Plan(healthy=0.15))
-    assert healthy.hours == pytest.approx(9.0 / 3600.0) and healthy.pushes == 3
-    assert not healthy.reports
+    simulated, prescribed = healthy_motion(Plan(healthy=0.15, hours=30.0 / 3600.0))
+    assert simulated.hours == pytest.approx(9.0 / 3600.0) and simulated.pushes == 3
+    assert prescribed.hours == pytest.approx(30.0 / 3600.0) and prescribed.pushes == 10
+    assert not simulated.reports and not prescribed.reports
+
+
+@pytest.mark.parametrize("name", ["sara", "panda"])
+def test_each_push_of_a_prescribed_motion_is_felt_when_it_is_there(name):
+    robot = robot_named(name)
+    samples, pushes = prescribed_pushes(robot, 3, 20.0)
+    said = listen(tl.Pipeline(robot), samples)
+    begun = [round((event.detected - 1.0) // EVERY) for event in said.events]
+    assert begun == list(range(pushes))
+    assert all((event.detected - 1.0) % EVERY < 0.1 for event in said.events)
+    assert all(event.cleared - event.detected < LASTS[1] + 0.3 for event in said.events)
 
 
 def test_what_the_layout_cannot_tell_is_counted_apart(listened):
@@ -225,7 +241,7 @@ def test_what_the_layout_cannot_tell_is_counted_apart(listened):
         for name in ("wrist.fz", "tau.joint2")
     ]
     late = [replace(outcome, told=9.0, harmless=False) for outcome in outcomes]
-    text, _ = tables(late, Health(1.0, 40, ()))
+    text, _ = tables(late, [Health("simulated", 1.0, 40, ())])
     lines = {" ".join(line.split()) for line in text.splitlines()}
     assert "and in 1 runs that the layout cannot tell none 0.0 %" in lines
     assert "sara-full delay wrist.fz 1 of 1 the layout cannot" in lines

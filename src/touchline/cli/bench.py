@@ -563,6 +563,7 @@ def reliability(
     seeds: int = 1,
     share: float = 0.03,
     healthy: float = 0.25,
+    hours: float = 0.0,
     page: Annotated[Path | None, arg(metavar="FILE")] = None,
     keep: Annotated[Path | None, arg(metavar="DIR")] = None,
     processes: int = 1,
@@ -581,6 +582,8 @@ def reliability(
         seeds: Motions and pushes of each arm.
         share: Share of the cases that are drawn; 1 takes some 7,000 runs, half an hour.
         healthy: Minutes of motion without a fault, of each arm, in which none may be reported.
+        hours: The same along prescribed paths, of all arms together; ten take a quarter of an
+            hour of CPU.
         page: Writes docs/reliability.md.
         keep: Each run that is done is kept here; the same command goes on where it was stopped.
         processes: So many work at a time.
@@ -590,8 +593,8 @@ def reliability(
     from touchline.numbers import check_least
 
     check_least(1, seeds=seeds, processes=processes)
-    check_least(0, share=share, healthy=healthy, first=first)
-    return main(Plan(seeds, share, healthy, keep, processes, first), page)
+    check_least(0, share=share, healthy=healthy, hours=hours, first=first)
+    return main(Plan(seeds, share, healthy, hours, keep, processes, first), page)
 
 
 def tuning(

@@ -8,6 +8,7 @@ smooth, and is computed at a low rate and interpolated by polynomials: positions
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from math import ceil
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -24,7 +25,7 @@ Path = Callable[[Array], tuple[Array, Array, Array]]
 
 WAVES = 3  # per joint
 FREQUENCIES = 0.15, 0.6  # Hz, of the waves
-FASTEST = 3.0  # rad/s
+SLOWEST, FASTEST = 0.5, 3.0  # rad/s
 COARSE = 50.0  # Hz, at which loads are computed
 POINTS = np.arange(-3, 5)  # of these that a polynomial of degree 7 goes through
 
@@ -61,14 +62,16 @@ class Trajectory:
         return q, slope * s1[:, None], curvature * s1[:, None] ** 2 + slope * s2[:, None]
 
 
-def random_trajectory(robot: Robot, rng: np.random.Generator) -> Trajectory:
-    """A motion within the joints' limits whose fastest joint reaches 0.5 to 3 rad/s."""
+def random_trajectory(
+    robot: Robot, rng: np.random.Generator, fastest: float = FASTEST
+) -> Trajectory:
+    """A motion within joint limits whose fastest joint reaches SLOWEST to `fastest` [rad/s]."""
     n = len(robot.joint_names)
     lower, upper = robot.ranges
     frequency = 2 * np.pi * rng.uniform(*FREQUENCIES, (WAVES, n))
     amplitude = rng.uniform(0.2, 1.0, (WAVES, n)) / frequency
     speed = (amplitude * frequency).sum(axis=0)
-    amplitude *= rng.uniform(0.5, FASTEST) / speed.max()
+    amplitude *= rng.uniform(SLOWEST, fastest) / speed.max()
     reach = amplitude.sum(axis=0)
     amplitude *= np.minimum(1.0, 0.45 * (upper - lower) / reach)
     reach = amplitude.sum(axis=0)
@@ -141,6 +144,12 @@ class MotionMaker:
         near = np.stack([values[first + k : first + k + count] for k in range(len(POINTS))])
         fine = np.tensordot(self._weights, near, axes=(1, 0)).transpose(1, 0, 2)
         return fine.reshape(-1, values.shape[1])[: rows.stop - rows.start]
+
+    def around(self, start: float, end: float) -> tuple[slice, slice]:
+        """Samples between two times [s] and some more, and those of `coarse` they are made from."""
+        first, last = int(start * COARSE), min(ceil(end * COARSE), len(self.time) // self.factor)
+        rows = slice(first * self.factor, last * self.factor)
+        return rows, slice(first, last + len(POINTS) - 1)
 
     def samples(self, trajectory: Trajectory, rng: np.random.Generator) -> Samples:
         """A recording without contact."""

@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Healthy recordings: a simulated arm that moves, and is pushed once or every few seconds."""
+"""Healthy recordings: an arm that moves, and is pushed once or every few seconds."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from touchline.errors import InputError
+from touchline.localizer.skin import Skin
 from touchline.model.description import SensorDescription
 from touchline.model.robot import Robot, load_robot
+from touchline.observer.dynamics import contact_loads
 from touchline.observer.samples import Samples
 from touchline.simulation.contacts import Profile, ScriptedContact
 from touchline.simulation.noise import SensorNoise
@@ -15,6 +18,9 @@ from touchline.simulation.scenario import scripted
 from touchline.simulation.scene import Run
 from touchline.simulation.touchable import SurfacePoint, TouchableSurface, structure_links
 from touchline.simulation.truth import Simulated
+from touchline.trials.free_motion import MotionMaker, generator, imperfect, random_trajectory
+from touchline.trials.moving import carried
+from touchline.trials.touches import TouchSampler
 
 ROBOTS = ("sara", "sara-full", "ur5", "panda")
 SECONDS, SPEED, FORCE, MODEL_ERROR = 2.4, 0.5, 25.0, 0.02  # s, rad/s, N
@@ -24,6 +30,7 @@ DRAWS = 1000  # points that are tried
 OUTBOARD = 4  # so many of the outermost links are pushed: all layouts feel these
 EVERY = 3.0  # s from push to push, where there are many
 MANY_OUTBOARD = 6  # so many links are pushed then
+RATE = 1000.0  # Hz, of recordings without an engine
 LASTS, FORCES, RISES = (0.2, 1.2), (8.0, 40.0), (0.005, 0.08)  # s, N, s: of the many
 
 
@@ -117,13 +124,56 @@ def push_often(
     rng = np.random.default_rng([settings.seed, 12])
     free = scripted(robot, [], seconds, SPEED, settings).samples
     pushes = []
-    for begin in np.arange(1.0, seconds - LASTS[1] - 0.1, EVERY):
-        lasts, force, rise = (rng.uniform(*span) for span in (LASTS, FORCES, RISES))
-        at = _reachable(robot, free, (begin, begin + lasts), MANY_OUTBOARD, rng)
-        profile = Profile(float(begin), max(0.0, lasts - 2 * rise), rise, rise)
+    for profile, force in _strengths(seconds, rng):
+        at = _reachable(robot, free, (profile.start, profile.end), MANY_OUTBOARD, rng)
         push = ScriptedContact(at.link, at.point, -force * at.normal, profile, force_frame="link")
         pushes.append(push)
     return scripted(robot, pushes, seconds, SPEED, settings), pushes
+
+
+def prescribed_pushes(
+    robot: Robot, seed: int, seconds: float, fastest: float = SPEED
+) -> tuple[Samples, int]:
+    """The same of an arm that follows its path whatever pushes it: quick, as no engine is needed.
+
+    Args:
+        robot: as told.
+        seed: of the arm's inertias, its path, its pushes and its noise.
+        seconds: duration.
+        fastest: that its joints turn at [rad/s], see `random_trajectory`.
+
+    Returns:
+        Samples, and how many pushes there are.
+    """
+    rng = generator(seed, 13)
+    maker = MotionMaker(robot, imperfect(robot, MODEL_ERROR, seed), RATE, seconds)
+    path = random_trajectory(robot, rng, fastest)
+    q, qd, loads = maker.loads(path)
+    coarse = path(maker.coarse)[0]
+    links = structure_links(robot)[-MANY_OUTBOARD:]
+    sampler = TouchSampler(Skin(robot), np.random.default_rng(seed), floor=-np.inf, links=links)
+    pushes = 0
+    for profile, force in _strengths(seconds, rng):
+        rows, near = maker.around(profile.start, profile.end)
+        touch = sampler.sample(force, q[rows.start])
+        points, forces = carried(robot, touch, coarse[near])
+        push = np.hstack([forces, np.cross(points, forces)])
+        felt = contact_loads(robot, coarse[near], touch.patch.link, push)
+        held = np.hstack([felt.torque, felt.wrench.reshape(len(points), -1)])
+        strength = np.array([profile.at(time) for time in maker.time[rows]])
+        loads[rows] -= strength[:, None] * maker.interpolated(held, slice(0, len(strength)))
+        pushes += 1
+    samples = maker.sensed(q, qd, loads, rng)
+    step = 2 * np.pi / 2 ** SensorNoise().position_bits
+    samples.q[:] = step * np.round(samples.q / step)
+    return samples, pushes
+
+
+def _strengths(seconds: float, rng: np.random.Generator) -> Iterator[tuple[Profile, float]]:
+    """Times of pushes, one after the other, and their forces [N]."""
+    for begin in np.arange(1.0, seconds - LASTS[1] - 0.1, EVERY):
+        lasts, force, rise = (rng.uniform(*span) for span in (LASTS, FORCES, RISES))
+        yield Profile(float(begin), max(0.0, lasts - 2 * rise), rise, rise), force
 
 
 def _reachable(

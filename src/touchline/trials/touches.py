@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Random touches of an arm at rest, and what its sensors report: no physics engine needed."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
 
@@ -44,6 +45,7 @@ class TouchSampler:
         friction: forces are uniform in this friction cone.
         clearance: free space along the outward normal and along the way the push comes [m].
         floor: points lie above this height [m].
+        links: only these; default: all.
     """
 
     def __init__(
@@ -54,13 +56,16 @@ class TouchSampler:
         friction: float = 0.5,
         clearance: float = 0.03,
         floor: float = 0.0,
+        links: Sequence[str] | None = None,
     ) -> None:
         self.skin, self.robot, self._rng = skin, skin.robot, rng
         self._friction, self._clearance, self._floor = friction, clearance, floor
         self._patches = [
             patch
             for patch in skin.patches
-            if patch.segment is not None and (segments is None or patch.segment in segments)
+            if patch.segment is not None
+            and (segments is None or patch.segment in segments)
+            and (links is None or patch.link in links)
         ]
         areas = np.array([patch.surface.areas.sum() for patch in self._patches])
         self._shares = areas / areas.sum()

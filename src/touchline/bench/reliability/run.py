@@ -2,7 +2,7 @@
 """`touchline bench reliability`: faults of each type on each channel, and what comes of them."""
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import ceil
@@ -16,9 +16,17 @@ from touchline.bench.tables import Row, aligned
 from touchline.check.parity import parity_of
 from touchline.folder import check_file, replaced_file
 from touchline.model.robot import Robot
+from touchline.observer.samples import Samples
 from touchline.pipeline.pipeline import Pipeline
 from touchline.trials.faults import FAULTS, SIGN_TO_DELAY, WANDERS
-from touchline.trials.recordings import EVERY, ROBOTS, record_pushes, robot_named, robots
+from touchline.trials.recordings import (
+    EVERY,
+    ROBOTS,
+    prescribed_pushes,
+    record_pushes,
+    robot_named,
+    robots,
+)
 
 TOLD, WRONG = 0.98, 0.005  # shares that are required
 RECOVERED = 0.05 + 1e-6  # s: 5 / K of these arms, and what stamps are rounded by
@@ -32,7 +40,8 @@ class Plan:
         seeds: motions and pushes of each arm.
         first: the first of their numbers.
         share: of the cases of each, drawn at random; 1: all.
-        healthy: minutes of motion without a fault, of each arm.
+        healthy: minutes of simulated motion without a fault, of each arm.
+        hours: of motion along prescribed paths without a fault, of all arms together.
         folder: keeps what is done, for another start to go on with; None: nothing is kept.
         processes: that work at a time.
     """
@@ -40,6 +49,7 @@ class Plan:
     seeds: int = 1
     share: float = 1.0
     healthy: float = 0.5
+    hours: float = 0.0
     folder: Path | None = None
     processes: int = 1
     first: int = 0
@@ -57,33 +67,50 @@ class Health:
     """What was said of healthy motion.
 
     Attributes:
+        what: the kind of motion.
         hours: of it.
         pushes: in it.
         reports: what was said to be faulty; a line each.
     """
 
+    what: str
     hours: float
     pushes: int
     reports: tuple[str, ...]
 
 
-def healthy_motion(plan: Plan) -> Health:
-    """The arms swing without a fault, and are pushed every few seconds."""
-    seeds = range(1000 + plan.first, 1000 + plan.first + ceil(plan.healthy))
+# Samples of an arm without a fault, and how many pushes there are, by seed and duration [s].
+Recorder = Callable[[Robot, int, float], tuple[Samples, int]]
+
+
+def healthy_motion(plan: Plan) -> tuple[Health, ...]:
+    """The arms move without a fault, and are pushed every few seconds."""
+    minutes = 60.0 * plan.hours / max(len(robots()), 1)
+    return (
+        _healthy(plan, "simulated", record_pushes, plan.healthy),
+        _healthy(plan, "prescribed", prescribed_pushes, minutes),
+    )
+
+
+def _healthy(plan: Plan, what: str, recorder: Recorder, minutes: float) -> Health:
+    """So many minutes of each arm, one with each seed."""
+    seeds = range(1000 + plan.first, 1000 + plan.first + ceil(minutes))
     parts = [(name, seed) for name, _ in robots() for seed in seeds]
-    seconds = 60.0 * min(plan.healthy, 1.0)
-    if not seconds:
-        return Health(0.0, 0, ())
-    found = list(spread(partial(_healthy_part, seconds=seconds), parts, plan.processes))
+    seconds = 60.0 * min(minutes, 1.0)
+    work = partial(_healthy_part, recorder=recorder, seconds=seconds)
+    found = list(spread(work, parts, plan.processes)) if parts else []
     reports = tuple(line for _, lines in found for line in lines)
-    return Health(len(parts) * seconds / 3600.0, sum(pushes for pushes, _ in found), reports)
+    hours = len(parts) * seconds / 3600.0
+    return Health(what, hours, sum(pushes for pushes, _ in found), reports)
 
 
-def _healthy_part(part: tuple[str, int], seconds: float) -> tuple[int, list[str]]:
+def _healthy_part(
+    part: tuple[str, int], recorder: Recorder, seconds: float
+) -> tuple[int, list[str]]:
     """Pushes, and what was said, of an arm and a seed."""
     name, seed = part
     pipeline = Pipeline(robot_named(name))
-    samples, pushes = record_pushes(pipeline.robot, seed, seconds)
+    samples, pushes = recorder(pipeline.robot, seed, seconds)
     listen(pipeline, samples)
     return pushes, [
         f"{name} seed {seed} at {samples.time[c.sample]:.3f} s: {c.channel} {c.fault}"
@@ -105,7 +132,7 @@ def main(plan: Plan, out: Path | None = None) -> int:
     return int(missed)
 
 
-def tables(found: list[Outcome], healthy: Health) -> tuple[str, bool]:
+def tables(found: list[Outcome], healthy: Sequence[Health]) -> tuple[str, bool]:
     """Figures beside the goals, then by type of fault; whether a goal is missed."""
     untold = {name: untold_channels(robot_named(name)) for name in {o.robot for o in found}}
     goals = _goals(found, healthy, untold)
@@ -113,7 +140,8 @@ def tables(found: list[Outcome], healthy: Health) -> tuple[str, bool]:
     rows += [(what, goal, here, "" if met else "missed") for what, goal, here, met in goals]
     lines = [aligned(rows, (0, 3)), "", aligned(_by_fault(found))]
     lines += ["", *_layouts(untold), "", aligned(_missed(found, untold), (0, 1, 2, 4))]
-    lines += ["", *healthy.reports[:20]] if healthy.reports else []
+    reports = [line for motion in healthy for line in motion.reports]
+    lines += ["", *reports[:20]] if reports else []
     return "\n".join(lines), not all(met for *_, met in goals)
 
 
@@ -141,7 +169,7 @@ def _is_untold(outcome: Outcome, untold: dict[str, tuple[str, ...]]) -> bool:
 
 def _goals(
     found: list[Outcome],
-    healthy: Health,
+    healthy: Sequence[Health],
     untold: dict[str, tuple[str, ...]],
 ) -> list[tuple[str, str, str, bool]]:
     count = max(len(found), 1)
@@ -169,9 +197,12 @@ def _goals(
     goals.append(("runs with a phantom collision", "0", str(collisions), collisions == 0))
     wrong = share(lambda o: o.wrong > 0)
     goals.append(("runs with a sure, wrong link", "0.5 %", f"{100 * wrong:.2f} %", wrong <= WRONG))
-    false = len(healthy.reports)
-    what = f"false reports in {healthy.hours:.2f} h of healthy motion, {healthy.pushes} pushes"
-    goals.append((what, "1 in 10 h", str(false), false <= healthy.hours / 10.0))
+    for motion in healthy:
+        false = len(motion.reports)
+        span = f"{motion.hours:.2f} h of {motion.what} motion"
+        what = f"false reports in {span}, {motion.pushes} pushes"
+        if motion.hours:
+            goals.append((what, "1 in 10 h", str(false), false <= motion.hours / 10.0))
     quick = [o.recovery for o in found if o.fault.group.startswith(("spike", "stuck", "absent"))]
     for what, part in (("median", 0.5), ("90 %", 0.9)):
         late = float(np.quantile(quick, part)) if quick else 0.0
@@ -261,8 +292,12 @@ signs, scales and delays, 2 s for biases. *Harmless*: events are those without t
 was told twice or late. *Weaker*: a collision is told in time, but as a contact. A phantom
 *collision* became one while nothing touched the arm, or where the healthy recording has no
 collision. A *wrong* link is one that is at least 90 % sure, is not the touched one, and is not what
-the healthy recording says either. In *healthy motion* each arm is pushed every {every:g} s with
-8 to 40 N, for 0.2 to 1.2 s; each channel that is told counts.
+the healthy recording says either.
+
+Healthy arms are pushed every {every:g} s with 8 to 40 N, for 0.2 to 1.2 s; each channel that is
+told counts. In *simulated* motion they give way to a push (`--healthy`). In *prescribed* motion
+they follow waves along a path whatever pushes them. That needs no engine, so hours are cheap
+(`--hours`).
 
 ```
 {text}
