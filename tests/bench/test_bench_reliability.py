@@ -210,10 +210,20 @@ def test_the_tables_count_what_was_missed(listened):
 
 def test_healthy_arms_are_pushed_every_few_seconds(monkeypatch):
     monkeypatch.setattr("touchline.trials.recordings.ROBOTS", ("sara",))
-    simulated, prescribed = healthy_motion(Plan(healthy=0.15, hours=30.0 / 3600.0))
+    simulated, prescribed, fast = healthy_motion(Plan(healthy=0.15, hours=30.0 / 3600.0))
     assert simulated.hours == pytest.approx(9.0 / 3600.0) and simulated.pushes == 3
     assert prescribed.hours == pytest.approx(30.0 / 3600.0) and prescribed.pushes == 10
     assert not simulated.reports and not prescribed.reports
+    assert fast.hours == prescribed.hours and fast.pushes == 10
+
+
+def test_of_fast_motion_reports_are_counted_without_a_goal(listened):
+    pipeline, recording, healthy = listened
+    channel, phase = channel_named(recording.robot, "tau.joint2"), ("free", PHASES["free"])
+    outcomes = [judge(pipeline, recording, healthy, fault_named("spike"), channel, phase)]
+    text, _ = tables(outcomes, [Health("fast", 10.0, 9, ("sara: tau.joint1 suspect",) * 9)])
+    (line,) = (x for x in text.splitlines() if "10.00 h of fast motion" in x)
+    assert line.split()[-2:] == ["none", "9"]
 
 
 @pytest.mark.parametrize("name", ["sara", "panda"])

@@ -582,8 +582,8 @@ def reliability(
         seeds: Motions and pushes of each arm.
         share: Share of the cases that are drawn; 1 takes some 7,000 runs, half an hour.
         healthy: Minutes of motion without a fault, of each arm, in which none may be reported.
-        hours: The same along prescribed paths, of all arms together; ten take a quarter of an
-            hour of CPU.
+        hours: The same along prescribed paths, of all arms together, and as many of fast ones; ten
+            take half an hour of CPU.
         page: Writes docs/reliability.md.
         keep: Each run that is done is kept here; the same command goes on where it was stopped.
         processes: So many work at a time.
