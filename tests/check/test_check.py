@@ -13,7 +13,7 @@ from free_motion import free_motion
 
 import touchline as tl
 from touchline.check.model import outboard_mass
-from touchline.check.order import joint_order
+from touchline.check.order import joint_orders
 from touchline.check.run import check
 from touchline.check.windows import WindowMaker
 from touchline.cli.main import main
@@ -244,10 +244,9 @@ def test_where_no_torque_is_measured_sensors_tell_the_order_of_positions(robot, 
     maker.add(recording)
     windows = maker.windows()
     turned = windows.ordered(robot, np.arange(7)[::-1], np.arange(7))
-    assert joint_order(robot, windows, [], "motion") is None
-    assert joint_order(robot, turned, [], "torque") is joint_order(robot, turned, [], "all") is None
-    found = joint_order(robot, turned, [], "motion")
-    assert found is not None and found.known == "reversed order"
+    assert joint_orders(robot, windows, []) == {}
+    found = joint_orders(robot, turned, [])
+    assert [*found] == ["motion"] and found["motion"].known == "reversed order"
 
 
 def test_a_fixed_description_has_no_more_findings(tmp_path, robot):

@@ -28,7 +28,7 @@ from touchline.check.joints import (
 from touchline.check.loads import explain_weights
 from touchline.check.mending import Mending
 from touchline.check.misfit import mends, misfit, total_misfit
-from touchline.check.order import SIGNALS, joint_order
+from touchline.check.order import joint_orders
 from touchline.check.seen import Seen, windows_of
 from touchline.check.windows import DRY_SPEED, Windows
 from touchline.check.wrenches import check_wrenches
@@ -270,10 +270,7 @@ def _orders(
         return {}
     steps = {}
     own = np.arange(len(robot.joint_names))
-    for signals in SIGNALS:
-        found = joint_order(robot, seen.windows, measured, signals)
-        if found is None:
-            continue
+    for signals, found in joint_orders(robot, seen.windows, measured).items():
         order = np.array(found.order)
         joints = own if signals == "torque" else order
         torques = own if signals == "motion" else order

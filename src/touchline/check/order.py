@@ -7,7 +7,7 @@ Orders that leave nearly the same are not told from each other: what they differ
 """
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
@@ -24,16 +24,19 @@ from touchline.model.description import RobotDescription
 from touchline.model.robot import Robot
 
 MOST = 64  # windows, spread over the recording, that orders are judged by: 16 s tell an order
-KEPT = 8  # orders that are changed further in every round of the search
+KEPT = 5  # orders that are changed further in every round of the search
 NEAR = 40  # orders, the best first, that may turn out to be as good as the best
-BLOCKS, LEAST = 8, 3  # of time, each judged by itself; fewer tell nothing of how sure an order is
-SURE = 3.0  # standard errors of eight blocks: by chance one order in a hundred is so much better
+LEAST = 12  # windows, 3 s; fewer tell nothing of how sure an order is
+SURE = 4.0  # standard errors by which an order is better: more than any of a thousand by chance
+WORST = 2.0  # of a row's size; what is touched or lost is farther off, and counts as much
 UNREAD = 0.5  # misfit of a row whose torque no column holds: as good as half wrong
 SIGNALS = {
     "all": ("positions, velocities and torques", "q, qd and tau"),
     "motion": ("positions and velocities", "q and qd"),
     "torque": ("torques", "tau"),
 }
+ALPHABET, REVERSED = "alphabetical order of the joints' names", "reversed order"
+LIKELY = ALPHABET, REVERSED  # so usual that they are believed where other orders fit as well
 Permutation = tuple[int, ...]
 """For each joint the number of the joint in whose column its values stand."""
 
@@ -49,6 +52,7 @@ class JointOrder:
         sure: by how many standard errors it is better than any order that is told from it.
         untold: joints of which other orders that are as good say something else.
         known: what the order is called; "" of one without a name.
+        other: keys of `SIGNALS` that may stand in some other order instead, as far as is told.
     """
 
     signals: str
@@ -58,20 +62,22 @@ class JointOrder:
     sure: float
     untold: tuple[int, ...]
     known: str
+    other: tuple[str, ...] = ()
 
     @property
     def complete(self) -> bool:
-        """Can the whole order be written down without guessing?"""
-        return bool(self.known) or self._swap or all(self.order[j] == j for j in self.untold)
+        """Can the order be written down, with joints that are not told left as described?"""
+        left = all(self.order[j] == j for j in self.untold)
+        return not self.other and (bool(self.known) or left)
 
     @property
-    def _swap(self) -> bool:
+    def swap(self) -> bool:
         """Are all other columns as described?"""
         return sum(column != j for j, column in enumerate(self.order)) == 2
 
     def words(self, names: tuple[str, ...]) -> str:
-        """The finding, which ends in what `log_line` is put for."""
-        what, keys = SIGNALS[self.signals]
+        """The finding, which ends in `mend_words`."""
+        what = SIGNALS[self.signals][0]
         own = range(len(names))
         moved = [j for j in own if self.order[j] != j and (self.known or j not in self.untold)]
         if self.known:
@@ -82,13 +88,15 @@ class JointOrder:
         else:
             pairs = ", ".join(f"{names[j]} in that of {names[self.order[j]]}" for j in moved)
             start = f"{what} seem to stand in another joint's column: {pairs}"
-            if self._swap:
-                start += "; that these two are swapped would explain it"
+            if self.swap:
+                start += "; that these two are swapped would explain all"
         told = f"{100 * self.left / self.now:.0f} % of what is off is left then"
-        told += f", and any other order is worse by {self.sure:.0f} standard errors or more"
+        told += f", and any order that says otherwise is worse by {self.sure:.0f} standard errors"
         if self.untold:
             doubt = " and ".join(names[j] for j in self.untold)
             told += f"; the data do not tell which columns are those of {doubt}"
+        if self.other:
+            told += f"; as well it may be {' or '.join(SIGNALS[x][0] for x in self.other)}"
         return f"{start} ({told}): {mend_words(self.signals)}"
 
 
@@ -133,24 +141,39 @@ def log_keys(
     return keys
 
 
-def joint_order(
-    robot: Robot, windows: Windows, measured: list[int], signals: str
-) -> JointOrder | None:
-    """The order of columns that fits clearly better than the described one; None if none does."""
-    judge = _Judge(robot, windows, measured, signals)
-    if judge.blocks < LEAST or (signals != "motion" and len(measured) < 2):
-        return None
-    known = known_orders(robot.joint_names)
-    found = judge.found(known)
-    return _told(judge, found, known)
+def joint_orders(robot: Robot, windows: Windows, measured: list[int]) -> dict[str, JointOrder]:
+    """By key of `SIGNALS`: the order of columns that fits clearly better than the described one.
+
+    Where the data do not tell what is in another order, only the likelier is there, which says so.
+    """
+    found: dict[str, JointOrder] = {}
+    least: dict[str, float] = {}
+    moved: dict[Permutation, Windows] = {}
+    for signals in SIGNALS:
+        judge = _Judge(robot, windows, measured, signals, moved)
+        if not judge.enough or (signals != "motion" and len(measured) < 2):
+            continue
+        known = known_orders(robot.joint_names)
+        orders = judge.found(known)
+        least[signals] = min(orders.values())
+        order = _told(judge, orders, known)
+        if order is not None:
+            found[signals] = order
+    for signals, order in list(found.items()):
+        others = [x for x in least if x != signals and not mends(least[signals], least[x])]
+        if any(mends(least[x], least[signals]) for x in others):
+            del found[signals]
+        else:
+            found[signals] = replace(order, other=tuple(others))
+    return found
 
 
 def known_orders(names: tuple[str, ...]) -> dict[Permutation, str]:
     """Orders of joints that have a name, the likelier ones first."""
     n = len(names)
     orders = {
-        "alphabetical order of the joints' names": np.argsort(np.argsort(names)),
-        "reversed order": np.arange(n)[::-1],
+        ALPHABET: np.argsort(np.argsort(names)),
+        REVERSED: np.arange(n)[::-1],
     }
     for by in range(1, n):
         orders[f"an order rotated by {by}"] = np.roll(np.arange(n), by)
@@ -178,11 +201,12 @@ def _told(
             sure = min(sure, by)
     if sure < SURE:  # than the described order
         return None
-    named = [order for order in known if order in alike]
-    moved = {order: sum(a != b for a, b in enumerate(order)) for order in alike}
-    order = named[0] if named else min(alike, key=lambda x: (moved[x], found[x]))
     untold = [j for j in own if len({x[j] for x in alike}) > 1]
-    if not named and all(order[j] == j or j in untold for j in own):
+    moved = {order: sum(a != b for a, b in enumerate(order)) for order in alike}
+    # Of drivers the alphabet and the reverse are known: they are likelier than what else fits.
+    named = [x for x in known if x in alike and (not untold or known[x] in LIKELY)]
+    order = named[0] if named else min(alike, key=lambda x: (moved[x], found[x]))
+    if all(order[j] == j or j in untold for j in own):
         return None
     return JointOrder(
         judge.signals,
@@ -198,12 +222,20 @@ def _told(
 class _Judge:
     """What the model leaves of a recording whose columns are taken in some order."""
 
-    def __init__(self, robot: Robot, windows: Windows, measured: list[int], signals: str) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        windows: Windows,
+        measured: list[int],
+        signals: str,
+        moved: dict[Permutation, Windows],
+    ) -> None:
         self.signals, self.count = signals, len(robot.joint_names)
         self._robot, self._measured = robot, measured
         self._windows = windows.part(slice(None, None, max(1, -(-len(windows) // MOST))))
         self._off: dict[Permutation, Array] = {}
-        self.blocks = min(BLOCKS, len(self._windows) // 4)
+        self._moved = moved  # by order, with all signals in it: what is expected takes time
+        self.enough = len(self._windows) >= LEAST
         joints = [robot.mechanism.joints[name] for name in robot.joint_names]
         self._lower = np.array([joint.lower for joint in joints]) - OUTSIDE
         self._upper = np.array([joint.upper for joint in joints]) + OUTSIDE
@@ -224,12 +256,16 @@ class _Judge:
                 return found
 
     def better(self, one: Permutation, other: Permutation) -> float:
-        """By how many standard errors over blocks of time one order leaves less than another."""
-        blocks = [np.array_split(self._off[order], self.blocks) for order in (one, other)]
-        more = np.array([self._left(b) - self._left(a) for a, b in zip(*blocks, strict=True)])
-        more += self._outside(other) - self._outside(one)
-        error = float(np.std(more, ddof=1)) / np.sqrt(len(more))
-        return float(np.mean(more)) / max(error, 1e-9)
+        """By how many standard errors one order leaves less than another.
+
+        Noise is what differs between windows that follow each other: how much an order matters
+        depends on the motion.
+        """
+        off = [np.minimum(self._off[order], WORST) for order in (one, other)]
+        more = np.nansum(off[1] - off[0], axis=1)
+        error = float(np.sqrt(np.mean(np.diff(more) ** 2) / 2.0 / len(more)))
+        total = float(np.mean(more)) + self._outside(other) - self._outside(one)
+        return total / max(error, 1e-9)
 
     def _try(self, orders: set[Permutation], found: dict[Permutation, float]) -> None:
         for order in sorted(orders - found.keys()):
@@ -239,10 +275,16 @@ class _Judge:
             found[order] = self._left(self._off[order]) + self._outside(order)
 
     def _ordered(self, order: Permutation) -> Windows:
-        own, other = np.arange(self.count), np.array(order)
-        joints = own if self.signals == "torque" else other
-        torques = own if self.signals == "motion" else other
-        return self._windows.ordered(self._robot, joints, torques)
+        own = np.arange(self.count)
+        if self.signals == "torque":
+            return self._windows.ordered(self._robot, own, np.array(order))
+        if order not in self._moved:
+            both = np.array(order)
+            self._moved[order] = self._windows.ordered(self._robot, both, both)
+        moved = self._moved[order]
+        return (
+            moved if self.signals == "all" else moved.ordered(self._robot, own, np.argsort(order))
+        )
 
     def _left(self, off: Array) -> float:
         rows = middle(off)
@@ -251,9 +293,8 @@ class _Judge:
 
     def _outside(self, order: Permutation) -> float:
         """Joints beyond their limits; each counts as a torque that fits nothing."""
-        if self.signals == "torque":
-            return 0.0
-        q = self._windows.q[:, list(order)]
+        own = range(self.count) if self.signals == "torque" else order
+        q = self._windows.q[:, list(own)]
         out = (q.min(axis=0) < self._lower) | (q.max(axis=0) > self._upper)
         return float(out.sum())
 

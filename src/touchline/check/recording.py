@@ -109,13 +109,13 @@ def _mend_order(robot: Robot, path: Path, mending: Mending, findings: Findings) 
         return
     bag = is_bag(path)
     keys = log_keys(robot.description, mending.joints, mending.order, bag)
-    if mending.guessed:
-        line = "no line for robot.yaml before the others are told: record more motion of them"
-    elif not keys:
+    entries = ", ".join(f"{key}: {flow(value)}" for key, value in keys.items())
+    line = f"log: {{{entries}}}"
+    if not keys:
         line = "no key of robot.yaml says it: have the messages name each value's joint"
+    elif mending.guessed:
+        line = f"record more motion, or try {line}"
     else:
-        entries = ", ".join(f"{key}: {flow(value)}" for key, value in keys.items())
-        line = f"log: {{{entries}}}"
         findings.fixes["log"] = keys
     for words in map(mend_words, SIGNALS):
         findings.all = [replace(x, line=x.line.replace(words, line)) for x in findings.all]

@@ -91,7 +91,7 @@ class Windows:
             self, q=q, qd=qd, slope=slope, acceleration=acceleration, tau=tau, torque=torque
         )
         if np.array_equal(joints, np.arange(q.shape[1])):
-            return moved
+            return moved  # what is expected of them stays
         # Two samples about the middle of each window, apart from those of the others.
         ways = INSTANT * np.array([-0.5, 0.5])[:, None]
         pairs = np.stack([np.arange(len(q)) + way for way in ways[:, 0]], axis=1).ravel()
