@@ -12,8 +12,8 @@ import pytest
 from free_motion import free_motion
 
 import touchline as tl
-from touchline.check.joints import swapped_torques
 from touchline.check.model import outboard_mass
+from touchline.check.order import joint_orders
 from touchline.check.run import check
 from touchline.check.windows import WindowMaker
 from touchline.cli.main import main
@@ -239,11 +239,14 @@ def test_a_load_at_the_centre_of_a_light_flange_is_a_unit_to_itself_alone(
     assert any("kgf" in line for line in findings) == (measured == "itself alone"), findings
 
 
-def test_where_no_torque_is_measured_none_are_swapped(robot, recording):
+def test_where_no_torque_is_measured_sensors_tell_the_order_of_positions(robot, recording):
     maker = WindowMaker(robot, 0.01)
     maker.add(recording)
     windows = maker.windows()
-    assert len(windows) > 4 and swapped_torques(windows, []) == []
+    turned = windows.ordered(robot, np.arange(7)[::-1], np.arange(7))
+    assert joint_orders(robot, windows, []) == {}
+    found = joint_orders(robot, turned, [])
+    assert [*found] == ["motion"] and found["motion"].known == "reversed order"
 
 
 def test_a_fixed_description_has_no_more_findings(tmp_path, robot):

@@ -6,11 +6,10 @@ units, order and signs of the torques and the sense of the positions, whichever 
 axes and units of force-torque sensors are last.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import nnls
 
 from touchline.arrays import Array
 from touchline.check.findings import Findings
@@ -23,12 +22,13 @@ from touchline.check.joints import (
     driving,
     fit_torque,
     judged_joints,
-    swapped_torques,
     torque_words,
     velocity_problems,
 )
 from touchline.check.loads import explain_weights
 from touchline.check.mending import Mending
+from touchline.check.misfit import mends, misfit, total_misfit
+from touchline.check.order import joint_orders
 from touchline.check.seen import Seen, windows_of
 from touchline.check.windows import DRY_SPEED, Windows
 from touchline.check.wrenches import check_wrenches
@@ -37,8 +37,6 @@ from touchline.observer.dynamics import gravity_loads
 
 OFF = 0.35  # of a row's size: beyond it something coarse may be wrong with its sign or order
 WEIGHTS_OFF = 0.05  # the same, of weights
-BETTER = 0.8  # a change that leaves more than this part of what is off explains nothing
-CLEARLY = 0.2  # nor does one that mends less; a wrong sign of one row is 1
 RIGHTED = 0.2  # of what is off: no more is left once the joints are in their right order
 LARGE = 5.0  # a factor beyond it, or below its inverse, is a unit, whatever else is wrong
 UNIT_NEAR = 0.4  # relative, of the common factor of all torques, which loads may change
@@ -121,9 +119,12 @@ def _torques(robot: Robot, seen: Seen, mending: Mending) -> Step | None:
     dead = {name for kind, name in seen.table.dead() if kind == "tau"}
     measured = judged_joints(robot, windows, dead)
     telling = telling_joints(robot, seen)
-    joints = _joints(robot, seen, mending, telling)
-    if joints is not None:
-        return joints
+    orders = _orders(robot, seen, mending, measured, telling)
+    best = min(orders.values(), key=lambda step: step.left, default=None)
+    if best is not None and best is not orders.get("torque"):
+        # Nothing else can be told before: no row means what it is taken for.
+        if best.left < RIGHTED * total_misfit(robot, windows_of(robot, seen, mending), telling):
+            return best
     units = _currents(robot, windows, telling, measured, mending)
     units = units or _units(robot, windows, telling, measured, mending)
     if units is not None:
@@ -132,11 +133,11 @@ def _torques(robot: Robot, seen: Seen, mending: Mending) -> Step | None:
         light = list(_weightless(robot, windows, telling, mending))
         if not light or left <= light[0].left:
             return units
-    change = _change(robot, seen, mending, measured, telling)
+    change = _change(robot, seen, mending, orders.values(), telling)
     heard = [j for j in telling if _heard(windows, j)]
     if change is None and heard != telling:
         # Torques that nothing is in are off whatever else is mended.
-        change = _change(robot, seen, mending, measured, heard)
+        change = _change(robot, seen, mending, orders.values(), heard)
     return change
 
 
@@ -177,23 +178,21 @@ def _heard(windows: Windows, j: int) -> bool:
 
 
 def _change(
-    robot: Robot, seen: Seen, mending: Mending, measured: list[int], telling: list[int]
+    robot: Robot, seen: Seen, mending: Mending, orders: Iterable[Step], telling: list[int]
 ) -> Step | None:
     """The change of order, of a sign or of a sensor's axes that explains most of what is off."""
-    rows = misfit(robot, seen.windows, telling)
-    outside = {p[0] for p in seen.table.outside_limits(robot)}
-    if max(rows, default=0.0) < OFF and not outside:
+    if not _far_off(robot, seen, telling):
         return None
     before = windows_of(robot, seen, mending)
     now = total_misfit(robot, before, telling)
-    steps = list(_orders(robot, before, measured, telling, mending))
+    steps = [*orders, *_signs(before, robot, telling, mending)]
     wrenches = _wrenches(robot, seen, mending)
     if wrenches is not None:
         left = total_misfit(robot, windows_of(robot, seen, wrenches.mending), telling)
         steps.append(replace(wrenches, left=left))
     steps += _weightless(robot, before, telling, mending)
     steps += _positions(robot, seen, mending, telling)
-    steps = sorted((step for step in steps if _mends(step.left, now)), key=lambda step: step.left)
+    steps = sorted((step for step in steps if mends(step.left, now)), key=lambda step: step.left)
     if not steps:
         return None
     # Would a missing body, a surplus one or a tilted base leave no more than the best change?
@@ -201,59 +200,9 @@ def _change(
     if weights > steps[0].left:
         return steps[0]
     for step in steps[:MOST_BESIDE]:
-        if _mends(_left_beside_weights(robot, seen, step.mending, telling), weights):
+        if mends(_left_beside_weights(robot, seen, step.mending, telling), weights):
             return step
     return None
-
-
-def _mends(left: float, now: float) -> bool:
-    """Does a change leave so much less that it explains something?"""
-    return left <= min(BETTER * now, now - CLEARLY)
-
-
-def misfit(robot: Robot, windows: Windows, measured: list[int]) -> list[float]:
-    """What is off of every joint's torque and every sensor, 0 to 1: of its size.
-
-    A sensor is judged by how its readings change, for it may have any bias; torques as they are.
-    """
-    found = []
-    for j in measured:
-        r, e = windows.torque[:, j], windows.expected_torque[:, j]
-        if robot.description.joints[j].torque == "motor":
-            r = r - _driving(windows, j)
-        known = np.isfinite(r) & np.isfinite(e)
-        if known.any():
-            found.append(_relative(r[known, None], e[known, None], 0.0))
-    for k, sensor in enumerate(robot.description.sensors):
-        if sensor.frame != "sensor" or len(sensor.axes) < 6 or sensor.compensated != "none":
-            continue
-        sign = 1.0 if sensor.polarity == "outboard" else -1.0
-        r, e = windows.wrench[:, k, :3], sign * windows.expected_wrench[:, k, :3]
-        known = np.isfinite(r).all(axis=1) & np.isfinite(e).all(axis=1)
-        if known.any():
-            r, e = r[known], e[known]
-            found.append(_relative(r - np.median(r, axis=0), e - np.median(e, axis=0), TELLING))
-    return found
-
-
-def _driving(windows: Windows, j: int) -> Array:
-    """What (W,) unknown friction and the rotor may have in a motor's torque: never negative.
-
-    A torque or a position of the wrong sign would need friction that drives the joint.
-    """
-    qd = windows.qd[:, j]
-    columns = np.column_stack([np.tanh(qd / DRY_SPEED), qd, windows.acceleration[:, j]])
-    beside = windows.torque[:, j] - windows.expected_torque[:, j]
-    known = np.isfinite(beside) & np.isfinite(columns).all(axis=1)
-    if not known.any():
-        return np.zeros(len(qd))
-    return columns @ nnls(columns[known], beside[known])[0]
-
-
-def _relative(reading: Array, expected: Array, least: float) -> float:
-    sizes = [float(np.median(np.linalg.norm(x, axis=1))) for x in (reading, expected)]
-    off = float(np.median(np.linalg.norm(reading - expected, axis=1)))
-    return off / max(sum(sizes), least, 1e-9)
 
 
 def telling_joints(robot: Robot, seen: Seen) -> list[int]:
@@ -269,11 +218,6 @@ def is_off(robot: Robot, seen: Seen) -> bool:
         return False
     rows = misfit(robot, seen.windows, telling_joints(robot, seen))
     return max(rows, default=0.0) > WEIGHTS_OFF
-
-
-def total_misfit(robot: Robot, windows: Windows, measured: list[int]) -> float:
-    """The sum over all rows."""
-    return float(sum(misfit(robot, windows, measured)))
 
 
 def _units(
@@ -319,33 +263,31 @@ LARGE_FACTORS = {f: w for f, w in MOMENT_FACTORS.items() if not 1 / LARGE < f < 
 
 
 def _orders(
-    robot: Robot, windows: Windows, measured: list[int], telling: list[int], mending: Mending
-) -> Iterator[Step]:
-    """Torques in another order, or of opposite sign."""
-    count = len(robot.joint_names)
-    whole = {
-        "reversed order": np.arange(count)[::-1],
-        "alphabetical order of the joints' names": np.argsort(np.argsort(robot.joint_names)),
-    }
-    for name, order in whole.items():
-        if len(measured) < count or np.array_equal(order, np.arange(count)):
-            continue
-        changed = replace(mending, order=mending.order[order], torque=mending.torque[order])
-        left = total_misfit(robot, replace(windows, torque=windows.torque[:, order]), telling)
-        yield Step((f"torques of all joints seem to be in {name}: mend log: tau",), changed, left)
-    pairs = swapped_torques(windows, measured)
-    if pairs:
-        order = np.arange(len(robot.joint_names))
-        for a, b in pairs:
-            order[[a, b]] = order[[b, a]]
-        words = tuple(
-            f"torques of {robot.joint_names[a]} and {robot.joint_names[b]} fit each other's joint: "
-            "the columns seem swapped"
-            for a, b in pairs
-        )
-        changed = replace(mending, order=mending.order[order], torque=mending.torque[order])
-        left = total_misfit(robot, replace(windows, torque=windows.torque[:, order]), telling)
-        yield Step(words, changed, left)
+    robot: Robot, seen: Seen, mending: Mending, measured: list[int], telling: list[int]
+) -> dict[str, Step]:
+    """Columns of joints in another order, by what of them; nothing where all rows fit."""
+    if not _far_off(robot, seen, telling):
+        return {}
+    steps = {}
+    own = np.arange(len(robot.joint_names))
+    for signals, found in joint_orders(robot, seen.windows, measured).items():
+        order = np.array(found.order)
+        joints = own if signals == "torque" else order
+        torques = own if signals == "motion" else order
+        changed = mending.ordered(joints, torques, not found.complete)
+        left = total_misfit(robot, windows_of(robot, seen, changed), telling)
+        steps[signals] = Step((found.words(robot.joint_names),), changed, left)
+    return steps
+
+
+def _far_off(robot: Robot, seen: Seen, telling: list[int]) -> bool:
+    """Is something off that an order, a sign or a sensor's axes could be the cause of?"""
+    rows = misfit(robot, seen.windows, telling)
+    return max(rows, default=0.0) >= OFF or bool(seen.table.outside_limits(robot))
+
+
+def _signs(windows: Windows, robot: Robot, telling: list[int], mending: Mending) -> Iterator[Step]:
+    """Torques of opposite sign."""
     fits = [(j, fit_torque(windows, j)) for j in telling]
     negative = {j: fit for j, fit in fits if fit is not None and fit.certain and fit.factor < 0}
     groups = [[j] for j in negative] + ([list(negative)] if len(negative) > 1 else [])
@@ -434,26 +376,6 @@ def _positions(robot: Robot, seen: Seen, mending: Mending, measured: list[int]) 
             "model once they are turned; use factor -1 in log: q and qd"
         )
         yield Step((words,), changed, left)
-
-
-def _joints(robot: Robot, seen: Seen, mending: Mending, telling: list[int]) -> Step | None:
-    """Positions and velocities in the opposite order, with the torques or without."""
-    if max(misfit(robot, seen.windows, telling), default=0.0) < OFF:
-        return None
-    steps = []
-    for what, keys, torques in (
-        ("positions, velocities and torques", "q, qd and tau", True),
-        ("positions and velocities", "q and qd", False),
-    ):
-        changed = mending.reversed(torques)
-        left = total_misfit(robot, windows_of(robot, seen, changed), telling)
-        words = f"{what} of all joints seem to be in reversed order: mend log: {keys}"
-        steps.append(Step((words,), changed, left))
-    best = min(steps, key=lambda step: step.left)
-    windows = windows_of(robot, seen, mending)
-    torques = replace(windows, torque=windows.torque[:, ::-1])
-    others = total_misfit(robot, torques, telling), RIGHTED * total_misfit(robot, windows, telling)
-    return best if best.left < min(others) else None
 
 
 def _left_beside_weights(robot: Robot, seen: Seen, mending: Mending, measured: list[int]) -> float:

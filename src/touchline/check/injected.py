@@ -20,6 +20,7 @@ from tqdm import tqdm
 
 from touchline.arrays import Array
 from touchline.check.findings import Findings
+from touchline.check.order import SIGNALS, known_orders
 from touchline.check.recording import check_recording
 from touchline.logs import write_table
 from touchline.model.mechanism import Inertia, Mechanism
@@ -103,7 +104,7 @@ class Error:
         change: of the recording, or of the mechanism before it moves.
         before: is it the mechanism that is changed?
         sensors: does it need force-torque sensors?
-        group: two errors of one group are not put into one recording.
+        group: words; two errors that share one are not put into one recording.
         blinding: do the torques then tell nothing of weights? Beside another error the arm is one
             with force-torque sensors.
     """
@@ -238,17 +239,79 @@ def _time_unit(case: Case) -> str:
     return rf"time.*{word}"
 
 
+def _order(case: Case, order: list[int], signals: str) -> str:
+    """Puts what belongs to joint j into the column of joint `order[j]`, of `SIGNALS`."""
+    columns = np.argsort(order)
+    for name in ("tau",) if signals == "torque" else ("q", "qd", "tau"):
+        values = getattr(case.samples, name)
+        values[:] = values[:, columns]
+    what = f"{SIGNALS[signals][0]} "
+    moved = [j for j, column in enumerate(order) if column != j]
+    name = known_orders(case.robot.joint_names).get(tuple(order))
+    forms = [] if name is None else [rf"of all joints seem to be in {re.escape(name)}"]
+    if len(moved) == 2:
+        a, b = map(case.name, moved)
+        forms.append(rf"of ({a} and {b}|{b} and {a}) seem swapped")
+    # Of joints that are light the data may tell nothing, which then is said.
+    right = [
+        rf"(?=.*(\b{case.name(j)} in that of {case.name(order[j])}\b|not tell.*{case.name(j)}\b))"
+        for j in moved
+    ]
+    wrong = [
+        rf"(?!.*\b{case.name(j)} in that of (?!{case.name(column)}\b))"
+        for j, column in enumerate(order)
+    ]
+    forms.append("seem to stand in another" + "".join(right + wrong))
+    return f"^{what}({'|'.join(forms)})"
+
+
+def _some_order(case: Case) -> list[int]:
+    """Any order in which a joint that bears a load is moved."""
+    j = case.joint()
+    while True:
+        order = case.rng.permutation(len(case.robot.joint_names)).tolist()
+        if order[j] != j:
+            return order
+
+
+def _some_swap(case: Case) -> list[int]:
+    """A joint that bears a load is swapped with any other."""
+    order = list(range(len(case.robot.joint_names)))
+    j = case.joint()
+    k = int(case.rng.choice([i for i in order if i != j]))
+    order[j], order[k] = k, j
+    return order
+
+
+def _ur_order(case: Case) -> list[int]:
+    """As drivers of UR arms list joints, by the alphabet: the first and the third are swapped."""
+    order = list(range(len(case.robot.joint_names)))
+    order[0], order[2] = 2, 0
+    return order
+
+
 def _reversed(case: Case) -> str:
-    case.samples.tau[:] = case.samples.tau[:, ::-1]
-    return r"torques of .*(swapped|order)"
+    return _order(case, list(range(len(case.robot.joint_names)))[::-1], "torque")
 
 
 def _two_swapped(case: Case) -> str:
-    j = case.joint()
-    k = int(case.rng.choice([i for i in range(case.samples.tau.shape[1]) if i != j]))
-    case.samples.tau[:, [j, k]] = case.samples.tau[:, [k, j]]
-    a, b = case.name(j), case.name(k)
-    return rf"torques of ({a} and {b}|{b} and {a}).*swapped"
+    return _order(case, _some_swap(case), "torque")
+
+
+def _torques_anyhow(case: Case) -> str:
+    return _order(case, _some_order(case), "torque")
+
+
+def _ur(case: Case) -> str:
+    return _order(case, _ur_order(case), "all")
+
+
+def _joints_swapped(case: Case) -> str:
+    return _order(case, _some_swap(case), "all")
+
+
+def _joints_anyhow(case: Case) -> str:
+    return _order(case, _some_order(case), "all")
 
 
 def _torque_sign(case: Case) -> str:
@@ -352,6 +415,7 @@ def _gap(case: Case) -> str:
     return r"gaps"
 
 
+JOINTS = "positions speeds torques"
 ERRORS = (
     Error("base tilted", _tilted, "loads", before=True),
     Error("hand missing in the model", _hand_missing, "loads", before=True),
@@ -367,6 +431,10 @@ ERRORS = (
     Error("time in another unit", _time_unit, "time"),
     Error("torques in reversed order", _reversed, "torques"),
     Error("two torques swapped", _two_swapped, "torques"),
+    Error("torques in any order", _torques_anyhow, "torques"),
+    Error("joints in a UR's order", _ur, JOINTS),
+    Error("two joints swapped", _joints_swapped, JOINTS),
+    Error("joints in any order", _joints_anyhow, JOINTS),
     Error("a torque's sign", _torque_sign, "torques"),
     Error("a position's sign", _position_sign, "positions"),
     Error("a velocity's sign", _speed_sign, "speeds"),
@@ -506,7 +574,7 @@ KINDS = (  # the first that a finding matches is its kind
     ("mass too many", r"kg too many"),
     ("polarity", r"polarity"),
     ("frame", r"holds|frame: "),
-    ("swapped", r"swapped"),
+    ("order", r"swapped|another joint's column|order of|reversed order|order rotated"),
     ("degrees", r"degrees"),
     ("limits", r"limits"),
     ("compensated", r"compensated"),
@@ -560,7 +628,7 @@ def trial(cases: int, seed: int) -> Tally:
             robots.append(load_robot(path))
         rng = np.random.default_rng(seed)
         singly = [(error,) for error in ERRORS]
-        pairs = [p for p in combinations(ERRORS, 2) if p[0].group != p[1].group]
+        pairs = [p for p in combinations(ERRORS, 2) if not _alike(*p)]
         tally = Tally()
         count = cases + round(CLEAN * cases)
         for number in tqdm(range(count), file=sys.stderr, leave=False, disable=None):
@@ -576,6 +644,10 @@ def trial(cases: int, seed: int) -> Tally:
             case = make_case(robot, errors, rng)
             tally.add(case, findings_of(case))
     return tally
+
+
+def _alike(one: Error, other: Error) -> bool:
+    return bool(set(one.group.split()) & set(other.group.split()))
 
 
 def main(cases: int, seed: int) -> int:

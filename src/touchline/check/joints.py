@@ -34,7 +34,6 @@ LIGHT = 0.02  # of a reading's variation; a smaller expected torque cannot be to
 MOSTLY = 0.5  # of a reading's variation must be what seems to drive the joint
 DRIVES = 0.5  # Nm; a driver that takes off too much friction errs by less
 SAME = 0.995  # correlation of an expected torque with an acceleration that it is all made of
-CLEARER = 0.3  # another joint explains a torque column so much better
 
 
 @dataclass(frozen=True)
@@ -159,12 +158,6 @@ def check_torques(
     if not measured or not len(windows):
         return
     fits: dict[int, TorqueFit] = {}
-    swapped = swapped_torques(windows, measured)
-    for i, k in swapped:
-        a, b = robot.joint_names[i], robot.joint_names[k]
-        line = f"torques of {a} and {b} fit each other's joint: the columns seem swapped"
-        findings.find(line, Kind.SIGNAL)
-    inside = {joint for pair in swapped for joint in pair}
     for j in measured:
         name = robot.joint_names[j]
         size = float(np.nanmax(np.abs(windows.expected_torque[:, j]), initial=0.0))
@@ -182,12 +175,11 @@ def check_torques(
         if driven is not None and driven.has_rotor:
             fit = driven
         _note_fit(name, fit, findings)
-        if j not in inside:
-            fits[j] = fit
-            told = driven is not None and not driven.certain
-            if name in clipped:
-                fit = replace(fit, offset=0.0)
-            _judge(joint, fit, size, limits.get(j, np.inf), told, findings)
+        fits[j] = fit
+        told = driven is not None and not driven.certain
+        if name in clipped:
+            fit = replace(fit, offset=0.0)
+        _judge(joint, fit, size, limits.get(j, np.inf), told, findings)
     _judge_delays(robot, fits, findings)
 
 
@@ -369,27 +361,3 @@ def driving(windows: Windows, j: int) -> float:
     error = float(np.hypot(line.errors[0], speed * line.errors[1]))
     with_motion = -(coulomb + speed * viscous)
     return with_motion if with_motion > max(SURE * error, MOSTLY * size, DRIVES) else 0.0
-
-
-def swapped_torques(windows: Windows, measured: list[int]) -> list[tuple[int, int]]:
-    """Pairs of joints whose readings each fit the other's expected torque far better."""
-    if len(windows) < 4 or len(measured) < 2:
-        return []
-    cost = np.array([[_misfit(windows, i, k) for k in measured] for i in measured])
-    best = cost.argmin(axis=1)
-    pairs = []
-    for a, b in enumerate(best):
-        better = cost[a, b] < CLEARER * cost[a, a] and cost[b, a] < CLEARER * cost[b, b]
-        if a < b and best[b] == a and better:
-            pairs.append((measured[a], measured[b]))
-    return pairs
-
-
-def _misfit(windows: Windows, i: int, k: int) -> float:
-    """How badly joint i's reading fits joint k's expected torque, up to sign and small offset."""
-    reading, expected = windows.torque[:, i], windows.expected_torque[:, k]
-    usable = np.isfinite(reading) & np.isfinite(expected)
-    if not usable.any():
-        return np.inf
-    reading, expected = reading[usable], expected[usable]
-    return 0.05 + min(float(np.median(np.abs(reading - sign * expected))) for sign in (1, -1))

@@ -24,6 +24,7 @@ class Mending:
         order: (n,) column of the log that holds each joint's torque.
         torque: (n,) factors.
         weights: the robot whose weights are added to the torques, or None.
+        guessed: do the columns of some joints only seem to be these?
         wrench: (k, 6, 6) what leads from a sensor's columns to those that it should have.
     """
 
@@ -35,6 +36,7 @@ class Mending:
     torque: Array
     wrench: Array
     weights: Robot | None = None
+    guessed: bool = False
 
     @staticmethod
     def none(robot: Robot) -> "Mending":
@@ -61,17 +63,29 @@ class Mending:
                 tau = tau + gravity_loads(self.weights, q).torque / scale
             yield replace(part, time=time, q=q, qd=qd, tau=tau, wrench=wrench)
 
-    def reversed(self, torques: bool) -> "Mending":
-        """With positions and velocities of the joints in the opposite order; torques, too?"""
-        changed = replace(
+    @property
+    def reordered(self) -> bool:
+        """Does a joint's signal stand in the column of another one?"""
+        own = np.arange(len(self.joints))
+        return not (np.array_equal(self.joints, own) and np.array_equal(self.order, own))
+
+    def ordered(self, joints: Index, torques: Index, guessed: bool = False) -> "Mending":
+        """With positions and velocities, and torques, from the columns of other joints.
+
+        Args:
+            joints: (n,) number of the joint in whose columns each position and velocity stands.
+            torques: (n,) the same, of the torques.
+            guessed: is some of it a guess?
+        """
+        return replace(
             self,
-            joints=self.joints[::-1],
-            position=self.position[::-1],
-            velocity=self.velocity[::-1],
+            joints=self.joints[joints],
+            position=self.position[joints],
+            velocity=self.velocity[joints],
+            order=self.order[torques],
+            torque=self.torque[torques],
+            guessed=self.guessed or guessed,
         )
-        if not torques:
-            return changed
-        return replace(changed, order=self.order[::-1], torque=self.torque[::-1])
 
     def scaled(self, what: str, joints: list[int] | slice, factor: float) -> "Mending":
         """With the factor of some joints' `position`, `velocity` or `torque` changed."""

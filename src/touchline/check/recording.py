@@ -15,12 +15,15 @@ from touchline.check.joints import CHECK_GAIN, check_torques, velocity_problems
 from touchline.check.loads import explain_weights, possible_load
 from touchline.check.mending import Mending
 from touchline.check.noise import check_noise
+from touchline.check.order import SIGNALS, log_keys, mend_words
 from touchline.check.seen import Seen, look
 from touchline.check.wrenches import check_wrenches
 from touchline.detector.thresholds import make_thresholds
 from touchline.logs import open_log
+from touchline.logs.log import is_bag
 from touchline.logs.presence import Presence
 from touchline.model.robot import Robot
+from touchline.model.robot_file import flow
 from touchline.observer.bandwidths import bandwidth_warnings, bandwidths
 from touchline.observer.samples import Samples
 
@@ -71,6 +74,7 @@ def check_recording(robot: Robot, path: Path, findings: Findings) -> None:
         elif again is None:
             _tell_load(robot, seen, mending, read, plain)
     findings.take(plain)
+    _mend_order(robot, path, mending, findings)
     _mend_description(robot, mending, findings)
 
 
@@ -99,12 +103,29 @@ def _tell_load(
     ]
 
 
+def _mend_order(robot: Robot, path: Path, mending: Mending, findings: Findings) -> None:
+    """Where joints stand in other columns: the keys of `log` that name these."""
+    if not mending.reordered:
+        return
+    bag = is_bag(path)
+    keys = log_keys(robot.description, mending.joints, mending.order, bag)
+    entries = ", ".join(f"{key}: {flow(value)}" for key, value in keys.items())
+    line = f"log: {{{entries}}}"
+    if not keys:
+        line = "no key of robot.yaml says it: have the messages name each value's joint"
+    elif mending.guessed:
+        line = f"record more motion, or try {line}"
+    else:
+        findings.fixes["log"] = keys
+    for words in map(mend_words, SIGNALS):
+        findings.all = [replace(x, line=x.line.replace(words, line)) for x in findings.all]
+
+
 def _mend_description(robot: Robot, mending: Mending, findings: Findings) -> None:
     """What a description can say of a recording that had to be mended; the log's keys cannot."""
     description = robot.description
-    ordered = np.array_equal(mending.order, np.arange(len(description.joints)))
     for joint, factor in zip(description.joints, mending.torque, strict=True):
-        if factor != 1.0 and ordered:
+        if factor != 1.0 and ("log" in findings.fixes or not mending.reordered):
             gain = float(f"{joint.gain * abs(factor):.6g}")
             findings.mend("joints", joint.name, gain=gain, sign=joint.sign * np.sign(factor).item())
         if mending.weights is not None and joint.measured:

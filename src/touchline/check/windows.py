@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from touchline.arrays import Array
+from touchline.arrays import Array, Index
 from touchline.model.description import Friction
 from touchline.model.robot import Robot
 from touchline.observer.observer import Observer
@@ -18,10 +18,14 @@ from touchline.observer.samples import Samples
 
 SECONDS, ROWS = 0.25, 8  # at least so long and so many samples is a window
 MOST = 4000
+INSTANT = 1e-3  # s; a motion goes on evenly for so long
 # Dry friction turns its sign over such speeds [rad/s or m/s], and holds a slower joint, of which a
 # motor's current says nothing; so many windows must be faster.
 DRY_SPEED, ENOUGH = 0.02, 8
-JOINT_FIELDS = "q", "qd", "slope", "acceleration", "torque", "expected_torque", "expected_rate"
+JOINT_FIELDS = (
+    *("q", "qd", "slope", "acceleration"),
+    *("tau", "torque", "expected_torque", "expected_rate"),
+)
 WRENCH_FIELDS = "wrench", "expected_wrench", "weightless_wrench", "wrench_rate", "weightless_rate"
 
 
@@ -34,6 +38,7 @@ class Windows:
         qd: (W, n) velocities as logged.
         slope: (W, n) velocities from the positions.
         acceleration: (W, n) change of the logged velocities.
+        tau: (W, n) torques in logged units.
         torque: (W, n) as the description reads the log: sign, gain, bias and friction applied. NaN
             where a joint with a motor's current stands still.
         expected_torque: (W, n) without contact.
@@ -49,6 +54,7 @@ class Windows:
     qd: Array
     slope: Array
     acceleration: Array
+    tau: Array
     torque: Array
     expected_torque: Array
     expected_rate: Array
@@ -61,6 +67,43 @@ class Windows:
 
     def __len__(self) -> int:
         return len(self.q)
+
+    def part(self, keep: slice | Index) -> "Windows":
+        """Some of the windows."""
+        names = JOINT_FIELDS + WRENCH_FIELDS
+        return Windows(**{name: getattr(self, name)[keep] for name in names}, period=self.period)
+
+    def ordered(self, robot: Robot, joints: Index, torques: Index) -> "Windows":
+        """As if the log's columns stood in another order.
+
+        Args:
+            robot: as described.
+            joints: (n,) number of the joint in whose columns each position and velocity stands.
+            torques: (n,) the same, of the torques.
+        """
+        q, qd, slope, acceleration = (
+            values[:, joints] for values in (self.q, self.qd, self.slope, self.acceleration)
+        )
+        tau = self.tau[:, torques]
+        torque = _read_torques(robot, Samples(np.arange(len(q)), q, qd, tau, self.wrench))
+        _hold_nothing(robot, qd, torque)
+        moved = replace(
+            self, q=q, qd=qd, slope=slope, acceleration=acceleration, tau=tau, torque=torque
+        )
+        if np.array_equal(joints, np.arange(q.shape[1])):
+            return moved  # what is expected of them stays
+        # Two samples about the middle of each window, apart from those of the others.
+        ways = INSTANT * np.array([-0.5, 0.5])[:, None]
+        pairs = np.stack([np.arange(len(q)) + way for way in ways[:, 0]], axis=1).ravel()
+        both = [
+            (value[:, None] + ways * rate[:, None]).reshape(-1, q.shape[1])
+            for value, rate in ((q, qd), (qd, acceleration))
+        ]
+        nothing = np.zeros_like(both[0]), np.zeros((len(pairs), *self.wrench.shape[1:]))
+        seen = _expecting(robot, "none").run(pairs, both[0], both[1], *nothing)
+        return replace(
+            moved, expected_torque=seen.tau_ext[1::2], expected_wrench=seen.sensor_wrench[1::2]
+        )
 
 
 class WindowMaker:
@@ -84,6 +127,7 @@ class WindowMaker:
         signals = {
             "q": part.q,
             "qd": part.qd,
+            "tau": part.tau,
             "torque": _read_torques(self._robot, part),
             "expected_torque": whole.tau_ext,
             "wrench": part.wrench,
@@ -129,11 +173,7 @@ class WindowMaker:
         shapes |= dict.fromkeys(WRENCH_FIELDS, (k, 6))
         parts = self._parts or [{name: np.empty((0, *s)) for name, s in shapes.items()}]
         joined = {name: np.concatenate([p[name] for p in parts]) for name in shapes}
-        for j, joint in enumerate(self._robot.description.joints):
-            if joint.torque == "motor":
-                moving = np.abs(joined["qd"][:, j]) > DRY_SPEED
-                enough = moving.sum() >= ENOUGH
-                joined["torque"][~moving | ~enough, j] = np.nan
+        _hold_nothing(self._robot, joined["qd"], joined["torque"])
         return Windows(**joined, period=self._period)
 
 
@@ -163,6 +203,15 @@ def _read_torques(robot: Robot, part: Samples) -> Array:
         if joint.rest is not None:
             torques[:, j] -= joint.rest.at(part.q[:, j], qd)
     return torques
+
+
+def _hold_nothing(robot: Robot, qd: Array, torque: Array) -> None:
+    """Makes the torques (W, n) of motors NaN where dry friction may hold the joint."""
+    for j, joint in enumerate(robot.description.joints):
+        if joint.torque == "motor":
+            moving = np.abs(qd[:, j]) > DRY_SPEED
+            enough = moving.sum() >= ENOUGH
+            torque[~moving | ~enough, j] = np.nan
 
 
 def _rate(values: Array, count: int, rows: int) -> Array:

@@ -32,7 +32,8 @@ def check(
         log: A recording: a table (.parquet, .csv, .csv.gz) or a rosbag2 (.mcap, .db3).
         fix: Writes a copy of the description in which all is mended that has a key there: loads, a
             tilted base, sign, gain, offset, delay and compensation of torques; polarity, axes and
-            bias of force-torque sensors; noise figures. What the log names wrongly is left to you.
+            bias of force-torque sensors; noise figures; the order of joints' columns in the log.
+            The log's units are left to you.
     """
     from touchline.check.run import check as run
 

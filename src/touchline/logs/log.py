@@ -115,7 +115,7 @@ def _open_source(path: Path, description: RobotDescription) -> Source:
     name = path.name.lower()
     if path.is_file() and not path.stat().st_size:
         raise InputError(f"{path}: the file is empty")
-    if path.is_dir() or name.endswith(BAGS):
+    if is_bag(path):
         from touchline.logs.rosbag import RosbagSource
 
         return RosbagSource(path, description, naming)
@@ -128,6 +128,11 @@ def _open_source(path: Path, description: RobotDescription) -> Source:
 
         return CsvSource(path, description, naming)
     raise unknown_kind(path)
+
+
+def is_bag(path: Path) -> bool:
+    """Is a log a rosbag2 recording rather than a table?"""
+    return path.is_dir() or path.name.lower().endswith(BAGS)
 
 
 def unknown_kind(path: Path) -> InputError:

@@ -73,7 +73,7 @@ def _named(entries: list[dict[str, Any]], changes: dict[str, Any]) -> list[dict[
 def _listed(lines: list[str], key: str, old: list[Any], new: list[Any]) -> list[str]:
     """The lines with a list's entries replaced where they changed, comments beside them kept."""
     found = _block(lines, key)
-    whole = [f"{key}:", *(f"  - {_flow(entry)}" for entry in new)]
+    whole = [f"{key}:", *(f"  - {flow(entry)}" for entry in new)]
     if found is None:
         return [*lines, *whole]
     start, end = found
@@ -90,13 +90,13 @@ def _listed(lines: list[str], key: str, old: list[Any], new: list[Any]) -> list[
         if before != after:
             _, mark, comment = inner[place].rpartition("}")[2].partition("#")
             tail = f"  #{comment}" if mark else ""
-            inner[place] = f"{indent}- {_flow(after)}{tail}"
-    inner += [f"{indent}- {_flow(entry)}" for entry in new[len(old) :]]
+            inner[place] = f"{indent}- {flow(after)}{tail}"
+    inner += [f"{indent}- {flow(entry)}" for entry in new[len(old) :]]
     return [*lines[: start + 1], *inner, *lines[end:]]
 
 
-def _flow(entry: Any) -> str:
-    """An entry in one line."""
+def flow(entry: Any) -> str:
+    """A value as YAML in one line."""
     text = yaml.dump(
         entry,
         Dumper=_Dumper,
