@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Joints whose columns come in another order are named, by `check` and by `analyze`."""
 
+import os
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from touchline.check.run import check, write_fixes
 from touchline.cli import main
 from touchline.errors import InputError
 from touchline.logs import write_table
+from touchline.trials import real_recordings
 from touchline.trials.recordings import record
 
 TOLD = "{} of all joints seem to be in reversed order ("
@@ -22,6 +25,7 @@ CASES = {
     ("q", "qd"): TOLD.format("positions and velocities"),
     (): None,
 }
+REPOSITORY = Path(__file__).resolve().parents[2]
 NAMES = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 PAN, ELBOW = 0, 2
 
@@ -201,6 +205,29 @@ def test_what_a_bag_can_say_is_its_names(ur10):
         names["elbow_joint"] == "shoulder_pan_joint" and names["wrist_1_joint"] == "wrist_1_joint"
     )
     assert log_keys(description, own, order, bag=True) == {}
+
+
+def test_a_real_arm_whose_currents_nobody_has_described_is_told_its_alphabet(tmp_path):
+    """A UR10, described by its model alone; its columns as a driver by the alphabet gives them."""
+    data = Path(os.environ.get("TOUCHLINE_DATA", REPOSITORY.parent / "shared" / "data"))
+    bag = data / "panda_ur10_rosbag2" / "ur10_exciting_trajectory.db3"
+    if not bag.exists():
+        pytest.skip(f"no recordings at {data}: set TOUCHLINE_DATA")
+    (tmp_path / "robot.yaml").write_text(real_recordings.UR10)
+    robot = tl.load_robot(tmp_path / "robot.yaml")
+    samples = tl.read_log(bag, robot)
+    right = tmp_path / "right.parquet"
+    write_table(right, samples, robot.description)
+    moved(samples, [2, 1, 0, 3, 4, 5])
+    write_table(tmp_path / "log.parquet", samples, robot.description)
+    found = check(tmp_path / "robot.yaml", tmp_path / "log.parquet")
+    assert (
+        "positions, velocities and torques of all joints seem to be in alpha" in found.findings[0]
+    )
+    assert found.findings[1:] == check(tmp_path / "robot.yaml", right).findings
+    write_fixes(tmp_path / "robot.yaml", found, tmp_path / "fixed.yaml")
+    again = check(tmp_path / "fixed.yaml", tmp_path / "log.parquet").findings
+    assert not any("order" in line for line in again)
 
 
 @pytest.mark.parametrize("joint", [1, 3])

@@ -22,16 +22,22 @@ def misfit(robot: Robot, windows: Windows, measured: list[int]) -> list[float]:
     return off[np.isfinite(off)].tolist()
 
 
-def departures(robot: Robot, windows: Windows, measured: list[int], least: float = 0.0) -> Array:
+def departures(
+    robot: Robot,
+    windows: Windows,
+    measured: list[int],
+    least: float = 0.0,
+    currents: bool = False,
+) -> Array:
     """How far readings (W, rows) are from what is expected, of the size of both; NaN: not known.
 
     The torques of the measured joints come first, as they are, of a size of `least` [Nm] or more.
     Then come the forces of sensors with six axes of their own, by how they change, for a sensor may
-    have any bias.
+    have any bias. `currents`: may all torques be motors' currents, whatever is described?
     """
     r, e = windows.torque[:, measured].copy(), windows.expected_torque[:, measured]
     for i, j in enumerate(measured):
-        if robot.description.joints[j].torque == "motor":
+        if currents or robot.description.joints[j].torque == "motor":
             r[:, i] -= _driving(windows, j)
     rows = [_relative(r[..., None], e[..., None], least)]
     for k, sensor in enumerate(robot.description.sensors):

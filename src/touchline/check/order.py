@@ -269,8 +269,9 @@ class _Judge:
 
     def _try(self, orders: set[Permutation], found: dict[Permutation, float]) -> None:
         for order in sorted(orders - found.keys()):
+            # Nobody has told yet that torques are currents: their friction must not hide the order.
             self._off[order] = departures(
-                self._robot, self._ordered(order), self._measured, TELLING
+                self._robot, self._ordered(order), self._measured, TELLING, currents=True
             )
             found[order] = self._left(self._off[order]) + self._outside(order)
 
