@@ -148,18 +148,23 @@ def joint_orders(robot: Robot, windows: Windows, measured: list[int]) -> dict[st
     Torques may be motors' currents that nobody has described: friction hides their order then. So
     they are judged as described and as currents, and what leaves fewer joints untold counts.
     """
-    ways = [_orders_told(robot, windows, measured, currents) for currents in (False, True)]
+    moved: dict[Permutation, Windows] = {}
+    ways = [_orders_told(robot, windows, measured, moved, currents) for currents in (False, True)]
     return min(
         ways, key=lambda way: min((len(order.untold) for order in way.values()), default=np.inf)
     )
 
 
 def _orders_told(
-    robot: Robot, windows: Windows, measured: list[int], currents: bool
+    robot: Robot,
+    windows: Windows,
+    measured: list[int],
+    moved: dict[Permutation, Windows],
+    currents: bool,
 ) -> dict[str, JointOrder]:
+    """The same, judged one way; `moved` keeps what is expected in each order."""
     found: dict[str, JointOrder] = {}
     least: dict[str, float] = {}
-    moved: dict[Permutation, Windows] = {}
     for signals in SIGNALS:
         judge = _Judge(robot, windows, measured, signals, moved, currents)
         if not judge.enough or (signals != "motion" and len(measured) < 2):

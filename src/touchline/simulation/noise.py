@@ -63,7 +63,7 @@ class SensorNoise:
         for name in ("link_torque", "motor_torque"):
             torques[name] = delayed(time, getattr(readings, name), self.torque_delay) + noise
         qd = readings.qd + self._white(time, readings.qd.shape, rng, self.velocity)
-        q = self._quantized(robot, readings.q)
+        q = self.quantized(robot, readings.q)
         return replace(readings, q=q, qd=qd, wrench=wrench, **torques)
 
     def drop(self, samples: Samples, rng: np.random.Generator) -> dict[str, Any]:
@@ -122,7 +122,8 @@ class SensorNoise:
         mix = mix * unit[:, None] / unit[None, :]
         return wrench + np.einsum("kij,nkj->nki", mix, wrench)
 
-    def _quantized(self, robot: Robot, q: Array) -> Array:
+    def quantized(self, robot: Robot, q: Array) -> Array:
+        """Positions (N, n) as encoders of `position_bits` report them [rad or m]."""
         if self.position_bits == 0:
             return q
         joints = robot.mechanism.joints

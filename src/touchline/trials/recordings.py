@@ -164,8 +164,7 @@ def prescribed_pushes(
         loads[rows] -= strength[:, None] * maker.interpolated(held, slice(0, len(strength)))
         pushes += 1
     samples = maker.sensed(q, qd, loads, rng)
-    step = 2 * np.pi / 2 ** SensorNoise().position_bits
-    samples.q[:] = step * np.round(samples.q / step)
+    samples.q[:] = SensorNoise().quantized(robot, samples.q)
     return samples, pushes
 
 
