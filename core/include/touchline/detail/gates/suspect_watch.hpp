@@ -27,15 +27,17 @@ class SuspectWatch {
         now_(at_.count(), 0),
         told_(at_.count(), 0),
         beyond_(at_.count(), 0),
-        most_(at_.count(), 0.0),
+        little_(at_.count(), 0),
         since_(at_.count(), kNever),
         seen_(at_.count(), -kNever),
         until_(at_.count(), -kNever),
+        joints_(robot.joints),
         sensors_(robot.sensors),
-        last_(6 * at_.sensors, std::numeric_limits<double>::quiet_NaN()),
+        last_(at_.count() - at_.tau(), std::numeric_limits<double>::quiet_NaN()),
         read_(last_),
         lately_(last_),
         stepped_(last_.size(), 0.0),
+        first_(last_.size()),
         rises_(at_.count(), 0),
         innermost_(at_.sensors, 1) {
     for (const Segment& segment : layout.segments) {
@@ -56,18 +58,16 @@ class SuspectWatch {
     const double dt = sample.time - time_;
     time_ = sample.time;
     const double forgets = dt > 0.0 ? dt / (kLately + dt) : 0.0;
+    for (std::size_t j = 0; j < at_.joints; ++j) {
+      const JointRow& joint = joints_[j];
+      if (joint.measured()) read(j, joint.sign * joint.gain * sample.tau[j] - joint.bias, 1.0, forgets);
+    }
     for (std::size_t s = 0; s < sensors_.size(); ++s) {
-      const double x = dt > 0.0 ? sensors_[s].bandwidth * dt : 0.0, follows = x / (1.0 + x);
-      for (std::size_t i = 6 * s; i < 6 * s + 6; ++i) {
-        const double now = sensors_[s].sign * sample.wrench[i] - sensors_[s].bias[i - 6 * s];
-        if (now != now) continue;
-        const bool first = read_[i] != read_[i];
-        read_[i] = first ? now : read_[i] + follows * (now - read_[i]);
-        if (first) lately_[i] = now;
-        else if (rises_[at_.wrench() + i] == 0) lately_[i] += forgets * (now - lately_[i]);
-        if (!first) stepped_[i] = std::max(std::fabs(now - last_[i]), (1.0 - forgets) * stepped_[i]);
-        last_[i] = now;
-      }
+      const SensorRow& sensor = sensors_[s];
+      const double x = dt > 0.0 ? sensor.bandwidth * dt : 0.0, follows = x / (1.0 + x);
+      for (std::size_t k = 0; k < 6; ++k)
+        read(at_.joints + 6 * s + k, sensor.sign * sample.wrench[6 * s + k] - sensor.bias[k], follows,
+             forgets);
     }
   }
   // `over`: does any row of the segment exceed its limit still? Where none does a push has let go, and what
@@ -77,12 +77,13 @@ class SuspectWatch {
     const double least = (over ? kLeast : 1.0) * contact_[suspect.channel];
     if (!(std::fabs(suspect.error) > least)) return;
     const char beyond = suspect.touched && is_beyond(suspect) ? 1 : 0;
+    if (now_[suspect.channel] == 0 && !(since_[suspect.channel] < kNever)) began(suspect);
     if (suspect.touched && has_risen(suspect)) rises_[suspect.channel] = 1;
-    const double size = std::fabs(suspect.error) / contact_[suspect.channel];
+    const char little = is_little(suspect) ? 1 : 0;
     for (const int c : {suspect.channel, suspect.other}) {
       if (c < 0) continue;
       now_[c] = 1;
-      most_[c] = std::max(most_[c], size);
+      little_[c] = little;
       beyond_[c] = std::max(beyond_[c], beyond);  // a scale is never wrong by more, so it was none
     }
     any_ = true;
@@ -96,12 +97,11 @@ class SuspectWatch {
       if (now_[c] != 0) seen_[c] = time;
       if (!(time - seen_[c] < kMissed)) {
         since_[c] = kNever;
-        beyond_[c] = rises_[c] = 0;
-        most_[c] = 0.0;
+        beyond_[c] = rises_[c] = little_[c] = 0;
       }
       if (now_[c] != 0 && !(since_[c] <= time)) since_[c] = time;
       const double dwell = beyond_[c] != 0 || rises_[c] != 0 ? kLasts
-                           : most_[c] < kSlight              ? kSlightLasts
+                           : little_[c] != 0                 ? kLittleLasts
                                                              : kDwell;
       if (now_[c] != 0 && time - since_[c] >= dwell) out(static_cast<int>(c), until_[c] = time + kOut);
       told_[c] = time < until_[c];
@@ -116,11 +116,10 @@ class SuspectWatch {
   static constexpr double kNever = std::numeric_limits<double>::infinity();
   static constexpr double kOut = 2.0;     // [s] for which it tells nothing after that
   static constexpr double kDwell = 0.02;  // [s] for which it explains all: a contact rises to more
-  // Times the threshold of a contact: an error of less may be the model's. Where that has brought an arm
-  // in motion to its thresholds, one row is the first to be over, and is explained by one channel. So
-  // such an error has to last for longer [s]. Half: models that are 2 % off are told as faults at
-  // 1 rad/s. Double: half a torque of a light joint is told after its motion has gone.
-  static constexpr double kSlight = 2.0, kSlightLasts = 0.5;
+  // Of what a channel carries, and of what that has changed by of late: an error of less is no wrong scale,
+  // and what a model errs by in motion. It has to last for longer [s]. Half of the part: a model that is
+  // 5 % off is told as a fault. Double: so may half a torque be, which is told later.
+  static constexpr double kLittle = 0.3, kLittleLasts = 0.5;
   // [s] of what may be a push, too. Biases and drifts are all that is wrong by more than a multiple: of
   // the two seconds in which these are to be told it leaves a tenth. Half: leaning on the first link for
   // a second is told as a fault.
@@ -130,6 +129,9 @@ class SuspectWatch {
   // Of the error: a fault that comes at once brings this part within one sample. A push that rises in
   // five brings a third.
   static constexpr double kAtOnce = 0.5;
+  // Thresholds by which its error has grown since it was suspected. Half: noise does so beside a push.
+  // Double: a push along an axis is told as a fault of an arm that moves fast.
+  static constexpr double kGrown = 2.0;
   // [s] over which it has carried something lately. Half: a lie that grows with a slow motion is a push for
   // longer. Double: where the arm has come to in the last seconds counts less.
   static constexpr double kLately = 5.0;
@@ -138,42 +140,78 @@ class SuspectWatch {
   static constexpr double kMissed = 0.01; // [s] for which noise may hide it
   static constexpr double kLeast = 0.7;   // of the threshold of a contact: what it must be wrong by
 
+  // A reading of torque or axis `i`, counted together, to its sign and scale [Nm or N, Nm].
+  void read(std::size_t i, double now, double follows, double forgets) {
+    if (now != now) return;
+    const bool first = read_[i] != read_[i];
+    read_[i] = first ? now : read_[i] + follows * (now - read_[i]);
+    if (first) lately_[i] = now;
+    else if (rises_[at_.tau() + i] == 0) lately_[i] += forgets * (now - lately_[i]);
+    if (!first) stepped_[i] = std::max(std::fabs(now - last_[i]), (1.0 - forgets) * stepped_[i]);
+    last_[i] = now;
+  }
+
+  // May the model err by that? Of what is compensated before it is read nothing is known.
+  bool is_little(const Suspect& suspect) const {
+    const std::size_t i = suspect.channel - at_.tau();
+    if (i >= at_.joints && sensors_[(i - at_.joints) / 6].gravity_compensated) return false;
+    const double size = std::fabs(suspect.error), carried = read_[i] + suspect.error;
+    return size < kLittle * std::min(std::fabs(carried), std::fabs(carried - lately_[i]));
+  }
+
   // Is a force wrong by more than a multiple of what its axis carries, or two that are swapped by
   // something else than they differ by? What they carry is what they read, less the error. Of what is
   // compensated before it is read nothing is known. No push loads a moment alone.
   bool is_beyond(const Suspect& suspect) const {
     if (suspect.channel < static_cast<int>(at_.wrench())) return false;
-    const std::size_t i = suspect.channel - at_.wrench();
-    if (i % 6 >= 3 || sensors_[i / 6].gravity_compensated) return false;
+    const std::size_t axis = suspect.channel - at_.wrench(), i = at_.joints + axis;
+    if (axis % 6 >= 3 || sensors_[axis / 6].gravity_compensated) return false;
     const double error = suspect.error;  // of a load, which is read with the other sign
     const double carried = read_[i] + error;
     if (suspect.other < 0) return std::fabs(error) > kMultiple * std::fabs(carried);
-    const double other = read_[suspect.other - at_.wrench()] - error;
+    const double other = read_[suspect.other - at_.tau()] - error;
     return std::fabs(error - (carried - other)) > kUnlike * std::fabs(error);
   }
 
-  // Has a force of the innermost sensor become wrong over several samples, while what it carries has hardly
-  // changed? It may carry so much that a push is a small part of that. An outer sensor has another one
-  // inboard, which feels the push.
+  // A channel is suspected from now on.
+  void began(const Suspect& suspect) {
+    const std::size_t i = suspect.channel - at_.tau();
+    first_[i] = {suspect.error, read_[i] + suspect.error};
+  }
+
+  // Has a force of the innermost sensor become wrong over several samples, by more than what it carries
+  // has changed by of late, or since it was suspected? It may carry so much that a push is a small part
+  // of that. An outer sensor has another one inboard, which feels the push.
   bool has_risen(const Suspect& suspect) const {
     if (suspect.channel < static_cast<int>(at_.wrench()) || suspect.other >= 0) return false;
-    const std::size_t i = suspect.channel - at_.wrench();
-    const SensorRow& sensor = sensors_[i / 6];
-    if (i % 6 >= 3 || sensor.gravity_compensated || innermost_[i / 6] == 0) return false;
+    const std::size_t axis = suspect.channel - at_.wrench(), i = at_.joints + axis;
+    const SensorRow& sensor = sensors_[axis / 6];
+    if (axis % 6 >= 3 || sensor.gravity_compensated || innermost_[axis / 6] == 0) return false;
     const double size = std::fabs(suspect.error), carried = read_[i] + suspect.error;
-    return stepped_[i] < kAtOnce * size && size > kMultiple * std::fabs(carried - lately_[i]);
+    if (!(stepped_[i] < kAtOnce * size)) return false;
+    const double grown = std::fabs(suspect.error - first_[i].error);
+    return size > kMultiple * std::fabs(carried - lately_[i]) ||
+           (grown > kGrown * contact_[suspect.channel] &&
+            grown > kMultiple * std::fabs(carried - first_[i].carried));
   }
+
+  // What an axis was wrong by, and carried, as it was suspected first [N, Nm].
+  struct First {
+    double error, carried;
+  };
 
   ChannelLayout at_;
   std::vector<double> contact_;  // per channel: threshold of a contact [N, Nm]
   std::vector<char> now_, told_, beyond_;
+  std::vector<char> little_;  // per channel: see `kLittle`
   bool any_ = false;
-  std::vector<double> most_;  // per channel: its largest error while it was suspected [thresholds]
   std::vector<double> since_, seen_, until_;  // [s]
+  std::vector<JointRow> joints_;
   std::vector<SensorRow> sensors_;
-  // Per axis: its last reading, readings as the filters have them, their mean of late, but for what has
+  // Per torque and axis: its last reading, readings as the filters have them, their mean of late, but for what has
   // risen, and their largest step of late [N, Nm].
   std::vector<double> last_, read_, lately_, stepped_;
+  std::vector<First> first_;
   std::vector<char> rises_;      // per channel: has it risen while it was suspected, see `has_risen`
   std::vector<char> innermost_;  // per sensor: has it none inboard?
   double time_ = std::numeric_limits<double>::quiet_NaN();  // [s]
