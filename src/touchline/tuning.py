@@ -81,6 +81,7 @@ def native_tuning(tuning: Mapping[str, float], rule: str = "likelihood") -> core
     """
     native = core.Tuning()
     for name, value in Tuning(tuning).items():
-        native.set_number(name, value)
+        if value != DEFAULTS[name]:  # which it has already
+            native.set_number(name, value)
     native.first_entry = rule == "paper"
     return native

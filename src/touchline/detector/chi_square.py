@@ -3,6 +3,7 @@
 
 import math
 from collections.abc import Iterable
+from functools import lru_cache
 from statistics import NormalDist
 
 import numpy as np
@@ -44,6 +45,7 @@ def normal_limit(probability: Array) -> Array:
     return np.array([-normal.inv_cdf(float(p)) for p in np.ravel(probability)])
 
 
+@lru_cache(maxsize=256)  # many rows of many pipelines ask for the same few
 def _limit(degrees: int, probability: float) -> float:
     low, high = 0.0, 2.0 * degrees
     while beyond(high, degrees) > probability:

@@ -55,6 +55,11 @@ class Crossing:
     entry: bool
 
 
+# By link and bytes of `T_node_link`: a link's node differs only with the sensors on it, so robots
+# of the same links share them.
+Meshes = dict[tuple[str, bytes], core.Mesh]
+
+
 class Skin:
     """All link surfaces of a robot.
 
@@ -70,16 +75,18 @@ class Skin:
 
     def __init__(self, robot: Robot, kind: str = "collision") -> None:
         self.robot = robot
-        self.patches, self.lost, self.doubts = _worn(robot, kind)
+        self.patches, self.lost, self.doubts, self._moved = _worn(robot, kind)
 
     def on(self, robot: Robot) -> "Skin":
         """The same surfaces on a robot of the same links with other sensors."""
         skin = object.__new__(Skin)
         skin.robot, skin.lost, skin.doubts = robot, self.lost, self.doubts
+        skin._moved = self._moved
         names = set(robot.segment_names)
         bodies = {link: body for body in robot.bodies for link in body.links}
         skin.patches = tuple(
-            _moved_patch(robot, patch, bodies[patch.link], names) for patch in self.patches
+            _moved_patch(robot, patch, bodies[patch.link], names, self._moved)
+            for patch in self.patches
         )
         return skin
 
@@ -147,33 +154,43 @@ class Skin:
 
 
 @lru_cache(maxsize=4)  # pipelines on one robot search the same surfaces
-def _worn(robot: Robot, kind: str) -> tuple[tuple[Patch, ...], tuple[str, ...], tuple[str, ...]]:
-    """Patches of a robot, and what is lost and doubtful of its surfaces."""
+def _worn(
+    robot: Robot, kind: str
+) -> tuple[tuple[Patch, ...], tuple[str, ...], tuple[str, ...], Meshes]:
+    """Patches of a robot, what is lost and doubtful of its surfaces, and meshes made so far."""
     surfaces = mechanism_surfaces(robot.mechanism, kind)
     names = set(robot.segment_names)
     bodies = {link: body for body in robot.bodies for link in body.links}
+    meshes: Meshes = {}
     patches = tuple(
-        _patch(robot, link, surface, bodies[link], names)
+        _patch(robot, link, surface, bodies[link], names, meshes)
         for link, surface in surfaces.by_link.items()
         if link in bodies
     )
-    return patches, surfaces.lost, surfaces.doubts
+    return patches, surfaces.lost, surfaces.doubts, meshes
 
 
-def _patch(robot: Robot, link: str, surface: Surface, body: Body, segments: set[str]) -> Patch:
+def _patch(
+    robot: Robot, link: str, surface: Surface, body: Body, segments: set[str], meshes: Meshes
+) -> Patch:
     place = robot.places[link]
     T = place.T_node_link
-    vertices = move_points(surface.vertices, T)
-    mesh = core.mesh(np.ascontiguousarray(vertices), np.ascontiguousarray(surface.faces, np.int64))
+    key = link, T.tobytes()
+    if key not in meshes:
+        vertices = np.ascontiguousarray(move_points(surface.vertices, T))
+        meshes[key] = core.mesh(vertices, np.ascontiguousarray(surface.faces, np.int64))
+    mesh = meshes[key]
     felt = _felt(robot, body, place.node, segments)
     return Patch(link, body.name, place.node, felt, T, surface, mesh)
 
 
-def _moved_patch(robot: Robot, patch: Patch, body: Body, segments: set[str]) -> Patch:
+def _moved_patch(
+    robot: Robot, patch: Patch, body: Body, segments: set[str], meshes: Meshes
+) -> Patch:
     """The same surface where a robot of the same links carries it."""
     place = robot.places[patch.link]
     if not np.array_equal(place.T_node_link, patch.T_node_link):
-        return _patch(robot, patch.link, patch.surface, body, segments)
+        return _patch(robot, patch.link, patch.surface, body, segments, meshes)
     felt = _felt(robot, body, place.node, segments)
     return replace(patch, body=body.name, node=place.node, segment=felt)
 

@@ -7,6 +7,7 @@ axis along the joint. Fixed and locked joints vanish into the nodes that carry t
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
@@ -50,6 +51,16 @@ class Place:
 def invert(T: Array) -> Array:
     """Inverse of a rigid transform (4, 4)."""
     return pose(T[:3, :3].T, -T[:3, :3].T @ T[:3, 3])
+
+
+@lru_cache(maxsize=64)  # joints turn about a few axes, also in arms that errors are drawn of
+def _along(axis: tuple[float, float, float]) -> tuple[Array, Array]:
+    """The pose (4, 4) in a link of a frame with z along `axis`, and its inverse; read-only."""
+    T = pose(rotation_to_axis(np.array(axis)))
+    made = T, invert(T)
+    for pose_of in made:
+        pose_of.setflags(write=False)
+    return made
 
 
 class TreeBuilder:
@@ -114,7 +125,7 @@ class TreeBuilder:
         if master.name in self._locked:
             position = multiplier * self._locked[master.name] + offset
             return Place(inner.node, T_node_child @ joint_motion(joint.kind, joint.axis, position))
-        T_child_axis = pose(rotation_to_axis(joint.axis))
+        T_child_axis, T_axis_child = _along(tuple(joint.axis.tolist()))
         node = Node(
             inner.node,
             joint.kind,
@@ -124,7 +135,7 @@ class TreeBuilder:
             offset,
             joint=joint.name,
         )
-        return self._new_node(node, invert(T_child_axis))
+        return self._new_node(node, T_axis_child)
 
     def _follow(self, joint: Joint) -> tuple[Joint, float, float]:
         """The independent joint that moves this one: its position = multiplier * q + offset."""

@@ -17,6 +17,9 @@ from touchline.model.kernel import joint_row, native_node, sensor_row
 from touchline.model.robot import Robot
 from touchline.native import core
 
+# The arguments of `native_robot` from `period` on.
+Weights = tuple[float, float | None, float, float, float, PushDescription, Mapping[str, float]]
+
 MAGIC = 8  # bytes with which exported robots begin, as robot_file.hpp says
 
 

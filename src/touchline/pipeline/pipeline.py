@@ -380,13 +380,9 @@ class Pipeline:
 
     def _native(self) -> core.Robot:
         """All that the core knows of the robot, and what carries on where its sensors are lost."""
-
-        def make(robot: Robot, thresholds: Thresholds, skin: Skin) -> core.Robot:
-            return native_robot(robot, thresholds, skin, *self._weights)
-
         whole = self.robot, self.thresholds, self.skin
-        made = make(*whole)
-        made.stand_ins = StandIns(*whole, self._weights[0], self._model_error, make).all()
+        made = native_robot(*whole, *self._weights)
+        made.stand_ins = StandIns(*whole, self._model_error, self._weights).all()
         return made
 
     @property

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The robot without some of its force-torque sensors, for when they are lost."""
 
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
+from weakref import ref
 
 from touchline.arrays import Array
 from touchline.detector.model_drift import link_errors
@@ -16,8 +18,13 @@ from touchline.detector.thresholds import (
 from touchline.localizer.skin import Skin
 from touchline.model.robot import Robot
 from touchline.native import core
+from touchline.pipeline.native_robot import Weights, native_robot
 
 SETS = 3  # sensors, of which any set may be lost: seven pipelines of 9 ms each
+KEPT = 4  # robots whose stand-ins are kept for the next pipelines on them
+
+# As asked for, surfaces (whose places in memory are part of that), and what was made.
+_kept: deque[tuple[tuple[object, ...], object, list[core.StandIn]]] = deque(maxlen=KEPT)
 
 
 def robot_without(robot: Robot, lost: Sequence[int]) -> Robot:
@@ -49,9 +56,8 @@ class StandIns:
         robot: whole.
         thresholds: of the whole robot.
         skin: its surfaces.
-        period: time between samples [s].
         model_error: as of `Pipeline`.
-        make: of a robot, its thresholds and surfaces, all that a native pipeline needs.
+        weights: what `native_robot` takes after the surfaces.
     """
 
     def __init__(
@@ -59,17 +65,35 @@ class StandIns:
         robot: Robot,
         thresholds: Thresholds,
         skin: Skin,
-        period: float,
         model_error: float,
-        make: Callable[[Robot, Thresholds, Skin], core.Robot],
+        weights: Weights,
     ) -> None:
         self._robot, self._thresholds, self._skin = robot, thresholds, skin
-        self._period, self._model_error, self._make = period, model_error, make
+        self._model_error, self._weights = model_error, weights
 
     def all(self) -> list[core.StandIn]:
-        """Of all losses after which something is left that feels."""
-        made = (self.after(lost) for lost in losses(len(self._robot.sensor_names)))
-        return [stand_in for stand_in in made if stand_in is not None]
+        """Of all losses after which something is left that feels.
+
+        Pipelines on one robot have the same ones, of which the core takes copies.
+        """
+        sets = losses(len(self._robot.sensor_names))
+        asked = self._asked(sets)
+        for before, _, made in tuple(_kept):
+            if before == asked:
+                return made
+        found = [self.after(lost) for lost in sets]
+        made = [stand_in for stand_in in found if stand_in is not None]
+        _kept.appendleft((asked, self._skin.patches, made))
+        return made
+
+    def _asked(self, sets: Sequence[tuple[int, ...]]) -> tuple[object, ...]:
+        """All that they follow from. Robots and surfaces never change: objects are compared.
+
+        Of the thresholds only counts what each row tests.
+        """
+        rows = [(row.segment, row.component, row.joint) for row in self._thresholds.rows]
+        patches = [id(patch) for patch in self._skin.patches]
+        return ref(self._robot), patches, rows, self._model_error, self._weights, sets
 
     def after(self, lost: Sequence[int]) -> core.StandIn | None:
         """Of lost sensors (indices); None where nothing that is left feels anything."""
@@ -77,7 +101,7 @@ class StandIns:
         measured = any(joint.measured for joint in rest.description.joints)
         if not rest.sensor_names and not measured:
             return None
-        rough = make_thresholds(rest, self._period)
+        rough = make_thresholds(rest, self._weights[0])
         own = expect_drift(rest, rough, self._model_error, self._drift)
         skin = self._skin.on(rest)
         segments = [_segment_in(robot, rest, name, lost) for name in rest.segment_names]
@@ -85,7 +109,7 @@ class StandIns:
         rows = [at.get(_key(rest, row), -1) for row in own.rows]
         sensors = [robot.sensor_names.index(name) for name in rest.sensor_names]
         watch = [_watch(robot, rest, own, skin, name) for name in robot.segment_names]
-        native = self._make(rest, own, skin)
+        native = native_robot(rest, own, skin, *self._weights)
         return core.StandIn(list(lost), native, sensors, segments, rows, watch)
 
     def _drift(self, rest: Robot, error: float) -> tuple[Array, Array]:
