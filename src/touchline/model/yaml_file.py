@@ -17,10 +17,32 @@ MAP_TAG = "tag:yaml.org,2002:map"
 DEEPEST = 50  # mappings and lists within each other; a description has five
 
 
+class TooDeepError(ValueError):
+    """More than `DEEPEST` mappings and lists stand within each other; begins with line, column."""
+
+    def __init__(self, mark: yaml.Mark) -> None:
+        super().__init__(
+            f"{mark.line + 1}:{mark.column + 1}: more than {DEEPEST} mappings and lists "
+            "stand within each other"
+        )
+
+
 class Yaml12Loader(yaml.SafeLoader):
     """A safe loader with the scalar rules of YAML 1.2's core schema (and merge keys)."""
 
     yaml_implicit_resolvers: dict[str, list[Any]] = {}
+    depth = 0  # mappings and lists around what is read
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        """Refuse what the readers, which call themselves for each level, could not get through."""
+        if not self.check_event(yaml.CollectionStartEvent):
+            return super().compose_node(parent, index)
+        self.depth += 1
+        if self.depth > DEEPEST:
+            raise TooDeepError(self.peek_event().start_mark)
+        node = super().compose_node(parent, index)
+        self.depth -= 1
+        return node
 
 
 def _construct_int(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int | float:
@@ -67,7 +89,6 @@ def read_yaml(path: Path) -> dict[Any, Any]:
     """
     text = read_text(path)
     try:
-        _check_depth(text, path)
         loader = Yaml12Loader(text)
         node = loader.get_single_node()
         if node is None:
@@ -76,27 +97,13 @@ def read_yaml(path: Path) -> dict[Any, Any]:
         if repeated:
             raise InputError(repeated)
         data = loader.construct_document(node)
+    except TooDeepError as error:
+        raise InputError(f"{path}:{error}") from None
     except yaml.YAMLError as error:
         raise InputError(_syntax_problem(path, error)) from None
     if not isinstance(data, dict):
         raise InputError(f"{path}: the file holds {kind_of(data)}, not a mapping of keys")
     return data
-
-
-def _check_depth(text: str, path: Path) -> None:
-    """Refuse what the readers, which call themselves for each level, could not get through."""
-    depth = 0
-    for event in yaml.parse(text, Loader=Yaml12Loader):
-        if isinstance(event, yaml.CollectionStartEvent):
-            depth += 1
-        elif isinstance(event, yaml.CollectionEndEvent):
-            depth -= 1
-        if depth > DEEPEST:
-            mark = event.start_mark
-            raise InputError(
-                f"{path}:{mark.line + 1}:{mark.column + 1}: more than {DEEPEST} mappings and lists "
-                "stand within each other"
-            )
 
 
 def read_text(path: Path) -> str:
