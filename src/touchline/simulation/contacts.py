@@ -184,11 +184,22 @@ class ScriptedForces(Forces):
 
     def __init__(self, contacts: Sequence[ScriptedContact]) -> None:
         self.contacts = tuple(contacts)
+        self._spans = [(contact.profile.start, contact.profile.end) for contact in self.contacts]
         super().__init__([no_touch(contact.link) for contact in self.contacts])
+
+    def apply(self, plant: Plant) -> bool:
+        """Sets the forces of the plant's present time; to be called after `evaluate`."""
+        time = plant.time
+        if not self._arms and not any(start <= time < end for start, end in self._spans):
+            return False  # as most of the time
+        return super().apply(plant)
 
     def acting(self, slot: int, plant: Plant) -> Touch | None:
         """The contact of a slot while its profile is not over."""
-        strength = self.contacts[slot].profile.at(plant.time)
+        time, (start, end) = plant.time, self._spans[slot]
+        if not start <= time < end:
+            return None
+        strength = self.contacts[slot].profile.at(time)
         return _touch(self.contacts[slot], strength, plant) if strength > 0.0 else None
 
 

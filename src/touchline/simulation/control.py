@@ -3,7 +3,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,8 +12,7 @@ from touchline.arrays import Array
 from touchline.simulation.plant import Plant, steady_share
 
 
-@dataclass(frozen=True)
-class Setpoint:
+class Setpoint(NamedTuple):  # made at each step of the physics: a dataclass takes longer
     """Desired positions, velocities and accelerations, (n,) each [rad, rad/s, rad/s2]."""
 
     q: Array
@@ -106,10 +105,12 @@ def sinusoids(
 ) -> Trajectory:
     """`center + amplitude sin(frequency t + phase)`, all (n,) [rad, rad/s]."""
     c, a, w, p = (np.asarray(x, float) for x in (center, amplitude, frequency, phase))
+    velocity, acceleration = a * w, -a * w**2
 
     def at(time: float) -> Setpoint:
-        s, co = np.sin(w * time + p), np.cos(w * time + p)
-        return Setpoint(c + a * s, a * w * co, -a * w**2 * s)
+        angle = w * time + p
+        s = np.sin(angle)
+        return Setpoint(c + a * s, velocity * np.cos(angle), acceleration * s)
 
     return at
 

@@ -8,8 +8,7 @@ before and after an input has changed.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,8 +23,7 @@ HOLDING_FREQUENCY = 25.0  # rad/s of a joint on springs of its own
 FASTEST_DECAY = 1.5  # of a damper, per step; Runge-Kutta's limit is 2.8, of a held torque 2
 
 
-@dataclass(frozen=True)
-class Reading:
+class Reading(NamedTuple):  # made twice a sample: a dataclass takes longer
     """What ideal sensors read at one instant.
 
     Attributes:
@@ -74,11 +72,16 @@ class Plant:
         self.data = self._mj.MjData(self.model)
         self._dofs = np.array([built.joints[j.name] for j in joints], dtype=int)
         self._set_couplings(built.joints)
+        self._moved_bodies = self.model.dof_bodyid[self._robot_dofs]
+        self._no_torque = np.zeros(len(joints))
+        self._no_torque.setflags(write=False)
+        self._from_inputs = int(self._mj.mjtStage.mjSTAGE_VEL)
         self._site_ids = [self.model.site(f"sensor:{s}").id for s in robot.sensor_names]
         self._shows_motion = any(j.compensated == "model" for j in joints)
         moved = any(j.torque == "motor" for j in joints)
         self._friction = _Friction(robot) if moved else None
         self._motor_torque = np.zeros(len(joints))
+        self._told = self._motor_torque.tolist()  # the same; lists of few numbers compare faster
         self._own_mass: dict[int, float] = {}
 
     def _set_couplings(self, joints: Mapping[str, int]) -> None:
@@ -118,6 +121,7 @@ class Plant:
         if qd is not None:
             self.data.qvel[self._robot_dofs] = self._P @ qd
         self._motor_torque[:] = 0.0
+        self._told = self._motor_torque.tolist()
 
     def evaluate(self) -> None:
         """Computes what depends on positions and velocities alone."""
@@ -130,10 +134,12 @@ class Plant:
         Returns:
             Whether anything has changed.
         """
-        if self._friction is None and np.array_equal(torque, self._motor_torque):
+        told = torque.tolist()
+        if self._friction is None and told == self._told:
             return False
-        self._motor_torque[:] = torque
-        self.data.qfrc_applied[self._dofs] = torque - self.friction_torque()
+        self._motor_torque[:], self._told = torque, told
+        applied = torque if self._friction is None else torque - self.friction_torque()
+        self.data.qfrc_applied[self._dofs] = applied
         return True
 
     def hold(
@@ -171,9 +177,7 @@ class Plant:
 
     def accelerate(self) -> None:
         """Computes accelerations and contact forces for the inputs that are set."""
-        self._mj.mj_fwdActuation(self.model, self.data)
-        self._mj.mj_fwdAcceleration(self.model, self.data)
-        self._mj.mj_fwdConstraint(self.model, self.data)
+        self._mj.mj_forwardSkip(self.model, self.data, self._from_inputs, 1)
 
     def integrate(self) -> None:
         """Moves on by one step; to be called after `accelerate`."""
@@ -190,11 +194,11 @@ class Plant:
         self._mj.mj_rnePostConstraint(m, d)
         self._mj.mj_sensorAcc(m, d)
         # Both are about the same point, so the product is the power of the transmitted wrench.
-        wrenches = d.cfrc_int[m.dof_bodyid[self._robot_dofs]]
-        transmitted = np.einsum("ij,ij->i", d.cdof[self._robot_dofs], wrenches)
+        wrenches = d.cfrc_int.take(self._moved_bodies, 0)
+        transmitted = np.einsum("ij,ij->i", d.cdof.take(self._robot_dofs, 0), wrenches)
         k = len(self._site_ids)
         return Reading(
-            self._P.T @ transmitted,
+            transmitted if self.plain else self._P.T @ transmitted,
             self._motor_torque + d.qfrc_passive[self._dofs],
             d.sensordata[: 6 * k].reshape(k, 6).copy(),
             d.qacc[self._dofs],
@@ -225,7 +229,7 @@ class Plant:
     def friction_torque(self) -> Array:
         """Torque (n,) that the drives' friction takes from the motors at the state [Nm or N]."""
         if self._friction is None:
-            return np.zeros(len(self._dofs))
+            return self._no_torque
         return self._friction.of_drives(self.qd)
 
     def gravity_torque(self) -> Array:

@@ -9,6 +9,8 @@ import numpy as np
 from touchline.arrays import Array
 from touchline.simulation.plant import Plant, Reading
 
+HALF = np.array(0.5)  # an array, since numpy converts a number each time
+
 
 @dataclass(frozen=True)
 class Readings:
@@ -67,14 +69,21 @@ class Readings:
         """Stores the mean of two readings of the plant's present state."""
         self.time[row] = round(plant.time * plant.rate) / plant.rate
         self.q[row], self.qd[row] = plant.q, plant.qd
-        self.link_torque[row] = (before.link_torque + after.link_torque) / 2
-        self.motor_torque[row] = (before.motor_torque + after.motor_torque) / 2
-        self.wrench[row] = (before.wrench + after.wrench) / 2
-        if self.acceleration is not None:
-            self.acceleration[row] = (before.acceleration + after.acceleration) / 2
-        room, first, second = self.motion_torque, before.motion_torque, after.motion_torque
-        if room is not None and first is not None and second is not None:
-            room[row] = (first + second) / 2
+        rooms = (
+            self.link_torque,
+            self.motor_torque,
+            self.wrench,
+            self.acceleration,
+            self.motion_torque,
+        )
+        for room, first, second in zip(rooms, before, after, strict=True):
+            if room is None or first is None or second is None:
+                continue
+            if first is second:
+                room[row] = first
+            else:
+                mean = np.add(first, second, room[row])
+                np.multiply(mean, HALF, mean)
         if self.gravity_torque is not None:
             self.gravity_torque[row] = plant.gravity_torque()
         if self.weight is not None:

@@ -146,6 +146,8 @@ class _Stepper:
         self.truth.make_room(rows)
 
     def _touches(self) -> list[Touch]:
+        if len(self._contacts) == 1:
+            return self._contacts[0].touches(self._plant)
         return [touch for contact in self._contacts for touch in contact.touches(self._plant)]
 
     def end_step(self, row: int) -> None:

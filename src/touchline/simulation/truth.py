@@ -102,6 +102,7 @@ class TruthRecorder:
     def _clear(self) -> None:
         self._sum = np.zeros((self._slots, 6))
         self._touched = [-1] * self._slots
+        self._any = False
 
     def add(self, touches: list[Touch]) -> None:
         """What acts at either end of a physics step counts half."""
@@ -109,11 +110,13 @@ class TruthRecorder:
             if touch.active:
                 self._sum[slot] += self._weight * touch.wrench()
                 self._touched[slot] = self._index[touch.link]
+                self._any = True
 
     def close(self, row: int) -> None:
         """Stores the means up to a sample; to be called before anything of the next is added."""
-        self.truth.wrench_mean[row], self.truth.link_mean[row] = self._sum, self._touched
-        self._clear()
+        if self._any:  # else there is nothing but what the room was made with
+            self.truth.wrench_mean[row], self.truth.link_mean[row] = self._sum, self._touched
+            self._clear()
 
     def put(self, row: int, before: list[Touch], after: list[Touch]) -> None:
         """Stores a sample: the mean of just before and just after the inputs have changed."""
