@@ -5,6 +5,7 @@ MuJoCo collides the convex hull of a mesh, and its rays meet the triangles thems
 """
 
 from collections.abc import Iterable, Mapping
+from hashlib import sha256
 from importlib import import_module
 from typing import Any
 
@@ -17,7 +18,10 @@ from touchline.simulation.mujoco_model import Addition, quaternion
 
 PIECES = 20  # of a link at most
 MIN_TRIANGLES = 4
+KEPT = 64  # links whose pieces are kept for the next scene
 ROBOT, OTHER = 1, 2  # who collides: robot with others, never among themselves
+
+_cut_before: dict[tuple[bytes, int], list[Array]] = {}  # by triangles and number at most
 
 
 def surfaces_for_rays(surfaces: Mapping[str, Surface]) -> Addition:
@@ -138,7 +142,19 @@ def convex_pieces(surface: Surface, pieces: int = PIECES) -> list[Array]:
         surface: of a link.
         pieces: at most.
     """
-    parts = [_Part(surface.vertices[surface.faces])]
+    triangles = surface.vertices[surface.faces]
+    key = sha256(triangles.tobytes()).digest(), pieces
+    if key in _cut_before:
+        return list(_cut_before[key])
+    found = _cut_before[key] = _cut(triangles, pieces)
+    if len(_cut_before) > KEPT:
+        del _cut_before[next(iter(_cut_before))]
+    return list(found)
+
+
+def _cut(triangles: Array, pieces: int) -> list[Array]:
+    """As `convex_pieces`, which takes about a second for a link, so that the last ones are kept."""
+    parts = [_Part(triangles)]
     enough = 2e-3 * parts[0].volume
     while len(parts) < pieces:
         best = max(parts, key=lambda part: part.gain)
