@@ -19,7 +19,7 @@ import numpy as np
 from touchline.arrays import Array, Mask
 from touchline.model.mechanism import Inertia
 from touchline.model.robot import Robot
-from touchline.observer.dynamics import Posture, posture
+from touchline.observer.dynamics import Posture, cross, posture
 
 PARAMETERS = 10  # of one body: m, hx, hy, hz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz
 _INERTIA_AT = ((0, 1, 2), (1, 3, 4), (2, 4, 5))  # which of the six stands where
@@ -152,12 +152,12 @@ def _unit_twist(placed: Posture, node: int, axis: int) -> Array:
     direction = placed.rotation[node][..., axis % 3]
     if axis < 3:
         return np.concatenate([direction, np.zeros_like(direction)], axis=-1)
-    return np.concatenate([np.cross(placed.origin[node], direction), direction], axis=-1)
+    return np.concatenate([cross(placed.origin[node], direction), direction], axis=-1)
 
 
 def _cross_motion(v: Array, S: Array) -> Array:
-    linear = np.cross(v[:, 3:], S[:, :3]) + np.cross(v[:, :3], S[:, 3:])
-    return np.concatenate([linear, np.cross(v[:, 3:], S[:, 3:])], axis=1)
+    linear = cross(v[:, 3:], S[:, :3]) + cross(v[:, :3], S[:, 3:])
+    return np.concatenate([linear, cross(v[:, 3:], S[:, 3:])], axis=1)
 
 
 def _body_terms(
@@ -167,14 +167,14 @@ def _body_terms(
     R, p = placed.rotation[node], placed.origin[node]
     count = len(twists[node])
     w = twists[node][:, 3:]
-    v = twists[node][:, :3] + np.cross(w, p)  # of the node's origin
+    v = twists[node][:, :3] + cross(w, p)  # of the node's origin
     w_body = np.einsum("nji,nj->ni", R, w)
     linear, angular = np.zeros((count, 3, PARAMETERS)), np.zeros((count, 3, PARAMETERS))
     linear[:, :, 0] = v
     for k in range(3):
         axis = R[:, :, k]
-        linear[:, :, 1 + k] = np.cross(w, axis)
-        angular[:, :, 1 + k] = np.cross(axis, v)
+        linear[:, :, 1 + k] = cross(w, axis)
+        angular[:, :, 1 + k] = cross(axis, v)
     for six in range(6):
         column = np.zeros((count, 3))
         for a in range(3):
@@ -186,7 +186,7 @@ def _body_terms(
     force, moment = np.zeros_like(linear), np.zeros_like(angular)
     force[:, :, 0] = g
     for k in range(3):
-        moment[:, :, 1 + k] = np.cross(R[:, :, k], g)
+        moment[:, :, 1 + k] = cross(R[:, :, k], g)
     return _about_world(p, linear, angular), _about_world(p, force, moment)
 
 

@@ -67,15 +67,17 @@ def mean(values: Array) -> Array:
 def smooth(inputs: Array, steps: Steps, start: Array | None = None) -> Array:
     """Filters inputs (N - 1, ...) from `start`; where an interval is not usable, anew from zero."""
     flat = inputs.reshape(len(inputs), -1)
-    out = np.empty_like(flat)
+    out, added = np.empty_like(flat), np.empty(flat.shape[1])
+    fresh = 1.0 - steps.keep
     value = np.zeros(flat.shape[1]) if start is None else start
-    for i in range(len(flat)):
+    for i, row in enumerate(out):
         if steps.usable[i]:
-            a = steps.keep[i]
-            value = a * value + (1.0 - a) * flat[i]
+            np.multiply(value, steps.keep[i], row)
+            np.multiply(flat[i], fresh[i], added)
+            row += added
         else:
-            value = np.zeros_like(value)
-        out[i] = value
+            row[:] = 0.0
+        value = row
     return out.reshape(inputs.shape)
 
 
