@@ -16,7 +16,8 @@ from touchline.simulation.noise import SensorNoise
 from touchline.simulation.scenario import scripted
 from touchline.simulation.scene import Run
 from touchline.trials.faults import FAULTS, channels_of, injected
-from touchline.trials.recordings import PUSHED, RELEASED, record, robot_named
+from touchline.trials.free_motion import FASTEST
+from touchline.trials.recordings import PUSHED, RELEASED, prescribed_pushes, record, robot_named
 from touchline.trials.scene import arm_and_skin
 from touchline.trials.touches import TouchSampler, resting_signals, touch_loads
 
@@ -354,3 +355,19 @@ def test_a_sudden_push_that_only_one_axis_shows_at_first_is_a_sure_place():
         assert contact.status == "located" and contact.body == touch.patch.body
         right += np.linalg.norm(contact.position - touch.position) < 0.0225
     assert right >= 3
+
+
+@pytest.mark.parametrize(("seed", "seconds"), [(3114, 14.0), (4105, 60.0)])
+def test_what_a_model_errs_by_in_fast_motion_is_no_fault(arm, seed, seconds):
+    _, pipeline, _ = arm
+    samples, _ = prescribed_pushes(pipeline.robot, seed, seconds, FASTEST)
+    _, faults, _ = heard(pipeline, samples)
+    assert faults == []
+
+
+def test_a_push_along_a_force_of_the_base_sensor_of_a_fast_arm_is_no_fault(arm):
+    # The axis carries 330 N, and the arm's motion changes that by as much as the push.
+    _, pipeline, _ = arm
+    samples, _ = prescribed_pushes(pipeline.robot, 3119, 30.0, FASTEST)
+    _, faults, _ = heard(pipeline, samples)
+    assert faults == []

@@ -37,6 +37,7 @@ class SuspectWatch {
         read_(last_),
         lately_(last_),
         stepped_(last_.size(), 0.0),
+        usual_(stepped_),
         first_(last_.size()),
         rises_(at_.count(), 0),
         innermost_(at_.sensors, 1) {
@@ -117,9 +118,12 @@ class SuspectWatch {
   static constexpr double kOut = 2.0;     // [s] for which it tells nothing after that
   static constexpr double kDwell = 0.02;  // [s] for which it explains all: a contact rises to more
   // Of what a channel carries, and of what that has changed by of late: an error of less is no wrong scale,
-  // and what a model errs by in motion. It has to last for longer [s]. Half of the part: a model that is
-  // 5 % off is told as a fault. Double: so may half a torque be, which is told later.
-  static constexpr double kLittle = 0.3, kLittleLasts = 0.5;
+  // and what a model errs by in motion. Unless it came at once it has to last for longer [s]. Half of the
+  // part: a model that is 5 % off is told as a fault. Double: so may half a torque be, which is told later.
+  static constexpr double kLittle = 0.3, kLittleLasts = 0.2;
+  // Of the mean step: of 5,000 steps of white noise the largest is 5.4. Half: noise comes at once. Double:
+  // biases of some thresholds come slowly.
+  static constexpr double kUnusual = 8.0;
   // [s] of what may be a push, too. Biases and drifts are all that is wrong by more than a multiple: of
   // the two seconds in which these are to be told it leaves a tenth. Half: leaning on the first link for
   // a second is told as a fault.
@@ -147,7 +151,9 @@ class SuspectWatch {
     read_[i] = first ? now : read_[i] + follows * (now - read_[i]);
     if (first) lately_[i] = now;
     else if (rises_[at_.tau() + i] == 0) lately_[i] += forgets * (now - lately_[i]);
-    if (!first) stepped_[i] = std::max(std::fabs(now - last_[i]), (1.0 - forgets) * stepped_[i]);
+    const double step = first ? 0.0 : std::fabs(now - last_[i]);
+    stepped_[i] = std::max(step, (1.0 - forgets) * stepped_[i]);
+    usual_[i] += forgets * (step - usual_[i]);
     last_[i] = now;
   }
 
@@ -156,6 +162,7 @@ class SuspectWatch {
     const std::size_t i = suspect.channel - at_.tau();
     if (i >= at_.joints && sensors_[(i - at_.joints) / 6].gravity_compensated) return false;
     const double size = std::fabs(suspect.error), carried = read_[i] + suspect.error;
+    if (stepped_[i] >= std::max(kAtOnce * size, kUnusual * usual_[i])) return false;
     return size < kLittle * std::min(std::fabs(carried), std::fabs(carried - lately_[i]));
   }
 
@@ -202,16 +209,15 @@ class SuspectWatch {
 
   ChannelLayout at_;
   std::vector<double> contact_;  // per channel: threshold of a contact [N, Nm]
-  std::vector<char> now_, told_, beyond_;
-  std::vector<char> little_;  // per channel: see `kLittle`
+  std::vector<char> now_, told_, beyond_, little_;
   bool any_ = false;
   std::vector<double> since_, seen_, until_;  // [s]
   std::vector<JointRow> joints_;
   std::vector<SensorRow> sensors_;
-  // Per torque and axis: its last reading, readings as the filters have them, their mean of late, but for what has
-  // risen, and their largest step of late [N, Nm].
-  std::vector<double> last_, read_, lately_, stepped_;
-  std::vector<First> first_;
+  // Per torque and axis: its last reading, readings as the filters have them, their mean of late, but for
+  // what has risen, and their largest and mean steps of late [N, Nm].
+  std::vector<double> last_, read_, lately_, stepped_, usual_;
+  std::vector<First> first_;  // per torque and axis
   std::vector<char> rises_;      // per channel: has it risen while it was suspected, see `has_risen`
   std::vector<char> innermost_;  // per sensor: has it none inboard?
   double time_ = std::numeric_limits<double>::quiet_NaN();  // [s]
