@@ -118,7 +118,9 @@ def made_up(tmp_path, monkeypatch):
     monkeypatch.setattr(real, "touched_files", lambda data: [tmp_path / name for name in read])
     monkeypatch.setattr(real, "read_touched", lambda path, folder: read[path.name])
     monkeypatch.setattr(real, "read_free", lambda data, folder: [recording(spans())])
-    monkeypatch.setattr(real, "at_rate", lambda found, rate: replace(found, period=1.0 / rate))
+    monkeypatch.setattr(
+        real, "at_rate", lambda found, rate, later=0.0: replace(found, period=(1.0 + later) / rate)
+    )
 
     def events_of(found):
         told = {5: [event(1.0, 1.5, link5=0.95), event(3.0, 3.5, link4=0.95)], 4: []}
@@ -135,7 +137,7 @@ def test_touched_and_free_recordings_are_printed(made_up, capsys):
     whole, thin, free = told.split("The same at 15 Hz")
     assert "found 66.7 % (2 of 3); of these: right link 50.0 % (1 of 2)" in whole
     assert "above 0.9 wrong 50.0 % (1 of 2)" in whole
-    assert "found 33.3 % (1 of 3)" in thin and "of those found before: 1 of 2" in thin
+    assert "found 33.3 % (1 of 3)" in thin and "of a period: 1, 2, 2, 2, of 2 found" in thin
     for text in (thin, free):  # motion in which nothing touches, at the full rate and at this one
         assert text.rstrip().splitlines()[-1].split()[-3:] == ["s", "1", "yes"]
 
@@ -182,6 +184,8 @@ def test_a_lower_rate_keeps_samples_of_even_instants():
     np.testing.assert_allclose(slow.samples.time, 5.0 + np.arange(30) / 15.0, atol=0.005)
     assert np.isin(slow.samples.time, time).all()
     np.testing.assert_array_equal(slow.samples.q[:, 0], slow.samples.time)
+    between = at_rate(Recording("r", robot, samples, 0.005, spans((1, 2)), 7), 15.0, 0.5)
+    np.testing.assert_allclose(between.samples.time, slow.samples.time + 0.5 / 15.0, atol=0.01)
 
 
 def test_a_recording_has_no_say_in_what_it_is_judged_with():

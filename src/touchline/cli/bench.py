@@ -224,7 +224,8 @@ def real(
         data: Folder with the recordings: panda_touches, panda_touches_more, panda_ur10_rosbag2,
             kuka_lwr4, kinova_gen3; those that are missing are left out. The
             models of the Panda and the UR10 come with the package example-robot-data.
-        rate: Looks at all recordings once more as if recorded at this rate [Hz].
+        rate: Looks at all recordings once more as if recorded at this rate [Hz], and counts the
+            touches found at three other sampling instants.
         leave_one_out: For each touched recording, chooses three tuning numbers on all others, and
             prints what holds on the one left out.
         calibrate: For each touched recording, calibrates on what is untouched of all others, and

@@ -110,10 +110,16 @@ def read_free(data: Path, scratch: Path) -> list[Recording]:
     return found
 
 
-def at_rate(recording: Recording, rate: float) -> Recording:
-    """As if it had been recorded at a lower rate [Hz]: the first sample from each instant on."""
+def at_rate(recording: Recording, rate: float, later: float = 0.0) -> Recording:
+    """As if it had been recorded at a lower rate [Hz]: the first sample from each instant on.
+
+    Args:
+        recording: at its own rate.
+        rate: the lower one [Hz].
+        later: part of a period by which the first instant is later than the first sample.
+    """
     s = recording.samples
-    instants = np.arange(s.time[0], s.time[-1], 1.0 / rate)
+    instants = np.arange(s.time[0] + later / rate, s.time[-1], 1.0 / rate)
     kept = np.zeros(len(s), bool)
     kept[np.searchsorted(s.time, instants)] = True
     return replace(recording, samples=s.where(kept), period=1.0 / rate)

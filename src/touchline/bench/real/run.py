@@ -42,6 +42,7 @@ TOUCHED_HEAD = (
     "above 0.9",
     "wrong",
 )
+LATER = (0.25, 0.5, 0.75)  # of a period: other instants at which slow samples are taken
 FREE_HEAD = ("recording", "s", "in contact", "longest", "events", "to the end")
 
 
@@ -89,8 +90,13 @@ def main(
         if files and rate is not None:
             slow = [_judged(path, folder, rate) for path in files]
             print(_touched_text(f"The same at {rate:g} Hz", slow))
-            before, found = (sum(c.found for _, _, c in all_of) for all_of in (whole, slow))
-            print(f"touches found at {rate:g} Hz of those found before: {found} of {before}\n")
+            others = [[_judged(path, folder, rate, later) for path in files] for later in LATER]
+            found = [sum(c.found for _, _, c in judged) for judged in (slow, *others)]
+            before = sum(c.found for _, _, c in whole)
+            print(
+                f"touches found at {rate:g} Hz, sampled at {len(found)} instants of a period: "
+                f"{', '.join(map(str, found))}, of {before} found before\n"
+            )
         if free:
             print(_free_text("Motion in which nothing touches", free))
         if free and rate is not None:
@@ -114,10 +120,12 @@ def _left_out(files: list[Path], folder: Path) -> str:
     return f"{text}\n{aligned(rows, text_columns=(0, 1))}"
 
 
-def _judged(path: Path, folder: Path, rate: float | None = None) -> tuple[str, int, Touched]:
+def _judged(
+    path: Path, folder: Path, rate: float | None = None, later: float = 0.0
+) -> tuple[str, int, Touched]:
     recording = read_touched(path, folder)
     if rate is not None:
-        recording = at_rate(recording, rate)
+        recording = at_rate(recording, rate, later)
     return recording.name, recording.link, judge_touched(recording, events_of(recording))
 
 
