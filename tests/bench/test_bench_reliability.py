@@ -226,6 +226,18 @@ def test_of_fast_motion_reports_are_counted_without_a_goal(listened):
     assert line.split()[-2:] == ["none", "9"]
 
 
+def test_of_what_was_not_run_nothing_is_said_to_be_missed():
+    text, missed = tables([], [Health("prescribed", 10.0, 9, ("sara: tau.joint1 suspect",))])
+    told = "false reports in 10.00 h of prescribed motion, 9 pushes 1 in 10 h 1"
+    assert [" ".join(line.split()) for line in text.splitlines()] == [
+        "figure goal here",
+        told,
+        "",
+        "sara: tau.joint1 suspect",
+    ]
+    assert not missed
+
+
 @pytest.mark.parametrize("name", ["sara", "panda"])
 def test_each_push_of_a_prescribed_motion_is_felt_when_it_is_there(name):
     robot = robot_named(name)

@@ -141,8 +141,10 @@ def tables(found: list[Outcome], healthy: Sequence[Health]) -> tuple[str, bool]:
     goals = _goals(found, healthy, untold)
     rows: list[Row] = [("figure", "goal", "here", "")]
     rows += [(what, goal, here, "" if met else "missed") for what, goal, here, met in goals]
-    lines = [aligned(rows, (0, 3)), "", aligned(_by_fault(found))]
-    lines += ["", *_layouts(untold), "", aligned(_missed(found, untold), (0, 1, 2, 4))]
+    lines = [aligned(rows, (0, 3))]
+    if found:
+        lines += ["", aligned(_by_fault(found)), "", *_layouts(untold)]
+        lines += ["", aligned(_missed(found, untold), (0, 1, 2, 4))]
     reports = [line for motion in healthy for line in motion.reports]
     lines += ["", *reports[:20]] if reports else []
     return "\n".join(lines), not all(met for *_, met in goals)
@@ -175,11 +177,15 @@ def _goals(
     healthy: Sequence[Health],
     untold: dict[str, tuple[str, ...]],
 ) -> list[tuple[str, str, str, bool]]:
-    count = max(len(found), 1)
+    """Figures, their goals, what is here, and whether that meets them; of what was run."""
+    of_faults = _fault_goals(found, untold) if found else []
+    return [*of_faults, *_healthy_goals(healthy), *_recovery_goals(found)]
 
-    def share(test: Callable[[Outcome], bool]) -> float:
-        return sum(map(test, found)) / count
 
+def _fault_goals(
+    found: list[Outcome], untold: dict[str, tuple[str, ...]]
+) -> list[tuple[str, str, str, bool]]:
+    count = len(found)
     crashes = sum(bool(o.crash) or not o.finite for o in found)
     goals = [(f"{count} runs: crash, exception, not finite", "0", str(crashes), crashes == 0)]
     groups: dict[str, list[Outcome]] = defaultdict(list)
@@ -187,19 +193,24 @@ def _goals(
     for o in found:
         (beyond if _is_untold(o, untold) else groups)[o.fault.group].append(o)
     for group in dict.fromkeys(fault.group for fault in FAULTS):
-        part = groups[group]
-        told = sum(o.told_in_time for o in part) / max(len(part), 1)
-        goal = 1.0 if group.startswith("absent") else TOLD
-        what = f"told in time or harmless: {group}"
-        goals.append((what, f"{100 * goal:.0f} %", f"{100 * told:.1f} %", told >= goal))
+        if part := groups[group]:
+            told = sum(o.told_in_time for o in part) / len(part)
+            goal = 1.0 if group.startswith("absent") else TOLD
+            what = f"told in time or harmless: {group}"
+            goals.append((what, f"{100 * goal:.0f} %", f"{100 * told:.1f} %", told >= goal))
         if part := beyond[group]:
             told = sum(o.told_in_time for o in part) / len(part)
             what = f"  and in {len(part)} runs that the layout cannot tell"
             goals.append((what, "none", f"{100 * told:.1f} %", True))
     collisions = sum(o.collisions > 0 for o in found)
     goals.append(("runs with a phantom collision", "0", str(collisions), collisions == 0))
-    wrong = share(lambda o: o.wrong > 0)
+    wrong = sum(o.wrong > 0 for o in found) / count
     goals.append(("runs with a sure, wrong link", "0.5 %", f"{100 * wrong:.2f} %", wrong <= WRONG))
+    return goals
+
+
+def _healthy_goals(healthy: Sequence[Health]) -> list[tuple[str, str, str, bool]]:
+    goals = []
     for motion in healthy:
         if not motion.hours:
             continue
@@ -208,9 +219,14 @@ def _goals(
         what = f"false reports in {span}, {motion.pushes} pushes"
         fast = motion.what == "fast"
         goals.append((what, "none" if fast else "1 in 10 h", str(false), fast or met))
+    return goals
+
+
+def _recovery_goals(found: list[Outcome]) -> list[tuple[str, str, str, bool]]:
     quick = [o.recovery for o in found if o.fault.group.startswith(("spike", "stuck", "absent"))]
-    for what, part in (("median", 0.5), ("90 %", 0.9)):
-        late = float(np.quantile(quick, part)) if quick else 0.0
+    goals = []
+    for what, part in (("median", 0.5), ("90 %", 0.9)) if quick else ():
+        late = float(np.quantile(quick, part))
         name = f"recovery after the fault, {what}"
         goals.append((name, "50 ms", f"{1e3 * late:.0f} ms", late <= RECOVERED))
     return goals
