@@ -345,7 +345,8 @@ what is estimated where a sensor inboard contradicts it.
 A push does so where it passes near a sensor's axis. But a wrong sign, scale or delay is wrong by no
 more than a few times what the channel carries. An axis that is wrong by more, where a contact
 explains all as well, is told after 1.8 s; two axes that do not differ as swapped ones do, too.
-So a push that is told as a fault is one along an axis that carries about as much. Where a push lets
+So a push that is told as a fault is one along an axis that carries about as much. An error of less
+than 0.3 of what a channel carries may be the model's. It has to last for 0.2 s. Where a push lets
 go errors of the model alone are left. There a channel is told only if it is wrong by more than the
 threshold of a contact. For two seconds a channel that is told does not count.
 
