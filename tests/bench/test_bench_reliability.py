@@ -11,6 +11,7 @@ from touchline.bench.reliability.campaign import Kept, Part, run_all
 from touchline.bench.reliability.judge import judge, listen
 from touchline.bench.reliability.run import Health, Plan, healthy_motion, tables, untold_channels
 from touchline.check.parity import parity_of
+from touchline.cli import main
 from touchline.errors import InputError
 from touchline.simulation.contacts import Profile, ScriptedContact
 from touchline.simulation.noise import SensorNoise
@@ -312,3 +313,8 @@ def test_runs_of_another_build_are_refused(tmp_path):
     (tmp_path / "build.txt").write_text("0123456789abcdef\n")
     with pytest.raises(InputError, match="another build"):
         Kept(tmp_path)
+
+
+def test_more_than_all_cases_are_refused(capsys):
+    assert main(["bench", "reliability", "--share", "2"]) == 2
+    assert "--share 2: must be at most 1" in capsys.readouterr().err

@@ -55,20 +55,11 @@ def departures(
 def middle(values: Array) -> Array:
     """Median over the first axis of what is known; NaN where nothing is."""
     if np.isfinite(values).all() and len(values):
-        return _median(values)
+        return np.median(values, axis=0)
     out = np.full(values.shape[1:], np.nan)
     some = np.isfinite(values).any(axis=0)
     out[some] = np.nanmedian(values[:, some], axis=0)
     return out
-
-
-def _median(values: Array) -> Array:
-    """As `np.median` over the first axis of finite numbers; that looks for others, too."""
-    half, odd = divmod(len(values), 2)
-    if odd:
-        return np.partition(values, half, axis=0)[half]
-    part = np.partition(values, (half - 1, half), axis=0)
-    return (part[half - 1] + part[half]) / 2
 
 
 def total_misfit(robot: Robot, windows: Windows, measured: list[int]) -> float:

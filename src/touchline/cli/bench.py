@@ -591,10 +591,13 @@ def reliability(
         first: The first seed.
     """
     from touchline.bench.reliability.run import Plan, main
+    from touchline.errors import InputError
     from touchline.numbers import check_least
 
     check_least(1, seeds=seeds, processes=processes)
     check_least(0, share=share, healthy=healthy, hours=hours, first=first)
+    if share > 1.0:
+        raise InputError(f"--share {share:g}: must be at most 1, which takes all cases")
     return main(Plan(seeds, share, healthy, hours, keep, processes, first), page)
 
 
