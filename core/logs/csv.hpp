@@ -45,7 +45,8 @@ inline bool is_null(std::string_view cell) {
 }
 
 inline bool read_number(std::string_view cell, double* value) {
-  const char *start = cell.data(), *end = start + cell.size();
+  const std::size_t size = cell.size();
+  const char *start = cell.data(), *end = start + size;
   if (start != end && *start == '+') ++start;
   const auto [last, error] = std::from_chars(start, end, *value);
   if (last == end && error == std::errc()) return true;
@@ -60,7 +61,7 @@ inline bool read_number(std::string_view cell, double* value) {
     *value = std::numeric_limits<double>::quiet_NaN();
     return true;
   }
-  if (cell.data() == start && cell.size() == static_cast<std::size_t>(end - start)) return false;
+  if (cell.size() == size) return false;  // nothing was taken off
   return cell.front() != '"' && read_number(cell, value);
 }
 

@@ -390,6 +390,26 @@ def test_a_packed_bag_that_is_damaged_is_read_as_far_as_it_goes(tmp_path):
     np.testing.assert_array_equal(part.q, whole.q[: len(part.time)])
 
 
+def test_messages_that_a_damaged_index_does_not_lead_to_are_told(tmp_path):
+    messages = recording()
+    folder = write_bag(tmp_path / "bag", messages)
+    file = storage_file(folder, "db3")
+    with sqlite3.connect(file) as table:
+        (stamp,) = table.execute("SELECT timestamp FROM messages WHERE id = 300").fetchone()
+    table.close()
+    data = bytearray(file.read_bytes())
+    # A record of the index: the size of its head, the kinds of its two numbers (eight bytes, two),
+    # then the time.
+    at = data.index(bytes([3, 6, 2]) + stamp.to_bytes(8, "big"))
+    data[at + 1] = 0  # no time, as it is read now
+    file.write_bytes(data)
+    with open_log(folder, describe()) as log:
+        (part,) = log.chunks()
+        assert any("its index is damaged; 1 messages" in text for text in log.warnings)
+    whole = read_log(write_bag(tmp_path / "plain", messages), describe())
+    assert abs(len(part.time) - len(whole.time)) <= 1
+
+
 def test_a_packed_file_that_is_none_is_told(tmp_path):
     folder = write_bag(tmp_path / "bag", recording(1.0), packed="FILE")
     (file,) = folder.glob("*.zstd")

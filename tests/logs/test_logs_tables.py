@@ -168,6 +168,14 @@ def test_cell_that_is_no_number(tmp_path, ending, row):
     assert f"row {row} (line {row + 2}), column 'tau.j2': '1.2.3' is not a number" in text
 
 
+@pytest.mark.parametrize("cell", ["+", "+x", "++1", '"+x"', " +"])
+def test_a_sign_alone_is_no_number(tmp_path, cell):
+    lines = rows(10)
+    lines[3] = lines[3].rsplit(",", 1)[0] + "," + cell
+    text = problems(write_csv(tmp_path / "log.csv", *lines))
+    assert "row 3 (line 5), column 'tau.j2'" in text and "is not a number" in text
+
+
 def test_ragged_row(tmp_path):
     lines = rows(10)
     lines[4] = lines[4] + ",7"

@@ -193,6 +193,11 @@ class Bag:
                 )
         elif isinstance(file, SqliteFile) and file.odd:
             self._warn(f"{file.path}: {file.odd} rows are no messages and are left out")
+        if isinstance(file, SqliteFile) and file.lost:
+            self._warn(
+                f"{file.path}: its index is damaged; {file.lost} messages that it does not lead to "
+                "are left out"
+            )
 
     def _warn(self, text: str) -> None:
         if text not in self.warnings:

@@ -29,6 +29,7 @@ class SqliteFile:
         first: time of the first message received [ns], and `last` of the last.
         damage: what was wrong when it was opened, or None.
         odd: rows that are no messages, in the last call of `messages`.
+        lost: messages that its index does not lead to, likewise.
         done: fraction of the messages that the last call of `messages` has handed out.
     """
 
@@ -40,7 +41,7 @@ class SqliteFile:
         """
         self.path = path
         self.damage: str | None = None
-        self.odd, self.done = 0, 0.0
+        self.odd, self.lost, self.done = 0, 0, 0.0
         self._file = sqlite3.connect(
             f"{path.absolute().as_uri()}?immutable=1", uri=True, check_same_thread=False
         )
@@ -67,22 +68,23 @@ class SqliteFile:
 
         Of a damaged file: in the order written, those before and behind the damage.
         """
-        self.odd, self.done, taken = 0, 0.0, 0
+        self.odd, self.lost, self.done, taken, given = 0, 0, 0.0, 0, 0
         order = {topic: number for number, topic in enumerate(topics)}
         wanted = {n: order[topic] for n, topic in self._topics.items() if topic in order}
         for rows in self._batches(wanted) if self.damage is None else self._salvaged():
             taken += len(rows)
             self.done = min(taken / max(self._total, 1), 1.0)
-            if not self._whole:
-                whole = [row for row in rows if _is_message(row)]
-                self.odd += len(rows) - len(whole)
-                rows = whole
+            whole = [row for row in rows if _is_message(row)]  # a damaged index names others
+            self.odd += 0 if self._whole else len(rows) - len(whole)
+            rows = whole
             if self.damage is not None:
                 rows = [row for row in rows if row[0] in wanted]
+            given += len(rows)
             if rows:
                 numbers, received, data = zip(*rows, strict=True)
                 yield Messages.of(data, list(map(wanted.__getitem__, numbers)), received)
         self.done = 1.0
+        self.lost = max(0, sum(self.counts[t] for t in order if t in self.counts) - given)
 
     def _batches(self, wanted: Collection[int]) -> Iterator[list[_Row]]:
         numbers = ",".join(map(str, wanted))
