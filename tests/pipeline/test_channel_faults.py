@@ -206,6 +206,47 @@ def test_a_blow_of_300_n_on_a_lone_sensor_is_taken_at_once(rise):
     assert pipeline.events[0].detected <= s.time[AT] + 0.005
 
 
+# N, Nm per sample as it begins: of forces of 700 N on links 1 and 3 of sara against each other.
+CLAMP = 4.0 * np.array([1.0, -1.6, 2.1, -0.3, 3.8, -1.3])
+
+
+def of_a_clamp():
+    """Its rise and fall are a half sine of 70 ms, on the innermost sensor of sara alone."""
+    s = in_motion("sara")
+    wave = np.clip((np.arange(len(s.time)) - AT) / 70.0, 0.0, 1.0)
+    s.wrench[:, 0] -= np.outer(70.0 / np.pi * np.sin(np.pi * wave), CLAMP)
+    return s
+
+
+def test_two_forces_against_each_other_on_a_lone_sensor_are_believed_within_five_samples():
+    """Their wrench is that of no force, but several axes go on for many samples as they began."""
+    s = of_a_clamp()
+    pipeline = tl.Pipeline(robot_named("sara"))
+    run(pipeline, s)
+    assert {str(c.fault) for c in pipeline.faults} == {"spike", "none"}
+    for channel in {c.channel for c in pipeline.faults}:
+        told = [c for c in pipeline.faults if c.channel == channel]
+        for begun, ended in zip(told[::2], told[1::2], strict=True):
+            assert str(begun.fault) == "spike" and ended.sample - begun.sample <= 5
+    (event,) = pipeline.events  # no collision: a sensor that dies begins like this
+    assert event.detected <= s.time[AT] + 0.01
+
+
+@pytest.mark.parametrize("axis", [2, 4])
+def test_what_one_axis_makes_up_beside_a_blow_is_not_believed(axis):
+    s = of_a_clamp()
+    rng = np.random.default_rng(axis)
+    s.wrench[AT : AT + 70, 0, axis] = rng.uniform(-300.0, 300.0, 70)
+    pipeline = tl.Pipeline(robot_named("sara"))
+    run(pipeline, s)
+    name = f"base.{AXES[axis]}"
+    told = [(c.sample, str(c.fault)) for c in pipeline.faults if c.channel == name]
+    faulty = np.zeros(len(s.time), bool)
+    for (begin, fault), (end, _) in zip(told, [*told[1:], (len(s.time), "")], strict=True):
+        faulty[begin:end] = fault != "none"
+    assert faulty[AT : AT + 70].mean() > 0.9
+
+
 def test_a_new_level_of_one_axis_that_lives_is_taken_three_samples_late():
     s = in_motion("sara")
     s.wrench[AT:, 0, 2] += 100.0  # the innermost one

@@ -73,6 +73,10 @@ class ChannelGates {
         spiked_(at_.count(), -std::numeric_limits<double>::infinity()),
         moved_(at_.count(), Moved::no),
         unproven_(at_.count(), 0),
+        read_(6 * at_.sensors),
+        read_step_(6 * at_.sensors),
+        read_step_before_(6 * at_.sensors),
+        grown_(6 * at_.sensors, 0),
         shown_from_(at_.joints),
         far_(at_.joints),
         since_(at_.count()),
@@ -192,6 +196,7 @@ class ChannelGates {
   void settle(double dt, bool gap) {
     absurd_ = false;
     absent_ = 0;
+    follow_loads(gap);
     take_out_friction();
     carry(dt);
     for (std::size_t c = 0; c < at_.count(); ++c) {
@@ -211,6 +216,42 @@ class ChannelGates {
     if (gap) speeds_.forget_all();
     find_all_sound();
   }
+
+  // Follows how each axis of a sensor steps, whatever is believed of it.
+  void follow_loads(bool gap) {
+    std::swap(read_step_, read_step_before_);
+    for (std::size_t i = 0; i < read_.size(); ++i) {
+      const std::size_t c = at_.wrench() + i;
+      const double before = fault_[c] == Fault::none ? last_[c] : read_[i];
+      read_[i] = now_[c];
+      read_step_[i] = gap ? kNever : (now_[c] - before) / gate(c);
+    }
+  }
+
+  // Does an axis go on as it went in the last sample, and others of its sensor with it? A load that grows
+  // does that: two forces against each other, too, whose wrench is that of no force. What an axis makes up
+  // goes now up, now down.
+  bool goes_on(std::size_t c) const {
+    const std::size_t axis = c - at_.wrench(), first = axis - axis % 6;
+    double along = 0.0, here = 0.0, before = 0.0;
+    int moving = 0;
+    for (std::size_t i = first; i < first + 6; ++i) {
+      const double step = read_step_[i], last = read_step_before_[i], size = std::fabs(step);
+      const double size_before = std::fabs(last);
+      const bool alike = step * last > 0.0 && size_before < kAlike * size && size < kAlike * size_before;
+      if (i == axis && !alike) return false;
+      if (i == axis || !limits_.is_watched(at_.wrench() + i)) continue;
+      along += step * last;
+      here += step * step;
+      before += last * last;
+      const std::size_t other = at_.wrench() + i;
+      moving += size * gate(other) > tuning_.moves * mean_[other] + kLeastMove ? 1 : 0;
+    }
+    return moving >= kSeveral && along > kSameWay * std::sqrt(here * before);
+  }
+  static constexpr double kAlike = 2.5;    // times: steps of a blow that turns at its peak
+  static constexpr double kSameWay = 0.8;  // cosine: one in 15 pairs of random steps of five axes has it
+  static constexpr int kSeveral = 2;       // other axes that move: more than the crosstalk of one that fails
 
   // Of the steps that are too large for their channel: what known friction has made of them counts
   // for nothing.
@@ -252,6 +293,7 @@ class ChannelGates {
         }
         fault_[c] = Fault::spike;
         since_[c] = calm_[c] = 0;
+        if (c >= at_.wrench()) grown_[c - at_.wrench()] = 0;
         if (time_ - spiked_[c] < kAgain) moved_[c] = moved(c);
         spiked_[c] = time_;
         if (c >= at_.qd() && c < at_.tau()) shown_from_[c - at_.qd()] = {time_ - dt, last_[c - at_.qd()]};
@@ -356,6 +398,11 @@ class ChannelGates {
       return;
     }
     if (c >= at_.qd() && c < at_.tau() && borne_out(c, dt)) return take(c);
+    if (c >= at_.wrench() && !witnessed(c)) {
+      int& grown = grown_[c - at_.wrench()];
+      grown = goes_on(c) ? grown + 1 : 0;
+      if (grown >= kGrows) return take(c);
+    }
     if (++since_[c] < held_most_) return hold(c, dt);
     candidate_[c] = last_[c];  // where it was good
     leave(c, stays && c >= at_.tau() ? Fault::stuck : Fault::wild);
@@ -398,6 +445,8 @@ class ChannelGates {
     if (nothing_known && fault_[v] == Fault::absent && now_[v] == now_[v]) fault_[v] = Fault::none;
     begin_tracking(c);
   }
+
+  static constexpr int kGrows = 2;  // samples in a row in which an axis goes on: one is chance in eight
 
   // The last good reading stands for this one; a joint is where its speed has brought it.
   void hold(std::size_t c, double dt) {
@@ -618,6 +667,10 @@ class ChannelGates {
   std::vector<double> spiked_;  // when it jumped last [s]
   std::vector<Moved> moved_;    // see `take_moved`
   std::vector<char> unproven_;  // see `any_unproven`
+  // Of axes, as long as samples are not usual: as read last, believed or not, its last two steps in parts
+  // of what is believed at once, and for how many samples one that is held has gone on alike.
+  std::vector<double> read_, read_step_, read_step_before_;
+  std::vector<int> grown_;
   std::vector<Place> shown_from_;  // per joint, before its velocity was held
   std::vector<int> far_;
   std::vector<int> since_, calm_;  // samples, of what a fault waits for
