@@ -7,7 +7,7 @@ import pytest
 from touchline.pipeline.pipeline import Pipeline
 from touchline.result.contact import Contact
 from touchline.trials.cell import Cell
-from touchline.trials.scene import arm_and_skin, make_scene
+from touchline.trials.scene import arm_and_skin, make_pipeline, make_scene
 
 NEWCOMER, WEAK = Cell("sara", 3, 1), Cell("sara", 1, 1, speed=0.5, force=2.0)
 TREMBLING, TORQUES = Cell("sara", 2, 1, hands="trembling"), Cell("panda-torques", 1, 1)
@@ -80,3 +80,19 @@ def test_samples_in_parts_give_the_same_bits(cell, few):
         np.testing.assert_array_equal(np.transpose(xyz), [c.position for c in few[-1]])
         events.append(pipeline.events)
     assert events[0] == events[1]
+
+
+def test_of_touches_that_begin_together_one_is_looked_for_in_each_sample():
+    """The first look at each is dear. The others are told at once, with their place yet to come."""
+    robot, skin = arm_and_skin("sara", 1)
+    signals = make_scene(Cell("sara", 4, 1, begin="together"), 0, 0).signals
+    pipeline, looked = make_pipeline(robot, skin), []
+    s = signals
+    for sample in zip(s.time.tolist(), s.q, s.qd, s.tau, s.wrench, strict=True):
+        contacts = pipeline.update(*sample).contacts
+        if contacts and len(looked) < 3:
+            assert [c.segment for c in contacts] == ["base", "wrist", "handle"]
+            looked.append([c.status != "wrench_only" for c in contacts])
+            waiting = [c for c in contacts if c.status == "wrench_only"]
+            assert all(c.searching and not c.candidates for c in waiting)
+    assert looked == [[True, False, False], [True, True, False], [True, True, True]]

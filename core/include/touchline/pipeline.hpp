@@ -99,6 +99,9 @@ class Pipeline {
     classifier_.forget_blows(g, since);
   }
 
+  // From the next sample on so many pipelines take each: they share the work that a sample may take.
+  void share_work(int pipelines) { localizer_.share_work(pipelines); }
+
   // What a joint's torque, or a sensor, had last is not believed: with the next sample its estimates
   // begin anew, even where the gap is short.
   void begin_torque_anew(std::size_t j) { observer_.begin_torque_anew(j); }

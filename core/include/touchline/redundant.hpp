@@ -76,6 +76,7 @@ class RedundantPipeline {
       }
       if (end > i) {
         const double* ratios = ratios_.data();
+        whole_.share_work(1);
         std::size_t taken = end;  // the last sample that the whole robot took
         whole_.run(end - i, time + i, at(i), rows + i * width, [&](const Result& result) {
           watch_parity(result, time[i]);
@@ -166,6 +167,7 @@ class RedundantPipeline {
     if (gates_.any_unproven()) doubts_.foresee(faults, judged.time);
     absent_.find(believed, gates_, robot());
     const bool whole = healthy();
+    if (whole) whole_.share_work(1);
     const Result result = whole ? whole_.update(believed) : step(believed);
     if (whole) watch_parity(result, believed.time);
     else parity_.forget();
@@ -242,6 +244,7 @@ class RedundantPipeline {
       warming_->begin(whole_, last_.sample());
       since_ = listens_ = sample.time;
     }
+    share_work();
     const Result of_whole = whole_.update(sample);  // it settles anew as soon as all are back
     Result of_now = now_ != nullptr ? now_->update(sample) : of_whole;
     events_.end_those_that_waited();
@@ -261,6 +264,17 @@ class RedundantPipeline {
     // What is wrong with the sample itself, the whole robot tells.
     of_now.health |= (of_whole.health & ~kSettling) | kSensorExcluded;
     return said_by_stand_in(of_now);
+  }
+
+  // All that take this sample have as much time as one alone.
+  void share_work() {
+    int pipelines = 1;
+    const auto takes_it = [&](const Deputy& deputy) {
+      return &deputy == now_ || &deputy == warming_ || deputy.feels();
+    };
+    deputies_.visit([&](const Deputy& deputy) { pipelines += takes_it(deputy) ? 1 : 0; });
+    whole_.share_work(pipelines);
+    deputies_.visit([&](Deputy& deputy) { deputy.pipeline().share_work(pipelines); });
   }
 
   // Those who spoke before listen until nothing that they felt lasts: they may speak again.

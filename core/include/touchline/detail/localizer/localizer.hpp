@@ -143,6 +143,8 @@ class Localizer {
   const Suspect& suspect() const { return tracks_.suspect(); }
   // From now on until then [s] a channel tells nothing of contacts where another one does.
   void leave_out(int channel, double until) { tracks_.leave_out(channel, until); }
+  // From the next sample on so many pipelines take each: they share its work.
+  void share_work(int pipelines) { tracks_.share_work(pipelines); }
 
   // An event: its number, its places, and the joint positions at the time of its position.
   struct Memory {

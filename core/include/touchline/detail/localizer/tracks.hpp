@@ -62,6 +62,9 @@ class Tracks {
   // From now on until then [s] a channel tells nothing.
   void leave_out(int channel, double until) { lone_.leave_out(channel, until); }
 
+  // From the next sample on so many pipelines take each: they share its work.
+  void share_work(int pipelines) { share_.divide(pipelines); }
+
   // Segment g is touched anew.
   int begin(int g) {
     pasts_[g].restart();
@@ -119,9 +122,12 @@ class Tracks {
       report(known.count > 0 ? known.known[0].serial : s.touched.first, single_.clear());
       return;
     }
-    own_ = share_.take(time, !s.touched.searched);
+    const bool first = !s.touched.searched;
+    own_ = share_.take(time, first);
     spent_ = 0;
+    const bool waits = first && !share_.begin();
     if (!measurement_.can_be_followed() || settings_.first_entry) {
+      if (waits) return report(s.touched.first, single_.wait(measurement_));
       const Ask ask{Ask::kSole, again(s), true, own_};
       report(s.touched.first, single_.locate(g, 0.0, measurement_, ask));
       share_.spend(single_.units());
@@ -133,6 +139,7 @@ class Tracks {
       pasts_[g].follow(measurement_.load(), bandwidth, time, measurement_.posture());
     if (!s.unexplained_now() || s.known.contacts.count > 1)
       s.known.contacts.age(bandwidth, time, settings_);
+    if (waits) return report(s.touched.first, single_.wait(measurement_));
     go_on(s, read);
     share_.spend(spent_);
   }
@@ -197,7 +204,7 @@ class Tracks {
       return;
     }
     if (a.status == Status::not_separable) {
-      spent_ += twins_.follow(s, a, now_, own_, spent_);
+      spent_ += twins_.follow(s, a, now_, own_, spent_, share_);
       return;
     }
     report(s.touched.first, a);

@@ -12,6 +12,7 @@
 #include "touchline/detail/localizer/pair_answer.hpp"
 #include "touchline/detail/localizer/reports.hpp"
 #include "touchline/detail/localizer/segment_contacts.hpp"
+#include "touchline/detail/localizer/work_share.hpp"
 
 namespace touchline {
 
@@ -36,10 +37,12 @@ class Twins {
   // forces rise, then ever more rarely. All of that takes many samples. `own`: units of work of the
   // segment in this sample (`PlaceTuning::search_work`), of which the one contact has taken `spent`.
   // Returns what is taken of the rest.
-  int follow(SegmentContacts& s, const Answer& one, const SegmentSample& now, int own, int spent) {
+  int follow(SegmentContacts& s, const Answer& one, const SegmentSample& now, int own, int spent,
+             WorkShare& share) {
     Together& two = s.together;
     Work& work = *work_[now.segment];
-    if (!s.state.is(Tracking::pair)) {
+    const bool first = !s.state.is(Tracking::pair);  // this sample has had enough to do
+    if (first) {
       s.state.enter(Tracking::pair);
       s.touched.two = true;
       s.suspected.explained.reset();
@@ -51,7 +54,8 @@ class Twins {
       work.parts.drop();
     }
     const int all = static_cast<int>(std::clamp(std::round(units_ * own), 1.0, kMost));
-    const bool worked = go_on(s, work, one, now, std::max(all - spent, all / kLeast));
+    const int units = std::max(all - spent, all / kLeast);
+    const bool worked = !first && go_on(s, work, one, now, units, share);
     const int taken = worked ? std::max(0, own - spent) : 0;
     if (!two.separable) {
       end_second(two);
@@ -103,7 +107,8 @@ class Twins {
 
   // One sample's part of it, at most about so many units of work: what is done is taken over in a sample
   // of its own. Returns whether any work is done.
-  bool go_on(SegmentContacts& s, Work& work, const Answer& one, const SegmentSample& now, int units) {
+  bool go_on(SegmentContacts& s, Work& work, const Answer& one, const SegmentSample& now, int units,
+             WorkShare& share) {
     Together& two = s.together;
     if (work.parts.done()) {
       conclude(two, work);
@@ -120,7 +125,7 @@ class Twins {
                work.search.begun() - two.since >= settings_.risen * now.brief()) {
       two.walking = true;
       work.parts.begin(work.search, now, measurement_);
-    } else if (now.time >= two.next_search) {
+    } else if (now.time >= two.next_search && share.begin_pair()) {
       two.taken = two.walking = false;
       two.next_search = std::max(two.since + settings_.risen * now.brief(),
                                  now.time + settings_.search_growth * (now.time - two.since));

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 namespace touchline {
 
@@ -21,8 +22,9 @@ class WorkShare {
     if (time != time_) {
       before_ = searching_;
       searching_ = 0;
-      left_ = units_;
-      left_first_ = units_ / kFirst;
+      left_ = units_ / pipelines_;
+      left_first_ = left_ / kFirst;
+      begun_ = begun_pair_ = false;
       time_ = time;
     }
     first_ = first;
@@ -34,6 +36,12 @@ class WorkShare {
     if (first_) left_first_ = std::max(0, left_first_ - units);
     searching_ += units > units_ / kLittle ? 1 : 0;
   }
+  // From the next sample on: so many pipelines take each sample, which share the work.
+  void divide(int pipelines) { pipelines_ = pipelines; }
+  // May the search of a touch begin? One does in a sample, which is dear as no cache has what it needs: those
+  // of other segments wait for the next. So do searches for two contacts.
+  bool begin() { return !std::exchange(begun_, true); }
+  bool begin_pair() { return !std::exchange(begun_pair_, true); }
   // Has a search been at work in the sample at hand?
   bool searched() const { return searching_ > 0; }
 
@@ -41,10 +49,11 @@ class WorkShare {
   static constexpr int kLittle = 16;  // so small a part of a sample's work is no search
   static constexpr int kFirst = 8;    // touches have such a part in their first sample
 
-  int units_;
+  int units_, pipelines_ = 1;
   // Of the sample of this time [s]: how many have searched, and in the one before; units that are left.
   double time_ = -std::numeric_limits<double>::infinity();
   int searching_ = 0, before_ = 0, left_ = 0, left_first_ = 0;
+  bool begun_ = false, begun_pair_ = false;
   bool first_ = false;  // was it the first sample of the touch that has taken last?
 };
 

@@ -63,6 +63,17 @@ class SingleContact {
     return answer_;
   }
 
+  // It has yet to be looked for: no more is known than the wrench, where there is one.
+  const Answer& wait(const Measurement& measurement) {
+    clear();
+    answer_.searching = true;
+    if (!measurement.has_wrench()) return answer_;
+    const double* w = measurement.wrench();
+    answer_.force = {w[0], w[1], w[2]};
+    answer_.status = Status::wrench_only;
+    return answer_;
+  }
+
   const Answer& answer() const { return answer_; }
 
   // Gives each body the probability that the evidence for links gives it; where no candidate is on
