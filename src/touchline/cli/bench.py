@@ -626,11 +626,12 @@ def tuning(
 def fuzz(
     *, runs: int = 1000, seed: int = 0, keep: Annotated[Path | None, arg(metavar="DIR")] = None
 ) -> int:
-    """Damaged descriptions, models, meshes and logs: each is read, or refused in words.
+    """Damaged descriptions, meshes, logs and results: each is read, or refused in words.
 
     Example: touchline bench fuzz --runs 20000 --keep found
 
-    Prints, for each kind of file, how many were neither, and the longest time that one took.
+    Command lines and what a visitor of a page sends are damaged, too. Prints, for each kind, how
+    many were neither, and the longest time that one took.
 
     Exit status: 1 where there was one, or one took more than 30 s.
 

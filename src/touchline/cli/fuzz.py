@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`touchline bench fuzz`: damaged files for each parser; prints those not refused in words."""
+"""`touchline bench fuzz`: damaged input for each parser; prints what is not refused in words."""
 
+import contextlib
 import csv
 import gzip
 import io
@@ -17,7 +18,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 
@@ -39,6 +41,7 @@ EXTREMES = (
     b"1e-320",
     b"9" * 40,
     b"0x7f",
+    b"+x",
     b"",
     b'"',
 )
@@ -202,6 +205,8 @@ def parsers(folder: Path) -> list[Parser]:
         *(_within(results, name, _replay) for name in RESULTS),
         *(_within(lerobot, name, _labelling(folder)) for name in LEROBOT),
         *_hdf5(table, folder),
+        _arguments(),
+        *_messages(),
     ]
 
 
@@ -358,6 +363,61 @@ def _hdf5(table: np.ndarray, folder: Path) -> list[Parser]:
         for name, values in _observations(table).items():
             file[f"observation.{name}"] = values
     return [Parser("HDF5", "damaged.h5", (path.read_bytes(),), _labelling(folder))]
+
+
+def _arguments() -> Parser:
+    """Command lines, a word in each line, from the examples that `--help` gives; none is run."""
+    from touchline.cli.main import BENCHMARKS, COMMANDS, understood
+
+    texts = [command.__doc__ or "" for command in (*COMMANDS.values(), *BENCHMARKS.values())]
+    lines = [line.split() for text in texts for line in text.splitlines() if "Example:" in line]
+    seeds = tuple("\n".join(words[2:]).encode() for words in lines)
+
+    def read(path: Path) -> object:
+        words = path.read_bytes().decode("utf-8", "surrogateescape").split("\n")
+        with contextlib.redirect_stdout(io.StringIO()):  # of the help that it may ask for
+            return understood(words)
+
+    return Parser("arguments", "damaged.txt", seeds, read)
+
+
+@dataclass
+class _Slider:
+    value: float = 1.0
+    min: float = 0.0
+    max: float = 100.0
+
+
+def _messages() -> list[Parser]:
+    """What a visitor of a page sends: dropped, or such that the server reads it.
+
+    None where viser is not installed.
+    """
+    try:
+        import msgspec
+        from viser import _messages as messages
+    except ImportError:
+        return []
+    from touchline.view.gate import Gate
+
+    gui = SimpleNamespace(_gui_input_handle_from_uuid={"slider": _Slider()})
+    gate = Gate(cast(Any, SimpleNamespace(gui=gui)))
+    third = (0.0, 0.6, 0.8)
+    view = {"wxyz": (1.0, 0.0, 0.0, 0.0), "position": third, "fov": 0.9, "near": 0.1, "far": 9.0}
+    view |= {"image_height": 600, "image_width": 800, "look_at": third, "up_direction": third}
+    click = {"name": "/arm/link1", "instance_index": None, "screen_pos": (0.4, 0.6)}
+    click |= {"ray_origin": third, "ray_direction": third, "modifier": None}
+    sent = (
+        {"type": "GuiUpdateMessage", "uuid": "slider", "updates": {"value": 30.5}},
+        {"type": "ViewerCameraMessage", **view},
+        {"type": "SceneNodeClickMessage", **click},
+    )
+
+    def read(path: Path) -> object:
+        raw = path.read_bytes()
+        return messages.Message.deserialize(raw) if gate.admits(raw) else raw
+
+    return [Parser("WebSocket", "damaged.bin", tuple(map(msgspec.msgpack.encode, sent)), read)]
 
 
 def _observations(table: np.ndarray) -> dict[str, np.ndarray]:

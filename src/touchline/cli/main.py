@@ -104,15 +104,27 @@ def _dispatch(arguments: list[str]) -> int:
     if not arguments or arguments[0] in ("-h", "--help", "help"):
         print(_usage())
         return 0
-    name, rest = arguments[0], arguments[1:]
-    if name == "--version":
+    if arguments[0] == "--version":
         print(f"touchline {__version__}")
         return 0
+    return int(understood(arguments)())
+
+
+def understood(arguments: list[str]) -> Callable[[], int]:
+    """The call that a command line asks for; help that it asks for is printed.
+
+    Args:
+        arguments: the command and what follows it.
+
+    Raises:
+        InputError: there is no such command, or it has no such arguments.
+    """
+    name, rest = arguments[0], arguments[1:]
     _check_name("command", name, COMMANDS)
-    return _bench(rest) if name == "bench" else _run(COMMANDS[name], name, rest)
+    return _bench(rest) if name == "bench" else _parsed(COMMANDS[name], name, rest)
 
 
-def _bench(arguments: list[str]) -> int:
+def _bench(arguments: list[str]) -> Callable[[], int]:
     names = list(takewhile(lambda word: not word.startswith("-"), arguments))
     options = arguments[len(names) :]
     for name in names:
@@ -120,12 +132,13 @@ def _bench(arguments: list[str]) -> int:
     if not names and options in (["-h"], ["--help"]):
         text = inspect.cleandoc(bench.__doc__ or "")
         print(BENCH_USAGE.format(text=text, commands=_listing(BENCHMARKS, 16)))
-        return 0
+        return lambda: 0
     if options and len(names) != 1:
         raise InputError(f"{options[0]}: options belong to one benchmark: touchline bench NAME ...")
     if not names:
-        return bench()
-    return max([_run(BENCHMARKS[name], f"bench {name}", options) for name in names])
+        return bench
+    calls = [_parsed(BENCHMARKS[name], f"bench {name}", options) for name in names]
+    return lambda: max([int(call()) for call in calls])
 
 
 def _check_name(kind: str, name: str, known: Iterable[str]) -> None:
@@ -135,19 +148,18 @@ def _check_name(kind: str, name: str, known: Iterable[str]) -> None:
         )
 
 
-def _run(command: Callable[..., int], name: str, arguments: list[str]) -> int:
-    """Run a command; arguments that cannot be understood are told in one line."""
+def _parsed(command: Callable[..., int], name: str, arguments: list[str]) -> Callable[[], int]:
+    """A command with its arguments; those that cannot be understood are told in one line."""
     import tyro
 
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said):
-            call = tyro.cli(_deferred(for_help(command)), prog=f"touchline {name}", args=arguments)
+            return tyro.cli(_deferred(for_help(command)), prog=f"touchline {name}", args=arguments)
     except SystemExit as stop:  # help, or arguments that cannot be understood
         if stop.code:
             raise InputError(_in_one_line(said.getvalue(), name)) from None
-        return 0
-    return int(call())
+        return lambda: 0
 
 
 def _deferred(command: Callable[..., int]) -> Callable[..., Callable[[], int]]:

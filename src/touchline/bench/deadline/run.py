@@ -194,5 +194,5 @@ def main(updates: int, arms: tuple[str, ...], seed: int = 0) -> None:
     print(
         f"CPU time of the thread in Pipeline.update [us], of each update the least of {REPEATS} "
         f"repeats of the same input;\nnoise {TIERS[TIER]}, 1 kHz; "
-        f"first update: the slowest one; in each time {clock_cost():.1f} us are the clock's own"
+        f"first update: the slowest one.\nIn each time {clock_cost():.1f} us are the clock's own."
     )

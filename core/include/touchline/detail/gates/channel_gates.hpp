@@ -667,8 +667,8 @@ class ChannelGates {
   std::vector<double> spiked_;  // when it jumped last [s]
   std::vector<Moved> moved_;    // see `take_moved`
   std::vector<char> unproven_;  // see `any_unproven`
-  // Of axes, as long as samples are not usual: as read last, believed or not, its last two steps in parts
-  // of what is believed at once, and for how many samples one that is held has gone on alike.
+  // Of axes, as long as samples are not usual: as read last, believed or not, and the last two steps, in
+  // parts of what is believed at once. For how many samples has one that is held gone on alike?
   std::vector<double> read_, read_step_, read_step_before_;
   std::vector<int> grown_;
   std::vector<Place> shown_from_;  // per joint, before its velocity was held
