@@ -25,7 +25,6 @@ from touchline.identify.identification import MOST_TOUCHED, touched_instants
 from touchline.identify.leaning import leaned
 from touchline.identify.payload import payload_link
 from touchline.identify.touches import usual_scatter
-from touchline.identify.usual import usual_links
 from touchline.model.corrections import with_offsets
 from touchline.model.description import Load, RobotDescription
 from touchline.model.mechanism import Inertia
@@ -364,7 +363,7 @@ def _fit(
     """
     rows, count = evidence.used, A.shape[-1]
     poses = _poses(evidence)
-    links = usual_links(evidence)
+    links = evidence.usual_links
     A, left = _without_unknowns(np.concatenate([A, links], axis=-1), left, sigma, poses, evidence)
     both = (A[:, rows] / sigma[rows][:, None]).reshape(-1, A.shape[-1])
     X, y = both[:, :count], (left[:, rows] / sigma[rows]).ravel()

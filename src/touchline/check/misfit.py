@@ -7,6 +7,7 @@ from scipy.optimize import nnls
 from touchline.arrays import Array
 from touchline.check.joints import TELLING
 from touchline.check.windows import DRY_SPEED, Windows
+from touchline.model.description import SensorDescription
 from touchline.model.robot import Robot
 
 BETTER = 0.8  # a change that leaves more than this part of what is off explains nothing
@@ -40,16 +41,21 @@ def departures(
         if currents or robot.description.joints[j].torque == "motor":
             r[:, i] -= _driving(windows, j)
     rows = [_relative(r[..., None], e[..., None], least)]
-    for k, sensor in enumerate(robot.description.sensors):
-        if sensor.frame != "sensor" or len(sensor.axes) < 6 or sensor.compensated != "none":
-            continue
-        sign = 1.0 if sensor.polarity == "outboard" else -1.0
-        r, e = windows.wrench[:, k, :3], sign * windows.expected_wrench[:, k, :3]
-        r = np.where(np.isfinite(e).all(axis=1, keepdims=True), r, np.nan)
-        r = np.where(np.isfinite(r).all(axis=1, keepdims=True), r, np.nan)
+    own = [k for k, sensor in enumerate(robot.description.sensors) if _has_own_axes(sensor)]
+    if own:
+        outboard = [robot.description.sensors[k].polarity == "outboard" for k in own]
+        r, e = windows.wrench[:, own, :3], windows.expected_wrench[:, own, :3]
+        e = np.where(outboard, 1.0, -1.0)[:, None] * e
+        r = np.where(np.isfinite(e).all(axis=2, keepdims=True), r, np.nan)
+        r = np.where(np.isfinite(r).all(axis=2, keepdims=True), r, np.nan)
         e = np.where(np.isfinite(r), e, np.nan)
-        rows.append(_relative((r - middle(r))[:, None], (e - middle(e))[:, None], TELLING))
+        rows.append(_relative(r - middle(r), e - middle(e), TELLING))
     return np.concatenate(rows, axis=1)
+
+
+def _has_own_axes(sensor: SensorDescription) -> bool:
+    """Does it say all of a wrench, in its own frame, as it is?"""
+    return sensor.frame == "sensor" and len(sensor.axes) == 6 and sensor.compensated == "none"
 
 
 def middle(values: Array) -> Array:
@@ -90,7 +96,6 @@ def _relative(reading: Array, expected: Array, least: float) -> Array:
     """Distances (W, rows) of vectors (W, rows, c), of the size of both."""
     off = np.linalg.norm(reading - expected, axis=-1)
     unknown = np.isnan(off)
-    sizes = [
-        middle(np.where(unknown, np.nan, np.linalg.norm(x, axis=-1))) for x in (reading, expected)
-    ]
-    return off / np.maximum(sum(sizes), max(least, 1e-9))
+    sizes = np.stack([np.linalg.norm(x, axis=-1) for x in (reading, expected)], axis=1)
+    size = middle(np.where(unknown[:, None], np.nan, sizes)).sum(axis=0)
+    return off / np.maximum(size, max(least, 1e-9))

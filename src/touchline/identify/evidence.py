@@ -18,6 +18,7 @@ from touchline.errors import InputError
 from touchline.identify.laws import SPEEDS, spread
 from touchline.identify.regressor import Rows, body_vector, momentum_regressors, rows_of
 from touchline.identify.smoothing import Steps, derivative, make_steps, mean, settled, smooth
+from touchline.localizer.localizer import MODEL_ERROR
 from touchline.model.description import Friction
 from touchline.model.robot import Robot
 from touchline.observer.dynamics import gravity_loads, posture
@@ -31,6 +32,8 @@ PIECE = 512  # samples worked on at once: 40 MB with 11 bodies and 25 rows
 MOST = 8000  # equations in time that are kept; longer recordings are thinned
 LEAST = 10  # samples of a recording
 EDGE = 1e-4  # rad; residuals change linearly with so small a lean of the base
+# Masses and inertias err by `MODEL_ERROR`, 1 sigma, centres by the same part of a link's width.
+LINK_WIDTH = 0.1  # m
 PRESENT = 0.5  # of the samples a row must have, or it counts as not measured
 
 
@@ -124,6 +127,18 @@ class Evidence:
     def _load(self, robot: Robot) -> Array:
         bodies = np.array([body_vector(node.inertia) for node in robot.nodes])
         return np.einsum("nrbk,bk->nr", self.model, bodies)
+
+    @cached_property
+    def usual_links(self) -> Array:
+        """What links are off by in any model: (N, R, c) [N or Nm], by 1 sigma of mass or centre."""
+        columns = []
+        for i, node in enumerate(self.robot.nodes):
+            body = node.inertia
+            if body.mass > 0.0:
+                columns.append(MODEL_ERROR * self.model[:, :, i] @ body_vector(body))
+                shifts = self.model[:, :, i, 1:4] * (MODEL_ERROR * LINK_WIDTH * body.mass)
+                columns += list(np.moveaxis(shifts, -1, 0))
+        return np.stack(columns, axis=-1) if columns else np.zeros((*self.reading.shape, 0))
 
     @cached_property
     def leaning(self) -> Array:

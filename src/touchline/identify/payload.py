@@ -12,7 +12,6 @@ from touchline.identify.evidence import PER_CONSTANT, Evidence, gather
 from touchline.identify.fit import BodyChange, Equations, Problem, Solution
 from touchline.identify.regressor import PARAMETERS, body_of_vector, body_vector
 from touchline.identify.touches import usual_scatter
-from touchline.identify.usual import usual_links
 from touchline.model.mechanism import Inertia
 from touchline.model.robot import Robot
 from touchline.model.transforms import move_inertia
@@ -105,7 +104,7 @@ def _links_doubt(
     """
     root = np.sqrt(weight[:, evidence.used])[..., None]
     X = (A[:, evidence.used] * root).reshape(-1, 4)
-    U = usual_links(evidence)[:, evidence.used] * root
+    U = evidence.usual_links[:, evidence.used] * root
     U = U.reshape(len(X), -1)
     taken = covariance @ (X.T @ U)  # (4, c) of each link's error ends in the load
     usual = float(((U - X @ taken) ** 2).sum())
@@ -116,7 +115,7 @@ def _links_doubt(
 def _unlike_load(evidence: Evidence, rest: Array) -> str:
     """What a load leaves (N, R) and should not, in a sentence; empty where it is as usual."""
     left = np.sqrt(np.mean(rest**2, axis=0))
-    usual = np.sqrt(np.mean(np.sum(usual_links(evidence) ** 2, axis=-1), axis=0))
+    usual = np.sqrt(np.mean(np.sum(evidence.usual_links**2, axis=-1), axis=0))
     far = np.where(evidence.used, left / np.hypot(usual, SOUND), 0.0)
     row = int(np.argmax(far))
     if far[row] <= MOST_LEFT:
