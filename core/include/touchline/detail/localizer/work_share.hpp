@@ -16,24 +16,20 @@ class WorkShare {
   explicit WorkShare(int units) : units_(units) {}
 
   // Units for the searches of one segment in the sample of `time` [s], of which it tells what it has
-  // spent: that may be a few more. `first`: of its touch. All touches that begin in a sample share a part
-  // of it, as no cache has what they need.
+  // spent: that may be a few more. `first`: of its touch, when no cache has what they need.
   int take(double time, bool first) {
     if (time != time_) {
       before_ = searching_;
       searching_ = 0;
-      left_ = units_ / pipelines_;
-      left_first_ = left_ / kFirst;
+      left_ = all_ = units_ / pipelines_;
       begun_ = begun_pair_ = false;
       time_ = time;
     }
-    first_ = first;
     const int own = left_ / std::max(1, before_ - searching_);
-    return first ? std::min(own, left_first_) : own;
+    return first ? std::min(own, all_ / kFirst) : own;
   }
   void spend(int units) {
     left_ = std::max(0, left_ - units);
-    if (first_) left_first_ = std::max(0, left_first_ - units);
     searching_ += units > units_ / kLittle ? 1 : 0;
   }
   // From the next sample on: so many pipelines take each sample, which share the work.
@@ -47,14 +43,13 @@ class WorkShare {
 
  private:
   static constexpr int kLittle = 16;  // so small a part of a sample's work is no search
-  static constexpr int kFirst = 8;    // touches have such a part in their first sample
+  static constexpr int kFirst = 8;    // a touch has such a part in its first sample
 
   int units_, pipelines_ = 1;
-  // Of the sample of this time [s]: how many have searched, and in the one before; units that are left.
+  // Of the sample of this time [s]: how many have searched, and in the one before; units in all, and left.
   double time_ = -std::numeric_limits<double>::infinity();
-  int searching_ = 0, before_ = 0, left_ = 0, left_first_ = 0;
+  int searching_ = 0, before_ = 0, all_ = 0, left_ = 0;
   bool begun_ = false, begun_pair_ = false;
-  bool first_ = false;  // was it the first sample of the touch that has taken last?
 };
 
 }  // namespace touchline
