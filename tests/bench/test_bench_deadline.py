@@ -67,3 +67,19 @@ def test_a_line_for_each_kind_of_touch(monkeypatch, capsys):
 def test_impossible_numbers_are_told(words, capsys):
     assert main(["bench", "deadline", "--robots", "sara", *words]) == 2
     assert words[0].strip("-") in capsys.readouterr().err
+
+
+def test_samples_come_at_the_rate_that_is_asked_for(monkeypatch, capsys):
+    made, periods = [], []
+
+    def update_times(make, signals):
+        made.append(make().robot)
+        periods.append(np.diff(signals.time).mean())
+        return np.full(len(signals.time), 2.0)
+
+    monkeypatch.setattr(deadline, "update_times", update_times)
+    given = ["--updates", "1", "--robots", "sara", "--rate", "4000"]
+    assert main(["bench", "deadline", *given]) == 0
+    assert "4000 Hz" in capsys.readouterr().out
+    np.testing.assert_allclose(periods, 1.0 / 4000.0)
+    assert len(made) == 12

@@ -28,6 +28,7 @@ class Cell:
             "sliding": the last contact slides, the others are held.
         lasts: how long steady hands touch an arm at rest after the last onset [s].
         force: how strong each touch is [N].
+        period: between samples [s].
     """
 
     arm: str
@@ -41,6 +42,7 @@ class Cell:
     hands: Hands = "steady"
     lasts: float = 0.1
     force: float = 20.0
+    period: float = 1e-3
 
     @property
     def turning(self) -> bool:

@@ -92,16 +92,15 @@ def make_scene(cell: Cell, run: int, seed: int = 0) -> Scene:
     if cell.hands != "steady":
         return _of_hands(cell, robot, skin, touches, np.random.default_rng([seed, run, 2]), noise)
     if not cell.speed:
-        signals = resting_signals(robot, touches[0].q, onsets, duration, noise)
+        signals = resting_signals(robot, touches[0].q, onsets, duration, noise, cell.period)
         still = [(touch.position, touch.force) for touch, _ in onsets]
         shape = len(onsets), len(signals.time), 3
         places, forces = (
             np.broadcast_to(np.array(x)[:, None], shape) for x in zip(*still, strict=True)
         )
         return Scene(onsets, signals, places, forces)
-    signals = moving_signals(
-        robot, onsets, duration, cell.speed, chance, noise, swing=swing, turning=cell.turning
-    )
+    how = {"period": cell.period, "swing": swing, "turning": cell.turning}
+    signals = moving_signals(robot, onsets, duration, cell.speed, chance, noise, **how)
     moved = [carried(robot, touch, signals.q) for touch, _ in onsets]
     places, turned = (np.array(x) for x in zip(*moved, strict=True))
     steady = np.array([touch.force for touch, _ in onsets])[:, None] + 0.0 * turned
@@ -123,9 +122,10 @@ def _of_hands(
     if cell.hands == "sliding":
         touches, path = _with_slide(skin, touches, cell.force, chance)
         duration = onsets[-1] + WAITS + len(path) * 1e-3 + RESTS
+        path = np.repeat(path, max(1, round(1e-3 / cell.period)), axis=0)
     else:
         duration = onsets[-1] + HELD
-    q, rest = touches[0].q, resting_signals(robot, touches[0].q, [], duration, None)
+    q, rest = touches[0].q, resting_signals(robot, touches[0].q, [], duration, None, cell.period)
     tau, wrench = rest.tau.copy(), rest.wrench.copy()
     places, forces = [], []
     for touch, onset in zip(touches, onsets, strict=True):
@@ -166,7 +166,11 @@ def _sample(cell: Cell, robot: Robot, skin: Skin, chance: np.random.Generator) -
 
 
 def make_pipeline(
-    robot: Robot, skin: Skin, rule: str = "likelihood", model_error: float = 0.0
+    robot: Robot,
+    skin: Skin,
+    rule: str = "likelihood",
+    model_error: float = 0.0,
+    period: float = 1e-3,
 ) -> Pipeline:
     """The pipeline as the benchmark uses it.
 
@@ -175,6 +179,7 @@ def make_pipeline(
     """
     return Pipeline(
         robot,
+        period=period,
         skin=skin,
         rule=rule,
         wrench_error=0.0,

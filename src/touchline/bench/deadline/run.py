@@ -99,7 +99,9 @@ def clock_cost() -> float:
     return float(np.median(taken)) * 1e-3
 
 
-def lines(arms: tuple[str, ...], updates: int, seed: int = 0) -> Iterator[Line]:
+def lines(
+    arms: tuple[str, ...], updates: int, seed: int = 0, period: float = 1e-3
+) -> Iterator[Line]:
     """Every arm with 0 to 4 contacts, apart or at the same instant; weak ones and clamps in motion.
 
     Two hands that tremble, too; and after the Panda the same arm with its joint torques alone.
@@ -108,6 +110,7 @@ def lines(arms: tuple[str, ...], updates: int, seed: int = 0) -> Iterator[Line]:
         arms: names of arms of the localization benchmark.
         updates: of each line, at least.
         seed: of all that is random.
+        period: between samples [s].
     """
     kinds: list[tuple[int, Begin]] = [
         (0, "apart"),
@@ -121,21 +124,22 @@ def lines(arms: tuple[str, ...], updates: int, seed: int = 0) -> Iterator[Line]:
     ]
     for arm in arms:
         for contacts, begin in kinds:
-            yield _line(Cell(arm, contacts, TIER, begin=begin), updates, seed)
+            yield _line(Cell(arm, contacts, TIER, begin=begin, period=period), updates, seed)
         for force in WEAK:
-            yield _line(Cell(arm, 1, TIER, speed=SPEED, force=force), updates, seed)
-        yield _clamped(arm, updates, seed)
-        yield _line(Cell(arm, 2, TIER, hands="trembling"), updates, seed)
+            weak = Cell(arm, 1, TIER, speed=SPEED, force=force, period=period)
+            yield _line(weak, updates, seed)
+        yield _clamped(arm, updates, seed, period)
+        yield _line(Cell(arm, 2, TIER, hands="trembling", period=period), updates, seed)
         if arm in ALONE:
             for contacts in (1, 2):
-                yield _line(Cell(ALONE[arm], contacts, TIER), updates, seed)
-            yield _clamped(ALONE[arm], updates, seed)
+                yield _line(Cell(ALONE[arm], contacts, TIER, period=period), updates, seed)
+            yield _clamped(ALONE[arm], updates, seed, period)
 
 
 def _line(cell: Cell, updates: int, seed: int) -> Line:
     robot, skin = arm_and_skin(cell.arm, cell.tier)
     times = _times(
-        lambda: make_pipeline(robot, skin),
+        lambda: make_pipeline(robot, skin, period=cell.period),
         (_signals(cell, robot, run, seed) for run in count()),
         updates,
     )
@@ -145,12 +149,12 @@ def _line(cell: Cell, updates: int, seed: int) -> Line:
     return Line(cell.arm, cell.contacts, begin, force, cell.motion, np.concatenate(times), first)
 
 
-def _clamped(arm: str, updates: int, seed: int) -> Line:
+def _clamped(arm: str, updates: int, seed: int, period: float) -> Line:
     """Two forces of the same strength on two sides, on an arm whose inertias are not as told."""
     robot, skin = arm_and_skin(arm, TIER)
     times = _times(
-        lambda: Pipeline(robot, skin=skin),
-        (_clamp(robot, skin, run, seed) for run in count()),
+        lambda: Pipeline(robot, skin=skin, period=period),
+        (_clamp(robot, skin, run, seed, period) for run in count()),
         updates,
     )
     first = np.array([part[0] for part in times])
@@ -167,9 +171,9 @@ def _times(make: Callable[[], Pipeline], runs: Iterator[Signals], updates: int) 
     return times
 
 
-def _clamp(robot: Robot, skin: Skin, run: int, seed: int) -> Signals:
+def _clamp(robot: Robot, skin: Skin, run: int, seed: int, period: float) -> Signals:
     chance = np.random.default_rng([seed, run, 3])
-    sampler = InteractionSampler(robot, TouchSampler(skin, chance), chance)
+    sampler = InteractionSampler(robot, TouchSampler(skin, chance), chance, period)
     return sampler.draw(KINDS[run % len(KINDS)], "structure", True).signals
 
 
@@ -177,22 +181,23 @@ def _signals(cell: Cell, robot: Robot, run: int, seed: int) -> Signals:
     if cell.contacts:
         return make_scene(cell, run, seed).signals
     chance = np.random.default_rng([seed, run])
-    return resting_signals(robot, chance.uniform(*robot.ranges), [], IDLE, chance)
+    q = chance.uniform(*robot.ranges)
+    return resting_signals(robot, q, [], IDLE, chance, cell.period)
 
 
-def main(updates: int, arms: tuple[str, ...], seed: int = 0) -> None:
-    """Runs the benchmark and prints its table."""
-    check_least(1, updates=updates)
+def main(updates: int, arms: tuple[str, ...], seed: int = 0, rate: int = 1000) -> None:
+    """Runs the benchmark and prints its table; `rate` of samples [Hz]."""
+    check_least(1, updates=updates, rate=rate)
     check_least(0, seed=seed)
     from tqdm import tqdm
 
     rows: list[Row] = [HEAD]
     total = sum(LINES + (ALONE_LINES if arm in ALONE else 0) for arm in arms)
-    done = tqdm(lines(arms, updates, seed), total=total, desc="deadline", disable=None)
+    done = tqdm(lines(arms, updates, seed, 1.0 / rate), total=total, desc="deadline", disable=None)
     rows += [line.row() for line in done]
     print(aligned(rows, text_columns=(0, 2, 4)))
     print(
         f"CPU time of the thread in Pipeline.update [us], of each update the least of {REPEATS} "
-        f"repeats of the same input;\nnoise {TIERS[TIER]}, 1 kHz; "
+        f"repeats of the same input;\nnoise {TIERS[TIER]}, {rate} Hz; "
         f"first update: the slowest one.\nIn each time {clock_cost():.1f} us are the clock's own."
     )
