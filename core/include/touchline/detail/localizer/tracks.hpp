@@ -39,7 +39,7 @@ class Tracks {
         pasts_(segments, Past(measurement.posture().nodes().size(), settings.past_worn)),
         looked_(segments),
         rivals_(segments, RivalPlaces(single.surfaces(), settings, rows)),
-        share_(settings.search_work),
+        share_(settings.sample_work(period)),
         arrivals_(single, measurement, settings, fit_, known_, reports_, lone_, rivals_, period),
         merging_(single.surfaces(), settings, fit_, known_, reports_),
         twins_(single.surfaces(), measurement, settings, fit_, known_, reports_, rows, segments,

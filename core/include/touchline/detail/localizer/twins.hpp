@@ -28,14 +28,14 @@ class Twins {
         known_(known),
         reports_(reports),
         said_(surfaces, settings),
-        units_(settings.pair_work * period / settings.search_work) {
+        units_(settings.pair_work * period / settings.sample_work(period)) {
     for (int g = 0; g < segments; ++g)
       work_.push_back(std::make_unique<Work>(measurement.posture(), surfaces, settings, rows, g));
   }
 
   // One contact explains nothing, from the beginning: looks for two, again and again while their
   // forces rise, then ever more rarely. All of that takes many samples. `own`: units of work of the
-  // segment in this sample (`PlaceTuning::search_work`), of which the one contact has taken `spent`.
+  // segment in this sample (`PlaceSettings::sample_work`), of which the one contact has taken `spent`.
   // Returns what is taken of the rest.
   int follow(SegmentContacts& s, const Answer& one, const SegmentSample& now, int own, int spent,
              WorkShare& share) {

@@ -4,6 +4,8 @@
 // Theory: docs/theory.md, section 8.
 #pragma once
 
+#include <algorithm>
+
 #include "touchline/detail/detector/tuning.hpp"
 #include "touchline/detail/place/tuning.hpp"
 
@@ -20,6 +22,11 @@ struct PlaceSettings : PlaceTuning {
   double finger = Pushes{}.reach;
   bool first_entry = false;  // the paper's rule
   double gap_sigmas = DetectorTuning{}.gap_sigmas;  // of what a gap may have left
+
+  // Units of work in a sample of `period` [s].
+  int sample_work(double period) const {
+    return std::max(1, static_cast<int>(search_work * std::min(1.0, period / short_sample)));
+  }
 };
 
 }  // namespace touchline

@@ -72,6 +72,9 @@ struct PlaceTuning {
   // is looked into, some 0.05 us, and a point that is tried is 10 to 30. What a sample has no work left
   // for, the next ones do. Half: weak contacts are searched for over more samples. Double: samples are late.
   int search_work = 1000;
+  // A sample that is shorter has a part of that, in proportion [s]: half of it at 8 kHz. Half: samples at
+  // 8 kHz are late. Double: at 4 kHz, too, a search takes more samples, in as much time.
+  double short_sample = 2.5e-4;
   // chi2 above the best beyond which an explanation weighs nothing: e^-25. Half: e^-12, which may
   // be seen in a list. Double: time, for nothing.
   double cost_window = 50.0;
@@ -190,6 +193,7 @@ struct PlaceTuning {
     v("past_worn", "1", t.past_worn);
     v("body_reach", "m", t.body_reach);
     v("search_work", "units", t.search_work);
+    v("short_sample", "s", t.short_sample);
     v("cost_window", "chi2", t.cost_window);
     v("relevant", "chi2", t.relevant);
     v("rough", "chi2", t.rough);
