@@ -17,6 +17,7 @@ import touchline as tl
 from touchline.cli import main
 from touchline.errors import InputError
 from touchline.label.channel import BEFORE
+from touchline.label.lerobot import _numbers, _widths
 from touchline.label.naming import Given, choose
 from touchline.label.run import label
 from touchline.logs import write_table
@@ -481,3 +482,16 @@ def test_a_copy_of_another_kind_is_refused(tmp_path, capsys):
     assert main(words) == 2
     assert "b.csv: must end in '.parquet'" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == [table]
+
+
+@pytest.mark.parametrize("shape", [[float("inf")], [1.5], ["1"], 3, [2, 2], None])
+def test_a_feature_whose_shape_is_no_row_is_no_signal(shape):
+    features = {"odd": {"dtype": "float32", "shape": shape}}
+    features["row"] = {"dtype": "float32", "shape": [7]}
+    assert _widths(features) == {"row": 7}
+
+
+def test_a_column_that_holds_no_numbers_is_refused_in_words():
+    column = pa.chunked_array([pa.array([{"list": [1.0]}, {"list": [2.0]}])])
+    with pytest.raises(InputError, match="here: holds struct.*, not lists of numbers"):
+        _numbers(column, "here")

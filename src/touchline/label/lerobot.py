@@ -177,8 +177,9 @@ def _widths(features: dict[str, Any]) -> dict[str, int]:
     found = {}
     for name, feature in features.items():
         shape = feature.get("shape") if isinstance(feature, dict) else None
-        if shape and len(shape) == 1 and feature.get("dtype") in NUMBERS:
-            found[name] = int(shape[0])
+        row = isinstance(shape, list) and len(shape) == 1 and isinstance(shape[0], int)
+        if row and feature.get("dtype") in NUMBERS:
+            found[name] = shape[0]
     return found
 
 
@@ -209,9 +210,13 @@ def _numbers(column: Any, where: str) -> Array:
     count = len(array)
     if array.null_count:
         raise InputError(f"{where}: {array.null_count} rows are empty")
-    flat = (
-        array.flatten() if hasattr(array, "flatten") and pa.types.is_nested(array.type) else array
+    kind = array.type
+    lists = (
+        pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind)
     )
+    if pa.types.is_nested(kind) and not lists:
+        raise InputError(f"{where}: holds {kind}, not lists of numbers")
+    flat = array.flatten() if lists else array
     values = np.asarray(flat.to_numpy(zero_copy_only=False), dtype=float)
     if count and len(values) % count:
         raise InputError(f"{where}: rows of different lengths")
