@@ -177,8 +177,9 @@ def _widths(features: dict[str, Any]) -> dict[str, int]:
     found = {}
     for name, feature in features.items():
         shape = feature.get("shape") if isinstance(feature, dict) else None
-        row = isinstance(shape, list) and len(shape) == 1 and isinstance(shape[0], int)
-        if row and feature.get("dtype") in NUMBERS:
+        if not (isinstance(shape, list) and len(shape) == 1 and isinstance(shape[0], int)):
+            continue
+        if feature.get("dtype") in NUMBERS:
             found[name] = shape[0]
     return found
 
