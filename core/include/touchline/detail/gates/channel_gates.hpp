@@ -250,7 +250,7 @@ class ChannelGates {
     return moving >= kSeveral && along > kSameWay * std::sqrt(here * before);
   }
   static constexpr double kAlike = 2.5;    // times: steps of a blow that turns at its peak
-  static constexpr double kSameWay = 0.8;  // cosine: one in 15 pairs of random steps of five axes has it
+  static constexpr double kSameWay = 0.8;  // cosine: one in 36 pairs of random steps of five axes has it
   static constexpr int kSeveral = 2;       // other axes that move: more than the crosstalk of one that fails
 
   // Of the steps that are too large for their channel: what known friction has made of them counts
@@ -446,7 +446,7 @@ class ChannelGates {
     begin_tracking(c);
   }
 
-  static constexpr int kGrows = 2;  // samples in a row in which an axis goes on: one is chance in eight
+  static constexpr int kGrows = 2;  // samples in a row in which an axis goes on: of noise one in seven does
 
   // The last good reading stands for this one; a joint is where its speed has brought it.
   void hold(std::size_t c, double dt) {
