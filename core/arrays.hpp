@@ -87,10 +87,21 @@ inline std::pair<std::size_t, std::size_t> ends(nb::handle part) {
   return {static_cast<std::size_t>(start), static_cast<std::size_t>(stop)};
 }
 
-// Columns of an array of float64 (..., width) as a view: (..., count), or (..., count / columns,
-// columns) unless `columns` is 0.
-inline nb::object view(nb::handle object, nb::handle part, std::size_t columns) {
-  const auto [first, last] = ends(part);
+// A new array that shows numbers of `owner`, which lives as long as it.
+inline nb::object shown(nb::handle owner, int axes, npy_intp* dims, npy_intp* strides, void* data,
+                        int flags) {
+  nb::object out = nb::steal(PyArray_NewFromDescr(&PyArray_Type, PyArray_DescrFromType(NPY_DOUBLE), axes,
+                                                  dims, strides, data, flags, nullptr));
+  if (!out.is_valid()) throw nb::python_error();
+  owner.inc_ref();
+  if (PyArray_SetBaseObject(reinterpret_cast<PyArrayObject*>(out.ptr()), owner.ptr()) < 0)
+    throw nb::python_error();
+  return out;
+}
+
+// Columns [first, last) of an array of float64 (..., width) as a view: (..., count), or
+// (..., count / columns, columns) unless `columns` is 0.
+inline nb::object view(nb::handle object, std::size_t first, std::size_t last, std::size_t columns) {
   const std::size_t count = last - first;
   if (!PyArray_Check(object.ptr())) throw nb::type_error("not an array");
   PyArrayObject* array = reinterpret_cast<PyArrayObject*>(object.ptr());
@@ -111,14 +122,12 @@ inline nb::object view(nb::handle object, nb::handle part, std::size_t columns) 
     strides[axes - 1] = static_cast<npy_intp>(columns) * step;
   }
   char* data = PyArray_BYTES(array) + static_cast<npy_intp>(first) * step;
-  nb::object out = nb::steal(PyArray_NewFromDescr(
-      &PyArray_Type, PyArray_DescrFromType(NPY_DOUBLE), axes + (split ? 1 : 0), dims, strides,
-      data, PyArray_FLAGS(array) & NPY_ARRAY_WRITEABLE, nullptr));
-  if (!out.is_valid()) throw nb::python_error();
-  object.inc_ref();
-  if (PyArray_SetBaseObject(reinterpret_cast<PyArrayObject*>(out.ptr()), object.ptr()) < 0)
-    throw nb::python_error();
-  return out;
+  return shown(object, axes + (split ? 1 : 0), dims, strides, data,
+               PyArray_FLAGS(array) & NPY_ARRAY_WRITEABLE);
+}
+inline nb::object view(nb::handle object, nb::handle part, std::size_t columns) {
+  const auto [first, last] = ends(part);
+  return view(object, first, last, columns);
 }
 
 // The number at the beginning of a slice of an array of float64 with one axis, as an integer.

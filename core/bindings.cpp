@@ -101,7 +101,8 @@ nb::object poses(Observer& shared, nb::handle q) {
   const guard::Turn turn(shared.turn);
   o.terms().sweep(positions, rest.data());
   for (std::size_t i = 0; i < count; ++i) {
-    const tl::NodeState<double>& X = o.terms().state().node(static_cast<int>(i));
+    const tl::NodeState<double>& state = o.terms().state().node(static_cast<int>(i));
+    const tl::Pose X{tl::plain(state.R), tl::plain(state.p)};
     const double rows[16] = {X.R.x.x, X.R.y.x, X.R.z.x, X.p.x, X.R.x.y, X.R.y.y, X.R.z.y, X.p.y,
                              X.R.x.z, X.R.y.z, X.R.z.z, X.p.z, 0.0,     0.0,     0.0,     1.0};
     std::copy(rows, rows + 16, out.data() + 16 * i);
@@ -229,7 +230,7 @@ void bind(nanobind::module_& m) {
   localization::bind(m);
   detection::bind(m);
   pipelines::bind(m);
-  m.def("view", &arrays::view, "rows"_a, "part"_a, "columns"_a,
+  m.def("view", nb::overload_cast<nb::handle, nb::handle, std::size_t>(&arrays::view), "rows"_a, "part"_a, "columns"_a,
         nb::sig("def view(rows: " TOUCHLINE_ARRAY ", part: slice, columns: int) -> " TOUCHLINE_ARRAY));
   m.def("whole", &arrays::whole, "row"_a, "part"_a,
         nb::sig("def whole(row: " TOUCHLINE_ARRAY ", part: slice) -> int"));

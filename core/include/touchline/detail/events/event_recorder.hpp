@@ -300,7 +300,7 @@ class EventRecorder {
       const LinkSurface& surface = localizer_.surfaces()[p.surface];
       const Vec3 point = surface.mesh.nearest_to_point(p.point).point;
       const NodeState<double>& X = state_.node(surface.node);
-      out.candidates.of[i] = {p.surface, p.share, X.R * point + X.p, 0.0};
+      out.candidates.of[i] = {p.surface, p.share, plain(X.R * point + X.p), 0.0};
       if (i == 0) best = point;
     }
     out.candidates.count = count;
@@ -352,8 +352,8 @@ class EventRecorder {
       const Node& node = robot_.nodes[i];
       if (node.coordinate < 0 || std::isnan(limits_[node.coordinate])) continue;
       const NodeState<double>& X = state_.node(i);
-      const Vec3 load = node.kind == NodeKind::prismatic ? force : moment - cross(X.p, force);
-      if (std::fabs(node.multiplier * dot(X.R.z, load)) > limits_[node.coordinate])
+      const Vec3 load = node.kind == NodeKind::prismatic ? force : moment - cross(plain(X.p), force);
+      if (std::fabs(node.multiplier * dot(plain(X.R.z), load)) > limits_[node.coordinate])
         return node.coordinate;
     }
     return -1;

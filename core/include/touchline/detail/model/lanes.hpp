@@ -40,18 +40,28 @@ inline double lane(const Lanes& v, int i) { return v[i]; }
 inline void set_lane(Lanes& v, int i, double x) { v[i] = x; }
 #endif
 
-// The lanes moved on by one: the first takes the last of `before`.
-inline Lanes shifted(const Lanes& before, const Lanes& v) {
-  Lanes out = v;
-#if defined(__GNUC__) || defined(__clang__)
-#if defined(__AVX__)
-  out = __builtin_shufflevector(before, v, 3, 4, 5, 6);
+inline Lanes all_lanes(double x) {
+#if defined(__AVX__) && (defined(__GNUC__) || defined(__clang__))
+  return Lanes{x, x, x, x};
+#elif defined(__GNUC__) || defined(__clang__)
+  return Lanes{x, x};
 #else
-  out = __builtin_shufflevector(before, v, 1, 2);
+  return x;
 #endif
+}
+
+// The lanes moved on by one: the first takes `before`, and `before` the last.
+inline Lanes move_on(double& before, const Lanes& v) {
+#if defined(__AVX__) && (defined(__GNUC__) || defined(__clang__))
+  const Lanes turned = __builtin_shufflevector(v, v, 3, 0, 1, 2);
+  const Lanes out = __builtin_shufflevector(all_lanes(before), turned, 0, 5, 6, 7);
+#elif defined(__GNUC__) || defined(__clang__)
+  const Lanes turned = __builtin_shufflevector(v, v, 1, 0);
+  const Lanes out = __builtin_shufflevector(all_lanes(before), turned, 0, 3);
 #else
-  out = before;
+  const Lanes turned = v, out = before;
 #endif
+  before = lane(turned, 0);
   return out;
 }
 
@@ -130,8 +140,6 @@ inline LaneMask between(const Lanes& v, double low, double high) { return (v > l
 inline LaneMask within(const Lanes& v, double low, double high) {
   return (v >= low) & (v <= high);
 }
-
-inline Lanes all_lanes(double x) { return Lanes{} + x; }
 
 // An instruction for all lanes: a library's root of each has an error to report.
 inline Lanes root(Lanes x) {

@@ -95,10 +95,10 @@ class Posture {
   void place(std::size_t i) {
     const NodeState<double>& s = state_.node(static_cast<int>(i));
     const Node& node = tree_.nodes()[i];
-    poses_[i] = {s.R, s.p};
-    twists_[i] = {s.velocity + cross(s.p, s.angular), s.angular};
-    const Vec3 axis = node.multiplier * s.R.z;
-    if (node.kind == NodeKind::revolute) subspaces_[i] = {cross(s.p, axis), axis};
+    poses_[i] = {plain(s.R), plain(s.p)};
+    twists_[i] = {plain(s.velocity + cross(s.p, s.angular)), plain(s.angular)};
+    const Vec3 axis = plain(node.multiplier * s.R.z);
+    if (node.kind == NodeKind::revolute) subspaces_[i] = {cross(poses_[i].p, axis), axis};
     if (node.kind == NodeKind::prismatic) subspaces_[i] = {axis, {}};
   }
 

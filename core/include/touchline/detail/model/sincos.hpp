@@ -15,6 +15,7 @@ namespace touchline {
 
 // Up to here the products with the parts of pi/2 below are exact.
 constexpr double kLargestAngle = 1e5;
+constexpr std::uint64_t kMagnitude = 0x7fffffffffffffffu;  // of a double: all bits but its sign
 
 namespace detail {
 
@@ -59,6 +60,10 @@ inline void sincos_reduced(double x, double& sine, double& cosine) {
 inline void sincos(const double* __restrict angles, std::size_t count,
                    double* __restrict sines, double* __restrict cosines) {
   for (std::size_t i = 0; i < count; ++i) detail::sincos_reduced(angles[i], sines[i], cosines[i]);
+  std::uint64_t within = ~std::uint64_t{0};  // the sign bit stays as long as all differences are negative
+  const std::uint64_t beyond = detail::to_bits(kLargestAngle) + 1;
+  for (std::size_t i = 0; i < count; ++i) within &= (detail::to_bits(angles[i]) & kMagnitude) - beyond;
+  if (within >> 63 != 0) return;
   for (std::size_t i = 0; i < count; ++i) {
     if (std::fabs(angles[i]) <= kLargestAngle) continue;
     sines[i] = std::sin(angles[i]);

@@ -6,6 +6,13 @@
 
 #include <cmath>
 
+// Calls of functions this small cost as much as the work in them.
+#if defined(__GNUC__) || defined(__clang__)
+#define TOUCHLINE_INLINE __attribute__((always_inline)) inline
+#else
+#define TOUCHLINE_INLINE inline
+#endif
+
 namespace touchline {
 
 template <class T>
@@ -32,11 +39,11 @@ BasicVec3<Product<A, B>> operator*(const A& s, const BasicVec3<B>& a) {
   return {s * a.x, s * a.y, s * a.z};
 }
 template <class A, class B>
-Product<A, B> dot(const BasicVec3<A>& a, const BasicVec3<B>& b) {
+TOUCHLINE_INLINE Product<A, B> dot(const BasicVec3<A>& a, const BasicVec3<B>& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 template <class A, class B>
-BasicVec3<Product<A, B>> cross(const BasicVec3<A>& a, const BasicVec3<B>& b) {
+TOUCHLINE_INLINE BasicVec3<Product<A, B>> cross(const BasicVec3<A>& a, const BasicVec3<B>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
@@ -47,7 +54,7 @@ struct BasicMat3 {
 };
 
 template <class A, class B>
-BasicVec3<Product<A, B>> operator*(const BasicMat3<A>& m, const BasicVec3<B>& v) {
+TOUCHLINE_INLINE BasicVec3<Product<A, B>> operator*(const BasicMat3<A>& m, const BasicVec3<B>& v) {
   return {m.x.x * v.x + m.y.x * v.y + m.z.x * v.z, m.x.y * v.x + m.y.y * v.y + m.z.y * v.z,
           m.x.z * v.x + m.y.z * v.y + m.z.z * v.z};
 }
@@ -57,7 +64,7 @@ BasicMat3<Product<A, B>> operator*(const BasicMat3<A>& a, const BasicMat3<B>& b)
 }
 // m^T v without forming the transpose.
 template <class A, class B>
-BasicVec3<Product<A, B>> transposed_times(const BasicMat3<A>& m, const BasicVec3<B>& v) {
+TOUCHLINE_INLINE BasicVec3<Product<A, B>> transposed_times(const BasicMat3<A>& m, const BasicVec3<B>& v) {
   return {dot(m.x, v), dot(m.y, v), dot(m.z, v)};
 }
 
@@ -98,13 +105,13 @@ using Pose = BasicPose<double>;
 
 // A wrench from frame B to A, with the pose of B in A.
 template <class T>
-BasicSpatial<T> wrench_to_parent(const BasicPose<T>& X, const BasicSpatial<T>& w) {
+TOUCHLINE_INLINE BasicSpatial<T> wrench_to_parent(const BasicPose<T>& X, const BasicSpatial<T>& w) {
   const BasicVec3<T> f = X.R * w.linear;
   return {f, X.R * w.angular + cross(X.p, f)};
 }
 // A wrench from frame A to B, with the pose of B in A.
 template <class T>
-BasicSpatial<T> wrench_to_child(const BasicPose<T>& X, const BasicSpatial<T>& w) {
+TOUCHLINE_INLINE BasicSpatial<T> wrench_to_child(const BasicPose<T>& X, const BasicSpatial<T>& w) {
   return {transposed_times(X.R, w.linear),
           transposed_times(X.R, w.angular - cross(X.p, w.linear))};
 }

@@ -91,10 +91,7 @@ class Filters {
   double* values() { return value_.data(); }
   // Has every row the same pole? It is for a step of `dt` [s]:
   bool alike() const { return poles_.size() == 1; }
-  double only_pole(double dt) {
-    if (dt != dt_) set_poles(dt);
-    return poles_[0];
-  }
+  double only_pole(double dt) const { return dt == dt_ ? poles_[0] : pole_of(0, dt); }
   // The poles of all rows for a step of `dt` [s].
   void write_poles(double dt, double* out) {
     if (dt != dt_) set_poles(dt);

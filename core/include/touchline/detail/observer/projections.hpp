@@ -45,15 +45,16 @@ class Projections {
     }
   }
 
-  // The same for samples side by side. `before`: terms of the samples before these, in whose last
-  // lane is the one before the first.
-  void project(const Lanes* before, const Lanes* terms, const Lanes* e, std::size_t used,
+  // The same for samples side by side. `before`: the subspaces of the sample before the first, which
+  // those of the last one replace.
+  void project(double* before, const Lanes* terms, const Lanes* e, std::size_t used,
                Lanes* values) const {
     for (std::size_t i = 0; i < used; ++i) {
       Lanes S[6];
       for (std::size_t c = 0; c < 6; ++c) {
-        const std::size_t at = first_ + c * lines_ + i;
-        S[c] = 0.5 * (shifted(before[at], terms[at]) + terms[at]);
+        const std::size_t at = c * lines_ + i;
+        const Lanes& now = terms[first_ + at];
+        S[c] = 0.5 * (move_on(before[at], now) + now);
       }
       for (std::size_t s = 0; s < needed_.size(); ++s) {
         if (!needed_[s]) continue;

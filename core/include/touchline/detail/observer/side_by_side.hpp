@@ -40,12 +40,10 @@ class SideBySide {
         q_(2 * joints.size()),
         logged_(joints.size() + 6 * sensors.size()),
         terms_(terms.at().width()),
-        terms_before_(terms_.size()),
-        p_(channels.balances.size(), all_lanes(kNaN)),
-        u_(p_),
-        p_before_(p_),
-        u_before_(p_),
-        e_(padded(p_.size()), all_lanes(kNaN)),
+        lines_before_(6 * terms.at().lines, 0.0),
+        p_before_(channels.balances.size(), kNaN),
+        u_before_(p_before_),
+        e_(padded(p_before_.size()), all_lanes(kNaN)),
         projected_(projections.room(), Lanes{}),
         inputs_(padded(channels.filters.size()), all_lanes(kNaN)),
         values_(inputs_.size(), kNaN),
@@ -87,10 +85,7 @@ class SideBySide {
   }
 
   // The terms of the samples that have been read.
-  void evaluate() {
-    terms_.swap(terms_before_);
-    model_.evaluate(q_.data(), q_.data() + joints_.size(), terms_.data());
-  }
+  void evaluate() { model_.evaluate(q_.data(), q_.data() + joints_.size(), terms_.data()); }
   void evaluate(const double* q, const double* qd) {
     const std::size_t n = joints_.size();
     gather(q, n, n, q_.data());
@@ -103,12 +98,10 @@ class SideBySide {
 
   // Begins with what single steps have left; `terms`: of the last sample.
   void enter(const double* terms) {
-    for (std::size_t i = 0; i < terms_.size(); ++i) terms_[i] = all_lanes(terms[i]);
+    std::copy_n(terms + model_.at().subspaces(), lines_before_.size(), lines_before_.begin());
     Balances& balances = channels_.balances;
-    for (std::size_t i = 0; i < p_.size(); ++i) {
-      p_[i] = all_lanes(balances.momenta()[i]);
-      u_[i] = all_lanes(balances.loads()[i]);
-    }
+    std::copy_n(balances.momenta(), p_before_.size(), p_before_.begin());
+    std::copy_n(balances.loads(), u_before_.size(), u_before_.begin());
     std::copy_n(channels_.filters.values(), channels_.filters.size(), values_.begin());
   }
 
@@ -116,41 +109,32 @@ class SideBySide {
   void leave(double* terms) const {
     copy_terms(kLanes - 1, terms);
     Balances& balances = channels_.balances;
-    for (std::size_t i = 0; i < p_.size(); ++i) {
-      balances.momenta()[i] = lane(p_[i], kLanes - 1);
-      balances.loads()[i] = lane(u_[i], kLanes - 1);
-    }
+    std::copy(p_before_.begin(), p_before_.end(), balances.momenta());
+    std::copy(u_before_.begin(), u_before_.end(), balances.loads());
     std::copy_n(values_.begin(), channels_.filters.size(), channels_.filters.values());
   }
 
-  // After `evaluate`: momenta, known loads, innovations and what these do to the joints.
+  // After `evaluate`: innovations of momenta and known loads, and what these do to the joints.
   void balance(const Instant* now) {
-    p_.swap(p_before_);
-    u_.swap(u_before_);
     const TermsLayout& at = model_.at();
     const std::size_t n = at.joints;
-    for (std::size_t j = 0; j < n; ++j) p_[j] = terms_[at.joint_momentum() + j];
-    torques_.read(logged_.data(), q_.data(), q_.data() + n, terms_.data() + at.joint_bias(), u_.data());
-    for (std::size_t s = 0; s < at.sensors; ++s) {
-      const Lanes* terms = terms_.data() + at.sensor(s);
-      const std::size_t first = row(channels_.sensor(s));
-      const BasicSpatial<Lanes> reading = wrenches_[s].read(logged_.data() + n + 6 * s);
-      const BasicSpatial<Lanes> weight = sensors_[s].gravity_compensated
-                                             ? BasicSpatial<Lanes>{}
-                                             : load(terms + TermsLayout::kWeight);
-      store(load(terms + TermsLayout::kMomentum), p_.data() + first);
-      store(wrench_to_parent(load_pose(terms + TermsLayout::kPose), reading) + weight,
-            u_.data() + first);
-    }
-    for (std::size_t g = 0; g < layout_.segments.size(); ++g) add_segment(g);
     Lanes rate;
     for (int k = 0; k < kLanes; ++k) set_lane(rate, k, now[k].time - now[k].before);
     rate = 1.0 / rate;
-    for (std::size_t i = 0; i < p_.size(); ++i) {
-      e_[i] = rate * (p_[i] - shifted(p_before_[i], p_[i])) -
-              0.5 * (shifted(u_before_[i], u_[i]) + u_[i]);
+    torques_.read(logged_.data(), q_.data(), q_.data() + n, terms_.data() + at.joint_bias(), logged_.data());
+    balance(0, n, terms_.data() + at.joint_momentum(), logged_.data(), rate);
+    for (std::size_t s = 0; s < at.sensors; ++s) {
+      const Lanes* terms = terms_.data() + at.sensor(s);
+      Lanes* u = logged_.data() + n + 6 * s;
+      const BasicSpatial<Lanes> reading = wrenches_[s].read(u);
+      const BasicSpatial<Lanes> weight = sensors_[s].gravity_compensated
+                                             ? BasicSpatial<Lanes>{}
+                                             : load(terms + TermsLayout::kWeight);
+      store(wrench_to_parent(load_pose(terms + TermsLayout::kPose), reading) + weight, u);
+      balance(row(channels_.sensor(s)), 6, terms + TermsLayout::kMomentum, u, rate);
     }
-    projections_.project(terms_before_.data(), terms_.data(), e_.data() + channels_.sensor_rows(),
+    for (std::size_t g = 0; g < layout_.segments.size(); ++g) balance_segment(g, rate);
+    projections_.project(lines_before_.data(), terms_.data(), e_.data() + channels_.sensor_rows(),
                          layout_.lines.size(), projected_.data());
   }
 
@@ -193,15 +177,17 @@ class SideBySide {
     }
     put(e_.data(), n, out + row_.joint_innovation());
     const std::size_t wrenches = channels_.filters.group(channels_.segment_filter(0)).first;
-    for (int i = 0; i < 6 * row_.segments; ++i) segment_wrenches_[i] = filtered(wrenches + i);
+    for (std::size_t i = wrenches / kLanes * kLanes; i < wrenches + 6 * row_.segments; i += kLanes)
+      transpose(inputs_.data() + i);  // of all samples row by row again
+    const Lanes* segment_wrenches = inputs_.data() + wrenches;
     for (int s = 0; s < row_.sensors; ++s) {
       BasicSpatial<Lanes> sum;
-      for (int g : layout_.segments_outboard[s]) sum = sum + load(segment_wrenches_.data() + 6 * g);
+      for (int g : layout_.segments_outboard[s]) sum = sum + load(segment_wrenches + 6 * g);
       const Lanes* pose = terms_.data() + model_.at().sensor(s) + TermsLayout::kPose;
       store(wrench_to_child(load_pose(pose), sum), sensor_wrenches_.data() + 6 * s);
     }
     put(sensor_wrenches_.data(), 6 * row_.sensors, out + row_.sensor_wrench());
-    put(segment_wrenches_.data(), 6 * row_.segments, out + row_.segment_wrench());
+    put(segment_wrenches, 6 * row_.segments, out + row_.segment_wrench());
     put(e_.data() + row(channels_.segment(0)), 6 * row_.segments, out + row_.segment_innovation());
     const std::size_t size = quality.size(), blocks = size / kLanes * kLanes;
     for (int k = 0; k < kLanes; ++k) {
@@ -225,36 +211,48 @@ class SideBySide {
     store_lanes(value, values_.data() + i);
   }
 
-  // A segment's momentum and load: those of its sensor without those of the next ones outboard.
-  void add_segment(std::size_t g) {
-    const Segment& segment = layout_.segments[g];
-    if (segment.sensor < 0) return;
-    const std::size_t to = row(channels_.segment(g)), from = row(channels_.sensor(segment.sensor));
-    BasicSpatial<Lanes> p = load(p_.data() + from), u = load(u_.data() + from);
-    for (int t : segment.successors) {
-      const std::size_t next = row(channels_.sensor(t));
-      p = p - load(p_.data() + next);
-      u = u - load(u_.data() + next);
+  // Rows from `first` on: from momenta and known loads to the mean external loads.
+  void balance(std::size_t first, std::size_t count, const Lanes* p, const Lanes* u, const Lanes& rate) {
+    double *p_before = p_before_.data() + first, *u_before = u_before_.data() + first;
+    Lanes* e = e_.data() + first;
+    for (std::size_t i = 0; i < count; ++i) {
+      e[i] = rate * (p[i] - move_on(p_before[i], p[i])) - 0.5 * (move_on(u_before[i], u[i]) + u[i]);
     }
-    store(p, p_.data() + to);
-    store(u, u_.data() + to);
   }
 
-  // Row i of the filters, of all samples.
-  Lanes filtered(std::size_t i) const {
-    const Lanes* of_rows = inputs_.data() + i / kLanes * kLanes;
-    Lanes v;
-    for (int k = 0; k < kLanes; ++k) set_lane(v, k, lane(of_rows[k], static_cast<int>(i % kLanes)));
-    return v;
+  // A segment's momentum and load: those of its sensor without those of the next ones outboard.
+  void balance_segment(std::size_t g, const Lanes& rate) {
+    const Segment& segment = layout_.segments[g];
+    if (segment.sensor < 0) return;
+    Lanes p[6], u[6];
+    std::copy_n(momentum(segment.sensor), 6, p);
+    std::copy_n(load_of(segment.sensor), 6, u);
+    for (int t : segment.successors) {
+      const Lanes *of_next = momentum(t), *on_next = load_of(t);
+      for (std::size_t i = 0; i < 6; ++i) p[i] -= of_next[i];
+      for (std::size_t i = 0; i < 6; ++i) u[i] -= on_next[i];
+    }
+    balance(row(channels_.segment(g)), 6, p, u, rate);
   }
+  // Of what is outboard of sensor s, and on it: six rows each.
+  const Lanes* momentum(int s) const {
+    return terms_.data() + model_.at().sensor(static_cast<std::size_t>(s)) + TermsLayout::kMomentum;
+  }
+  const Lanes* load_of(int s) const { return logged_.data() + joints_.size() + 6 * s; }
 
   // `count` columns of all rows of the output.
   void put(const Lanes* columns, std::size_t count, double* out) const {
     const std::size_t width = row_.width();
-    for (std::size_t i = 0; i < count; i += kLanes) {
+    if (count < kLanes) {
+      for (std::size_t i = 0; i < count; ++i) {
+        for (int k = 0; k < kLanes; ++k) out[k * width + i] = lane(columns[i], k);
+      }
+      return;
+    }
+    for (std::size_t next = 0; next < count; next += kLanes) {
+      const std::size_t i = std::min(next, count - kLanes);  // the last block reaches back
       Lanes block[kLanes];
-      for (std::size_t c = 0; c < kLanes; ++c)
-        block[c] = columns[std::min(i + c, count - 1)];
+      for (std::size_t c = 0; c < kLanes; ++c) block[c] = columns[i + c];
       transpose(block);
       for (int k = 0; k < kLanes; ++k) store_lanes(block[k], out + k * width + i);
     }
@@ -271,11 +269,12 @@ class SideBySide {
   RowLayout row_;
   bool possible_ = false;
   std::vector<Lanes> q_;  // positions, then velocities
-  std::vector<Lanes> logged_;  // torques, then wrenches
-  std::vector<Lanes> terms_, terms_before_;
-  std::vector<Lanes> p_, u_, p_before_, u_before_, e_;  // as in the balances
+  std::vector<Lanes> logged_;  // torques, then wrenches; after `balance` the known loads instead
+  std::vector<Lanes> terms_;
+  std::vector<double> lines_before_;  // of the last sample, as among the terms
+  std::vector<double> p_before_, u_before_;  // of the last sample, as in the balances
+  std::vector<Lanes> e_;                     // likewise
   std::vector<Lanes> projected_, inputs_;
-  std::vector<Lanes> segment_wrenches_ = std::vector<Lanes>(6 * row_.segments);
   std::vector<Lanes> sensor_wrenches_ = std::vector<Lanes>(6 * row_.sensors);
   // Of the filters: values and poles by row; per kLanes rows the poles of each sample, and what is
   // left to 1.

@@ -43,11 +43,18 @@ class Terms {
   Terms(const Tree& tree, const Layout& layout, const std::vector<JointRow>& joints,
         const std::vector<SensorRow>& sensors, std::vector<char> local)
       : tree_(tree),
-        joints_(joints),
         sensors_(sensors),
         local_(std::move(local)),
         at_{joints.size(), (layout.lines.size() + 3) / 4 * 4, sensors.size()},
-        state_(tree.make_state<T>()) {}
+        state_(tree.make_state<T>()) {
+    for (const JointRow& joint : joints) {
+      rows_.push_back({joint.rotor_inertia, joint.compensated, joint.nodes.size()});
+      for (int i : joint.nodes) {
+        const Node& node = tree.nodes()[i];
+        lines_.push_back({node.multiplier, i, node.kind == NodeKind::revolute});
+      }
+    }
+  }
 
   const TermsLayout& at() const { return at_; }
   const TreeState<T>& state() const { return state_; }
@@ -60,15 +67,17 @@ class Terms {
   void evaluate(const T* q, const T* qd, T* out) {
     sweep(q, qd);
     std::size_t line = 0;
-    for (std::size_t j = 0; j < joints_.size(); ++j) {
-      T p = joints_[j].rotor_inertia * qd[j], n{};
-      for (int i : joints_[j].nodes) {
-        const Vector a = axis(i);
-        add_row(i, a, p, n);
-        if (joints_[j].compensated == Compensated::gravity) n += weight_on(i, a);
-        put_line(out, line++, i, a);
+    for (std::size_t j = 0; j < rows_.size(); ++j) {
+      const Row& row = rows_[j];
+      T p = row.rotor_inertia * qd[j], n{};
+      for (const std::size_t end = line + row.lines; line < end; ++line) {
+        const Line& on = lines_[line];
+        const Vector a = axis(on);
+        add_row(on, a, p, n);
+        if (row.compensated == Compensated::gravity) n += weight_on(on, a);
+        put_line(out, line, on, a);
       }
-      if (joints_[j].compensated == Compensated::model) p = n = T{};
+      if (row.compensated == Compensated::model) p = n = T{};
       put(out, at_.joint_momentum() + j, p);
       put(out, at_.joint_bias() + j, n);
     }
@@ -77,26 +86,41 @@ class Terms {
 
   // Momentum and n-bar of joint j, without regard to what its driver compensates.
   void joint_row(std::size_t j, const T& qd, T& p, T& n) const {
-    p = joints_[j].rotor_inertia * qd;
+    p = rows_[j].rotor_inertia * qd;
     n = T{};
-    for (int i : joints_[j].nodes) add_row(i, axis(i), p, n);
+    for (const Line& on : lines_) {
+      if (tree_.nodes()[on.node].coordinate == static_cast<int>(j)) add_row(on, axis(on), p, n);
+    }
   }
 
   // Momentum and n-bar of sensor s, in its own frame.
   void sensor_row(std::size_t s, BasicSpatial<T>& p, BasicSpatial<T>& n) const {
     const int i = sensors_[s].node;
     const NodeState<T>& node = state_.node(i);
-    p.linear = transposed_times(node.R, node.linear_momentum);
-    p.angular = transposed_times(node.R, node.angular_momentum);
-    n.linear = transposed_times(node.R, force_bias(i));
-    n.angular = transposed_times(node.R, moment_bias(i));
+    p.linear = plain(transposed_times(node.R, node.linear_momentum));
+    p.angular = plain(transposed_times(node.R, node.angular_momentum));
+    n.linear = plain(transposed_times(node.R, force_bias(i)));
+    n.angular = plain(transposed_times(node.R, moment_bias(i)));
   }
 
  private:
-  using Vector = BasicVec3<T>;
+  using Vector = typename Packing<T>::Vector;
+  using Matrix = typename Packing<T>::Matrix;
 
-  bool turns(int i) const { return tree_.nodes()[i].kind == NodeKind::revolute; }
-  Vector axis(int i) const { return tree_.nodes()[i].multiplier * state_.node(i).R.z; }
+  // What a joint has and, of each node that moves with it, its line of action: close together, since
+  // a core's first cache has to hold all that a step of several samples works on.
+  struct Row {
+    double rotor_inertia;
+    Compensated compensated;
+    std::size_t lines;
+  };
+  struct Line {
+    double multiplier;
+    int node;
+    bool turns;
+  };
+
+  Vector axis(const Line& on) const { return on.multiplier * state_.node(on.node).R.z; }
 
   // The wrench of gravity on all outboard of node i, about that node's origin.
   Vector weight(int i) const { return (T{} + tree_.mass_outboard(i)) * tree_.gravity(); }
@@ -115,27 +139,27 @@ class Terms {
            weight_moment(i);
   }
 
-  // The part of node i with axis a in its joint's momentum and n-bar.
-  void add_row(int i, const Vector& a, T& p, T& n) const {
-    const NodeState<T>& s = state_.node(i);
-    if (turns(i)) {
+  // The part of a node with axis a in its joint's momentum and n-bar.
+  void add_row(const Line& on, const Vector& a, T& p, T& n) const {
+    const NodeState<T>& s = state_.node(on.node);
+    if (on.turns) {
       p += dot(a, s.angular_momentum);
-      n += dot(a, moment_bias(i));
+      n += dot(a, moment_bias(on.node));
     } else {
       p += dot(a, s.linear_momentum);
-      n += dot(a, force_bias(i));
+      n += dot(a, force_bias(on.node));
     }
   }
 
   // What gravity exerts along it.
-  T weight_on(int i, const Vector& a) const {
-    return dot(a, turns(i) ? weight_moment(i) : weight(i));
+  T weight_on(const Line& on, const Vector& a) const {
+    return dot(a, on.turns ? weight_moment(on.node) : weight(on.node));
   }
 
-  void put_line(T* out, std::size_t line, int i, const Vector& a) const {
+  void put_line(T* out, std::size_t line, const Line& on, const Vector& a) const {
     const std::size_t linear = at_.subspaces() + line, angular = linear + 3 * at_.lines;
-    if (turns(i)) {
-      put(out, linear, cross(state_.node(i).p, a), at_.lines);
+    if (on.turns) {
+      put(out, linear, cross(state_.node(on.node).p, a), at_.lines);
       put(out, angular, a, at_.lines);
     } else {
       put(out, linear, a, at_.lines);
@@ -171,20 +195,22 @@ class Terms {
     out[at] = value;
   }
   static void put(T* out, std::size_t at, const Vector& v, std::size_t stride = 1) {
-    put(out, at, v.x);
-    put(out, at + stride, v.y);
-    put(out, at + 2 * stride, v.z);
+    const BasicVec3<T>& a = plain(v);
+    put(out, at, a.x);
+    put(out, at + stride, a.y);
+    put(out, at + 2 * stride, a.z);
   }
-  static void put(T* out, std::size_t at, const BasicMat3<T>& m) {
+  static void put(T* out, std::size_t at, const Matrix& m) {
     put(out, at, m.x);
     put(out, at + 3, m.y);
     put(out, at + 6, m.z);
   }
 
   const Tree& tree_;
-  const std::vector<JointRow>& joints_;
   const std::vector<SensorRow>& sensors_;
   std::vector<char> local_;
+  std::vector<Row> rows_;    // one per joint
+  std::vector<Line> lines_;  // joint by joint
   TermsLayout at_;
   TreeState<T> state_;
 };
