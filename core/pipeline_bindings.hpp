@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "arrays.hpp"
+#include "at_once.hpp"
 #include "fields.hpp"
 #include "guard.hpp"
 #include "localizer_bindings.hpp"
@@ -198,6 +199,25 @@ inline nb::object update(Pipeline& p, double time, nb::handle q, nb::handle qd, 
   numbers.swap(p.snapshot);
   return out;
 }
+
+// A pipeline each of whose updates makes an instance of a class. It works out its fields when they are
+// asked for, from the numbers of the sample and `layout`, where they stand.
+struct Resulting {
+  Pipeline& pipeline;
+  nb::object type, layout;
+  nb::object source = at_once::interned("_source");
+
+  nb::object update(double time, nb::handle q, nb::handle qd, nb::handle tau, nb::handle wrench) {
+    const nb::object numbers = pipelines::update(pipeline, time, q, qd, tau, wrench);
+    const nb::object result =
+        nb::steal(PyType_GenericAlloc(reinterpret_cast<PyTypeObject*>(type.ptr()), 0));
+    const nb::object from = nb::steal(PyTuple_Pack(2, numbers.ptr(), layout.ptr()));
+    if (!result.is_valid() || !from.is_valid() ||
+        PyObject_GenericSetAttr(result.ptr(), source.ptr(), from.ptr()) < 0)
+      throw nb::python_error();
+    return result;
+  }
+};
 
 // N samples: rows of the observer, what the detector says of each, and contacts: the sample, then
 // the numbers of the contact.
@@ -433,7 +453,6 @@ inline void bind(nb::module_& m) {
             new (self) Pipeline(robot, tuning);
           },
           "robot"_a, "tuning"_a)
-      .def("update", &update, "time"_a, "q"_a, "qd"_a, "tau"_a.none(), "wrench"_a.none())
       .def("run", &run, "time"_a, "q"_a, "qd"_a, "tau"_a, "wrench"_a)
       .def("events", &events, "since"_a)
       .def("restart", &restart, "robot"_a, "same"_a = false)
@@ -453,6 +472,16 @@ inline void bind(nb::module_& m) {
              return localization::region(p.value->region());
            })
       .def_prop_ro("slices", &slices);
+  nb::class_<Resulting>(m, "Resulting")
+      .def("__init__",
+           [](Resulting* self, Pipeline& pipeline, nb::object type, nb::object layout) {
+             new (self) Resulting{pipeline, type, layout};
+           },
+           nb::keep_alive<1, 2>(), "pipeline"_a, "type"_a, "layout"_a)
+      .def("update", &Resulting::update, "time"_a, "q"_a, "qd"_a, "tau"_a.none(), "wrench"_a.none())
+      .def_static("take_over", &at_once::take_over<Resulting>, "type"_a,
+                  nb::sig("def take_over(type: type) -> None"));
+
 }
 
 }  // namespace touchline::pipelines

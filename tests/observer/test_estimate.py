@@ -2,7 +2,10 @@
 """An estimate is a value: it can be compared, copied, stored and read."""
 
 import copy
+import gc
+import inspect
 import pickle
+import sys
 
 import numpy as np
 import pytest
@@ -16,6 +19,98 @@ def estimates():
     rng = np.random.default_rng(0)
     signals = rng.normal(size=(5, 7)), rng.normal(size=(5, 7)), rng.normal(size=(5, 7))
     return observer.run(np.arange(5) * 1e-3, *signals, rng.normal(size=(5, 3, 6)))
+
+
+@pytest.fixture
+def observer():
+    return tl.Observer(tl.load_robot("sara"))
+
+
+@pytest.fixture
+def samples(observer):
+    """Of an arm that moves, as arrays of float64."""
+    rng = np.random.default_rng(1)
+    n, k = len(observer.robot.joint_names), len(observer.robot.sensor_names)
+    return [
+        (i * 1e-3, *(rng.normal(size=size) for size in (n, n, n, (k, 6)))) for i in range(1, 30)
+    ]
+
+
+@pytest.mark.parametrize("make", [tl.Observer, tl.Pipeline])
+def test_an_update_is_the_same_however_its_signals_are_given(samples, make):
+    """Arrays of float64 go to the core at once, all else by way of Python."""
+    at_once, listed, named = (make(tl.load_robot("sara")) for _ in range(3))
+    for time, *signals in samples:
+        names = dict(zip(("q", "qd", "tau", "wrench"), signals, strict=True))
+        result = at_once.update(time, *signals)
+        assert result == listed.update(time, *(x.tolist() for x in signals))
+        assert result == named.update(time=time, **names)
+
+
+@pytest.mark.parametrize("make", [tl.Observer, tl.Pipeline])
+def test_a_class_may_take_samples_in_another_way(samples, make):
+    class Doubled(make):
+        def update(self, time, q, qd, tau=None, wrench=None):
+            return super().update(time, q, qd, 2.0 * tau, wrench)
+
+    ours, plain = Doubled(tl.load_robot("sara")), make(tl.load_robot("sara"))
+    for time, q, qd, tau, wrench in samples:
+        assert ours.update(time, q, qd, tau, wrench) == plain.update(time, q, qd, 2.0 * tau, wrench)
+
+
+@pytest.mark.parametrize("make", [tl.Observer, tl.Pipeline])
+def test_update_tells_what_it_takes(make):
+    assert list(inspect.signature(make.update).parameters)[1:] == [
+        "time",
+        "q",
+        "qd",
+        "tau",
+        "wrench",
+    ]
+    assert inspect.getdoc(make.update).startswith("Takes one sample")
+    with pytest.raises(TypeError, match="q"):
+        make(tl.load_robot("sara")).update(0.0)
+
+
+def test_an_estimate_lives_as_long_as_its_parts(observer, samples):
+    held = [observer.update(*sample).segment_wrench for sample in samples]
+    kept = [part.copy() for part in held]
+    gc.collect()
+    more = [observer.update(time + 1.0, *signals) for time, *signals in samples]
+    assert len(more) == len(held)
+    for part, copied in zip(held, kept, strict=True):
+        np.testing.assert_array_equal(part, copied)
+
+
+def test_updates_leave_no_references_behind(observer, samples):
+    def count():
+        gc.collect()
+        return sys.getrefcount(observer._slices), len(gc.get_objects())
+
+    def work(shift):
+        for time, *signals in samples:
+            estimate = observer.update(time + shift, *signals)
+            _ = estimate.tau_ext, estimate.sensor_wrench, estimate.health, estimate.rows
+            with pytest.raises(ValueError, match="shape"):
+                observer.update(time + shift, signals[0][:2], *signals[1:])
+
+    work(0.0)
+    before = count()
+    for shift in (1.0, 2.0, 3.0):
+        work(shift)
+    after = count()
+    assert after[0] == before[0] and after[1] < before[1] + len(samples)
+
+
+def test_rows_of_one_sample_can_be_changed_and_exchanged(observer, samples):
+    estimate = observer.update(*samples[0])
+    estimate.rows[0] = 7.0
+    assert estimate.tau_ext[0] == 7.0
+    estimate.rows = np.zeros_like(estimate.rows)
+    assert not estimate.tau_ext.any() and estimate.health == 0
+    short = estimate.like(np.zeros(3))
+    with pytest.raises(TypeError, match="columns"):
+        _ = short.tau_ext
 
 
 @pytest.mark.parametrize("pick", [slice(None), 3])

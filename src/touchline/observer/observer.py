@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The extended momentum observer: external torques and wrenches from one sample or a recording."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -25,14 +24,14 @@ NEEDED = {  # signals that nothing can stand in for
 }
 
 
-class Estimate(Value):
+class Estimate(core.Rows, Value):
     """What the observer knows after one sample, or after each of N samples of a recording.
 
     Shapes are those of one sample; a recording's have N in front. n joints, k sensors, m segments.
     What cannot be computed is NaN.
     """
 
-    __slots__ = ("rows", "_slices")
+    __slots__ = ()
 
     def __init__(self, rows: Array, slices: dict[str, slice]) -> None:
         self.rows = rows
@@ -175,8 +174,7 @@ class Observer:
         self.robot = robot
         self.kernel = robot.kernel(method, discretization, bandwidth)
         self._slices = {name: slice(*ends) for name, ends in self.kernel.slices.items()}
-        making: Any = core.Estimating(self.kernel, Estimate, self._slices)
-        self._update: Callable[..., Estimate] = making.update
+        self._making: Any = core.Estimating(self.kernel, Estimate, self._slices)
 
     def update(
         self,
@@ -200,10 +198,8 @@ class Observer:
         """
         if not isinstance(time, float):
             require_seconds(time)
-        try:
-            return self._update(time, q, qd, tau, wrench)
-        except TypeError:  # not arrays of float64 yet
-            return self._update(*self.sample(time, q, qd, tau, wrench))
+        estimate: Estimate = self._making.update(*self.sample(time, q, qd, tau, wrench))
+        return estimate
 
     def run(
         self,
@@ -267,6 +263,9 @@ class Observer:
             else:
                 arrays.append(_numbers(signal, name, full))
         return arrays
+
+
+core.Estimating.take_over(Observer)  # arrays of float64 need none of this: the core takes them
 
 
 def require_seconds(time: ArrayLike) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -150,7 +151,6 @@ class Pipeline:
     def _begin(self) -> None:
         robot = self.robot
         self._core = core.Pipeline(self._made, self._native_tuning)
-        self._update = self._core.update
         names = Names.of(
             robot.segment_names,
             robot.joint_names,
@@ -161,6 +161,7 @@ class Pipeline:
         self._channels = channel_names(robot.joint_names, robot.sensor_names)
         self._estimates = estimate_names(robot.joint_names, robot.segment_names)
         self._layout = Layout(self._core, slices, names, self._channels, self._estimates)
+        self._making: Any = core.Resulting(self._core, Result, self._layout)
         self.contacts = ContactTable.empty(names)
         self.watch = np.empty((0, len(robot.segment_names)), np.int8)
         self.faults: tuple[FaultChange, ...] = ()
@@ -209,11 +210,8 @@ class Pipeline:
         """
         if not isinstance(time, float):
             require_seconds(time)
-        try:
-            row = self._update(time, q, qd, tau, wrench)
-        except TypeError:  # not arrays of float64 yet
-            row = self._update(*self._observer.sample(time, q, qd, tau, wrench))
-        return Result.of(row, self._layout)
+        result: Result = self._making.update(*self._observer.sample(time, q, qd, tau, wrench))
+        return result
 
     def run(
         self,
@@ -447,6 +445,9 @@ class Pipeline:
                 alone; a `Contact` has `candidates` and `covariance` in any case.
         """
         return Region.of(self.skin, self._core.region())
+
+
+core.Resulting.take_over(Pipeline)  # arrays of float64 need none of `Pipeline.update`
 
 
 def _lasting(event: Event) -> str:
