@@ -123,7 +123,8 @@ class Runner {
       unseen_.fetch_add(1);
       return;
     }
-    pipelines::take_snapshot(pipeline_, sample, result, snapshot_);
+    snapshot_.resize(pipelines::size_of_snapshot(pipeline_, result));
+    pipelines::take_snapshot(pipeline_, sample, result, snapshot_.data());
     out->clear();
     out->push_back(arrived.arrival);
     out->push_back(static_cast<double>(arrived.sequence));

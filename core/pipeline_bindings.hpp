@@ -146,29 +146,32 @@ inline void keep_ended(Pipeline& p, const tl::Result& result) {
   p.forgotten += kept - p.most;
 }
 
-inline void take_snapshot(Pipeline& of, const tl::Sample& sample, const tl::Result& result,
-                          std::vector<double>& out) {
+// How many numbers the snapshot of a sample has.
+inline std::size_t size_of_snapshot(const Pipeline& of, const tl::Result& result) {
+  return Snapshot(*of.value).end + result.contacts.size() * fields::width<tl::Contact>() +
+         result.events.size() * (fields::width<tl::Event>() + 1) + of.closed.size();
+}
+
+inline void take_snapshot(Pipeline& of, const tl::Sample& sample, const tl::Result& result, double* out) {
   const tl::RedundantPipeline& p = *of.value;
   const Snapshot at(p);
-  const std::size_t contact = fields::width<tl::Contact>(), event = fields::width<tl::Event>() + 1;
-  out.resize(at.end + result.contacts.size() * contact + result.events.size() * event +
-             of.closed.size());
-  write_row(result, p.row_layout(), out.data());
-  std::copy(result.levels.begin(), result.levels.end(), out.data() + at.levels);
-  std::copy(result.normalized.begin(), result.normalized.end(), out.data() + at.normalized);
-  std::copy(result.drift.begin(), result.drift.end(), out.data() + at.drift);
-  std::copy(result.quiet.begin(), result.quiet.end(), out.data() + at.quiet);
-  write_watch(result, out.data() + at.watch);
+  const std::size_t event = fields::width<tl::Event>() + 1;
+  write_row(result, p.row_layout(), out);
+  std::copy(result.levels.begin(), result.levels.end(), out + at.levels);
+  std::copy(result.normalized.begin(), result.normalized.end(), out + at.normalized);
+  std::copy(result.drift.begin(), result.drift.end(), out + at.drift);
+  std::copy(result.quiet.begin(), result.quiet.end(), out + at.quiet);
+  write_watch(result, out + at.watch);
   for (std::size_t c = 0; c < result.faults.size(); ++c)
     out[at.faults + c] = static_cast<double>(result.faults[c]);
-  std::copy(result.ratios.begin(), result.ratios.end(), out.data() + at.ratios);
-  double* reset = out.data() + at.resets;
+  std::copy(result.ratios.begin(), result.ratios.end(), out + at.ratios);
+  double* reset = out + at.resets;
   for (const tl::Reset& r : result.resets) reset = write_reset(r, reset);
   out[at.time] = sample.time;
-  std::copy_n(sample.q, at.contacts - at.q, out.data() + at.q);
+  std::copy_n(sample.q, at.contacts - at.q, out + at.q);
   out[at.contacts] = static_cast<double>(result.contacts.size());
   out[at.changes] = static_cast<double>(result.events.size() + of.closed.size() / event);
-  double* to = out.data() + at.end;
+  double* to = out + at.end;
   for (const tl::Contact& c : result.contacts) to = tl::write_numbers(c, to);
   to = std::copy(of.closed.begin(), of.closed.end(), to);
   of.closed.clear();
@@ -186,14 +189,24 @@ inline nb::object update(Pipeline& p, double time, nb::handle q, nb::handle qd, 
   const tl::Sample sample{time, arrays::numbers(q, {n}), arrays::numbers(qd, {n}),
                           arrays::numbers_or(tau, {n}, missing),
                           arrays::numbers_or(wrench, {k, 6}, missing)};
-  std::vector<double> numbers;  // taken out of its turn: a new array may run any code of Python
+  // A new array may run any code of Python, so none is made within a turn: one for a sample without
+  // contacts before it, and one for all else after it.
+  const std::size_t room = Snapshot(*p.value).end;
+  arrays::Out plain({room});
+  std::vector<double> numbers;
   {
     const guard::Turn turn(p.turn);
     const tl::Result result = p.value->update(sample);
     if (p.told) p.told(sample, result);
     keep_ended(p, result);
-    take_snapshot(p, sample, result, p.snapshot);
+    const std::size_t size = size_of_snapshot(p, result);
+    if (size == room) {
+      take_snapshot(p, sample, result, plain.data());
+      return plain.release();
+    }
     numbers.swap(p.snapshot);
+    numbers.resize(size);
+    take_snapshot(p, sample, result, numbers.data());
   }
   const nb::object out = arrays::line(numbers);
   numbers.swap(p.snapshot);

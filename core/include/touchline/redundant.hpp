@@ -221,7 +221,8 @@ class RedundantPipeline {
       if (left_out_.any_unsure()) left_out_.tell_unsure(faults_, result.time);
       told = &faults_;
     }
-    if (told != &sound_ || doubts_.pending()) doubts_.follow(*told, left_out_, result.time);
+    const bool news = told == &faults_ || faulty || gates_.any_moved();
+    if ((told != &sound_ && news) || doubts_.pending()) doubts_.follow(*told, left_out_, result.time);
     result.faults = {told->data(), told->size()};
     result.ratios = {ratios, told->size()};
     resets_.count(result, now_);

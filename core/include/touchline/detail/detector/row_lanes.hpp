@@ -20,6 +20,7 @@ class RowLanes {
       : values_((rows + kLanes - 1) / kLanes * kLanes, value) {}
 
   std::size_t size() const { return values_.size(); }
+  double* data() { return values_.data(); }
   double& operator[](std::size_t row) { return values_[row]; }
   double operator[](std::size_t row) const { return values_[row]; }
   Lanes at(std::size_t row) const { return load_lanes(values_.data() + row); }

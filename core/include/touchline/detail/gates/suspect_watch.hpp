@@ -11,6 +11,7 @@
 #include <limits>
 #include <vector>
 
+#include "touchline/detail/detector/row_lanes.hpp"
 #include "touchline/detail/gates/fault.hpp"
 #include "touchline/detail/place/lone_channel.hpp"
 #include "touchline/robot.hpp"
@@ -31,16 +32,35 @@ class SuspectWatch {
         since_(at_.count(), kNever),
         seen_(at_.count(), -kNever),
         until_(at_.count(), -kNever),
-        joints_(robot.joints),
-        sensors_(robot.sensors),
-        last_(at_.count() - at_.tau(), std::numeric_limits<double>::quiet_NaN()),
-        read_(last_),
-        lately_(last_),
-        stepped_(last_.size(), 0.0),
+        now_read_(at_.count() - at_.tau(), std::nan("")),
+        last_(now_read_),
+        read_(now_read_),
+        lately_(now_read_),
+        stepped_(at_.count() - at_.tau()),
         usual_(stepped_),
-        first_(last_.size()),
-        rises_(at_.count(), 0),
+        scale_(stepped_),
+        bias_(stepped_),
+        bandwidth_(stepped_),
+        held_(stepped_),
+        first_(at_.count() - at_.tau()),
+        compensated_(at_.sensors),
         innermost_(at_.sensors, 1) {
+    for (std::size_t j = 0; j < at_.joints; ++j) {
+      const JointRow& joint = robot.joints[j];
+      scale_[j] = joint.measured() ? joint.sign * joint.gain : std::nan("");
+      bias_[j] = joint.bias;
+      bandwidth_[j] = kNever;  // no filter
+    }
+    for (std::size_t s = 0; s < at_.sensors; ++s) {
+      const SensorRow& sensor = robot.sensors[s];
+      compensated_[s] = sensor.gravity_compensated ? 1 : 0;
+      for (std::size_t k = 0; k < 6; ++k) {
+        const std::size_t i = at_.joints + 6 * s + k;
+        scale_[i] = sensor.sign;
+        bias_[i] = sensor.bias[k];
+        bandwidth_[i] = sensor.bandwidth;
+      }
+    }
     for (const Segment& segment : layout.segments) {
       if (segment.sensor < 0) continue;
       for (const int outer : segment.successors) innermost_[outer] = 0;
@@ -59,17 +79,9 @@ class SuspectWatch {
     const double dt = sample.time - time_;
     time_ = sample.time;
     const double forgets = dt > 0.0 ? dt / (kLately + dt) : 0.0;
-    for (std::size_t j = 0; j < at_.joints; ++j) {
-      const JointRow& joint = joints_[j];
-      if (joint.measured()) read(j, joint.sign * joint.gain * sample.tau[j] - joint.bias, 1.0, forgets);
-    }
-    for (std::size_t s = 0; s < sensors_.size(); ++s) {
-      const SensorRow& sensor = sensors_[s];
-      const double x = dt > 0.0 ? sensor.bandwidth * dt : 0.0, follows = x / (1.0 + x);
-      for (std::size_t k = 0; k < 6; ++k)
-        read(at_.joints + 6 * s + k, sensor.sign * sample.wrench[6 * s + k] - sensor.bias[k], follows,
-             forgets);
-    }
+    std::copy_n(sample.tau, at_.joints, now_read_.data());
+    std::copy_n(sample.wrench, 6 * at_.sensors, now_read_.data() + at_.joints);
+    for (std::size_t i = 0; i < now_read_.size(); i += kLanes) read(i, dt, forgets);
   }
   // `over`: does any row of the segment exceed its limit still? Where none does a push has let go, and what
   // is left of an arm in motion is its model's error: a part of a threshold is no fault then.
@@ -79,7 +91,7 @@ class SuspectWatch {
     if (!(std::fabs(suspect.error) > least)) return;
     const char beyond = suspect.touched && is_beyond(suspect) ? 1 : 0;
     if (now_[suspect.channel] == 0 && !(since_[suspect.channel] < kNever)) began(suspect);
-    if (suspect.touched && has_risen(suspect)) rises_[suspect.channel] = 1;
+    if (suspect.touched && has_risen(suspect)) held_[suspect.channel - at_.tau()] = 1.0;
     const char little = is_little(suspect) ? 1 : 0;
     for (const int c : {suspect.channel, suspect.other}) {
       if (c < 0) continue;
@@ -98,10 +110,12 @@ class SuspectWatch {
       if (now_[c] != 0) seen_[c] = time;
       if (!(time - seen_[c] < kMissed)) {
         since_[c] = kNever;
-        beyond_[c] = rises_[c] = little_[c] = 0;
+        beyond_[c] = little_[c] = 0;
+        if (c >= at_.tau()) held_[c - at_.tau()] = 0.0;
       }
       if (now_[c] != 0 && !(since_[c] <= time)) since_[c] = time;
-      const double dwell = beyond_[c] != 0 || rises_[c] != 0 ? kLasts
+      const bool rises = c >= at_.tau() && held_[c - at_.tau()] > 0.0;
+      const double dwell = beyond_[c] != 0 || rises ? kLasts
                            : little_[c] != 0                 ? kLittleLasts
                                                              : kDwell;
       if (now_[c] != 0 && time - since_[c] >= dwell) out(static_cast<int>(c), until_[c] = time + kOut);
@@ -144,23 +158,28 @@ class SuspectWatch {
   static constexpr double kMissed = 0.01; // [s] for which noise may hide it
   static constexpr double kLeast = 0.7;   // of the threshold of a contact: what it must be wrong by
 
-  // A reading of torque or axis `i`, counted together, to its sign and scale [Nm or N, Nm].
-  void read(std::size_t i, double now, double follows, double forgets) {
-    if (now != now) return;
-    const bool first = read_[i] != read_[i];
-    read_[i] = first ? now : read_[i] + follows * (now - read_[i]);
-    if (first) lately_[i] = now;
-    else if (rises_[at_.tau() + i] == 0) lately_[i] += forgets * (now - lately_[i]);
-    const double step = first ? 0.0 : std::fabs(now - last_[i]);
-    stepped_[i] = std::max(step, (1.0 - forgets) * stepped_[i]);
-    usual_[i] += forgets * (step - usual_[i]);
-    last_[i] = now;
+  // The readings of torques and axes from `i` on, counted together, to their signs and scales [Nm or N,
+  // Nm]; what is not read stays as it was. Each lane does what a plain double would.
+  void read(std::size_t i, double dt, double forgets) {
+    const Lanes now = scale_.at(i) * now_read_.at(i) - bias_.at(i), zero = all_lanes(0.0), one = all_lanes(1.0);
+    const Lanes x = (dt > 0.0 ? dt : 0.0) * bandwidth_.at(i);
+    const Lanes follows = x < all_lanes(kNever) ? x / (one + x) : one;
+    const Lanes read = read_.at(i), lately = lately_.at(i), stepped = stepped_.at(i), usual = usual_.at(i);
+    const auto here = now == now, first = read != read;
+    const Lanes way = now - last_.at(i), step = first ? zero : (way < zero ? -way : way);
+    const Lanes moved = held_.at(i) > zero ? lately : lately + forgets * (now - lately);
+    const Lanes kept = (1.0 - forgets) * stepped;
+    read_.put(i, here ? (first ? now : read + follows * (now - read)) : read);
+    lately_.put(i, here ? (first ? now : moved) : lately);
+    stepped_.put(i, here ? (step < kept ? kept : step) : stepped);
+    usual_.put(i, here ? usual + forgets * (step - usual) : usual);
+    last_.put(i, here ? now : last_.at(i));
   }
 
   // May the model err by that? Of what is compensated before it is read nothing is known.
   bool is_little(const Suspect& suspect) const {
     const std::size_t i = suspect.channel - at_.tau();
-    if (i >= at_.joints && sensors_[(i - at_.joints) / 6].gravity_compensated) return false;
+    if (i >= at_.joints && compensated_[(i - at_.joints) / 6] != 0) return false;
     const double size = std::fabs(suspect.error), carried = read_[i] + suspect.error;
     if (stepped_[i] >= std::max(kAtOnce * size, kUnusual * usual_[i])) return false;
     return size < kLittle * std::min(std::fabs(carried), std::fabs(carried - lately_[i]));
@@ -172,7 +191,7 @@ class SuspectWatch {
   bool is_beyond(const Suspect& suspect) const {
     if (suspect.channel < static_cast<int>(at_.wrench())) return false;
     const std::size_t axis = suspect.channel - at_.wrench(), i = at_.joints + axis;
-    if (axis % 6 >= 3 || sensors_[axis / 6].gravity_compensated) return false;
+    if (axis % 6 >= 3 || compensated_[axis / 6] != 0) return false;
     const double error = suspect.error;  // of a load, which is read with the other sign
     const double carried = read_[i] + error;
     if (suspect.other < 0) return std::fabs(error) > kMultiple * std::fabs(carried);
@@ -192,8 +211,7 @@ class SuspectWatch {
   bool has_risen(const Suspect& suspect) const {
     if (suspect.channel < static_cast<int>(at_.wrench()) || suspect.other >= 0) return false;
     const std::size_t axis = suspect.channel - at_.wrench(), i = at_.joints + axis;
-    const SensorRow& sensor = sensors_[axis / 6];
-    if (axis % 6 >= 3 || sensor.gravity_compensated || innermost_[axis / 6] == 0) return false;
+    if (axis % 6 >= 3 || compensated_[axis / 6] != 0 || innermost_[axis / 6] == 0) return false;
     const double size = std::fabs(suspect.error), carried = read_[i] + suspect.error;
     if (!(stepped_[i] < kAtOnce * size)) return false;
     const double grown = std::fabs(suspect.error - first_[i].error);
@@ -212,13 +230,13 @@ class SuspectWatch {
   std::vector<char> now_, told_, beyond_, little_;
   bool any_ = false;
   std::vector<double> since_, seen_, until_;  // [s]
-  std::vector<JointRow> joints_;
-  std::vector<SensorRow> sensors_;
-  // Per torque and axis: its last reading, readings as the filters have them, their mean of late, but for
-  // what has risen, and their largest and mean steps of late [N, Nm].
-  std::vector<double> last_, read_, lately_, stepped_, usual_;
+  // Per torque and axis: its reading as given, its last one, readings as the filters have them, their mean
+  // of late, but for what has risen, and their largest and mean steps of late [N, Nm].
+  RowLanes now_read_, last_, read_, lately_, stepped_, usual_;
+  RowLanes scale_, bias_, bandwidth_;  // to make readings of what is given; of the filter [rad/s]
+  RowLanes held_;                      // 1: it has risen while it was suspected, see `has_risen`
   std::vector<First> first_;  // per torque and axis
-  std::vector<char> rises_;      // per channel: has it risen while it was suspected, see `has_risen`
+  std::vector<char> compensated_;  // per sensor: is gravity taken out of what it reads?
   std::vector<char> innermost_;  // per sensor: has it none inboard?
   double time_ = std::numeric_limits<double>::quiet_NaN();  // [s]
 };
