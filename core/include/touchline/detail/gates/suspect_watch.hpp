@@ -161,7 +161,8 @@ class SuspectWatch {
   // The readings of torques and axes from `i` on, counted together, to their signs and scales [Nm or N,
   // Nm]; what is not read stays as it was. Each lane does what a plain double would.
   void read(std::size_t i, double dt, double forgets) {
-    const Lanes now = scale_.at(i) * now_read_.at(i) - bias_.at(i), zero = all_lanes(0.0), one = all_lanes(1.0);
+    const Lanes zero = all_lanes(0.0), one = all_lanes(1.0);
+    const Lanes now = scale_.at(i) * now_read_.at(i) - bias_.at(i);
     const Lanes x = (dt > 0.0 ? dt : 0.0) * bandwidth_.at(i);
     const Lanes follows = x < all_lanes(kNever) ? x / (one + x) : one;
     const Lanes read = read_.at(i), lately = lately_.at(i), stepped = stepped_.at(i), usual = usual_.at(i);
