@@ -231,8 +231,8 @@ class SuspectWatch {
   std::vector<char> now_, told_, beyond_, little_;
   bool any_ = false;
   std::vector<double> since_, seen_, until_;  // [s]
-  // Per torque and axis: its reading as given, its last one, readings as the filters have them, their mean
-  // of late, but for what has risen, and their largest and mean steps of late [N, Nm].
+  // Per torque and axis [N, Nm]: its reading as given, its last one, and readings as the filters have
+  // them. Then their mean of late, but for what has risen, and their largest and mean steps of late.
   RowLanes now_read_, last_, read_, lately_, stepped_, usual_;
   RowLanes scale_, bias_, bandwidth_;  // to make readings of what is given; of the filter [rad/s]
   RowLanes held_;                      // 1: it has risen while it was suspected, see `has_risen`

@@ -84,13 +84,13 @@ class SideBySide {
     return all_of(inside);
   }
 
-  // The terms of the samples that have been read.
-  void evaluate() { model_.evaluate(q_.data(), q_.data() + joints_.size(), terms_.data()); }
+  // The terms of the samples that have been read; the sensors' poses stay with the model.
+  void evaluate() { model_.evaluate_without_poses(q_.data(), q_.data() + joints_.size(), terms_.data()); }
   void evaluate(const double* q, const double* qd) {
     const std::size_t n = joints_.size();
     gather(q, n, n, q_.data());
     gather(qd, n, n, q_.data() + n);
-    evaluate();
+    model_.evaluate(q_.data(), q_.data() + n, terms_.data());
   }
   void copy_terms(int k, double* out) const {
     for (std::size_t i = 0; i < terms_.size(); ++i) out[i] = lane(terms_[i], k);
@@ -106,7 +106,8 @@ class SideBySide {
   }
 
   // Leaves for single steps what the last sample was.
-  void leave(double* terms) const {
+  void leave(double* terms) {
+    model_.put_poses(terms_.data());
     copy_terms(kLanes - 1, terms);
     Balances& balances = channels_.balances;
     std::copy(p_before_.begin(), p_before_.end(), balances.momenta());
@@ -130,7 +131,7 @@ class SideBySide {
       const BasicSpatial<Lanes> weight = sensors_[s].gravity_compensated
                                              ? BasicSpatial<Lanes>{}
                                              : load(terms + TermsLayout::kWeight);
-      store(wrench_to_parent(load_pose(terms + TermsLayout::kPose), reading) + weight, u);
+      store(wrench_to_parent(model_.pose(s), reading) + weight, u);
       balance(row(channels_.sensor(s)), 6, terms + TermsLayout::kMomentum, u, rate);
     }
     for (std::size_t g = 0; g < layout_.segments.size(); ++g) balance_segment(g, rate);
@@ -183,8 +184,7 @@ class SideBySide {
     for (int s = 0; s < row_.sensors; ++s) {
       BasicSpatial<Lanes> sum;
       for (int g : layout_.segments_outboard[s]) sum = sum + load(segment_wrenches + 6 * g);
-      const Lanes* pose = terms_.data() + model_.at().sensor(s) + TermsLayout::kPose;
-      store(wrench_to_child(load_pose(pose), sum), sensor_wrenches_.data() + 6 * s);
+      store(wrench_to_child(model_.pose(s), sum), sensor_wrenches_.data() + 6 * s);
     }
     put(sensor_wrenches_.data(), 6 * row_.sensors, out + row_.sensor_wrench());
     put(segment_wrenches, 6 * row_.segments, out + row_.segment_wrench());

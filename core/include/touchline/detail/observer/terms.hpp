@@ -65,6 +65,11 @@ class Terms {
   // The same, and writes a row of `at().width()` numbers; joint rows are without what
   // the joint's driver has already taken out of its torque.
   void evaluate(const T* q, const T* qd, T* out) {
+    evaluate_without_poses(q, qd, out);
+    put_poses(out);
+  }
+  // The same without the sensors' poses: `pose` tells them, and `put_poses` writes them.
+  void evaluate_without_poses(const T* q, const T* qd, T* out) {
     sweep(q, qd);
     std::size_t line = 0;
     for (std::size_t j = 0; j < rows_.size(); ++j) {
@@ -82,6 +87,23 @@ class Terms {
       put(out, at_.joint_bias() + j, n);
     }
     for (std::size_t s = 0; s < sensors_.size(); ++s) put_sensor(out, s);
+  }
+
+  BasicPose<T> pose(std::size_t s) const {
+    const NodeState<T>& node = state_.node(sensors_[s].node);
+    return {plain(node.R), plain(node.p)};
+  }
+  void put_poses(T* out) const {
+    for (std::size_t s = 0; s < sensors_.size(); ++s) {
+      const SensorRow& sensor = sensors_[s];
+      const NodeState<T>& node = state_.node(sensor.node);
+      const std::size_t first = at_.sensor(s);
+      put(out, first + TermsLayout::kPose, node.R);
+      put(out, first + TermsLayout::kPose + 9, node.p);
+      if (!sensor.turned) continue;
+      const NodeState<T>& log = state_.node(sensor.log_node);  // -1: the world
+      put(out, first + TermsLayout::kLogRotation, log.R * sensor.R_node_log);
+    }
   }
 
   // Momentum and n-bar of joint j, without regard to what its driver compensates.
@@ -176,12 +198,6 @@ class Terms {
     put(out, first + TermsLayout::kMomentum + 3, node.angular_momentum + cross(node.p, l));
     put(out, first + TermsLayout::kWeight, G);
     put(out, first + TermsLayout::kWeight + 3, weight_moment(sensor.node) + cross(node.p, G));
-    put(out, first + TermsLayout::kPose, node.R);
-    put(out, first + TermsLayout::kPose + 9, node.p);
-    if (sensor.turned) {
-      const NodeState<T>& log = state_.node(sensor.log_node);  // -1: the world
-      put(out, first + TermsLayout::kLogRotation, log.R * sensor.R_node_log);
-    }
     if (!local_[s]) return;
     BasicSpatial<T> p, n;
     sensor_row(s, p, n);
