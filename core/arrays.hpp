@@ -130,15 +130,16 @@ inline nb::object view(nb::handle object, nb::handle part, std::size_t columns) 
   return view(object, first, last, columns);
 }
 
-// The number at the beginning of a slice of an array of float64 with one axis, as an integer.
-inline long long whole(nb::handle object, nb::handle part) {
-  const std::size_t at = ends(part).first;
+// The number in a column of an array of float64 with one axis, or at the beginning of a slice of it, as
+// an integer.
+inline long long whole(nb::handle object, std::size_t at) {
   if (length(object) <= at || PyArray_TYPE(reinterpret_cast<PyArrayObject*>(object.ptr())) != NPY_DOUBLE)
     throw nb::type_error("not an array of float64 with this number");
   PyArrayObject* array = reinterpret_cast<PyArrayObject*>(object.ptr());
   return static_cast<long long>(
       *static_cast<const double*>(PyArray_GETPTR1(array, static_cast<npy_intp>(at))));
 }
+inline long long whole(nb::handle object, nb::handle part) { return whole(object, ends(part).first); }
 
 // Numbers row by row as a new array.
 inline nb::object table(const std::vector<double>& values, std::size_t columns) {

@@ -8,7 +8,6 @@
 #include <exception>
 #include <stdexcept>
 #include <string>
-#include <utility>
 
 namespace touchline::at_once {
 
@@ -70,7 +69,8 @@ void take_over(nb::handle type) {
     PyMethodDef definition;
   };
   Method* method = new Method{"update($self, time, q, qd, tau=None, wrench=None)\n--\n\n" + doc, {}};
-  method->definition = {"update", reinterpret_cast<PyCFunction>(reinterpret_cast<void (*)()>(&update<Making>)),
+  const auto function = reinterpret_cast<void (*)()>(&update<Making>);  // of two casts no compiler warns
+  method->definition = {"update", reinterpret_cast<PyCFunction>(function),
                         METH_FASTCALL | METH_KEYWORDS, method->doc.c_str()};
   const nb::object descriptor = nb::steal(
       PyDescr_NewMethod(reinterpret_cast<PyTypeObject*>(type.ptr()), &method->definition));

@@ -230,9 +230,10 @@ void bind(nanobind::module_& m) {
   localization::bind(m);
   detection::bind(m);
   pipelines::bind(m);
-  m.def("view", nb::overload_cast<nb::handle, nb::handle, std::size_t>(&arrays::view), "rows"_a, "part"_a, "columns"_a,
+  m.def("view", nb::overload_cast<nb::handle, nb::handle, std::size_t>(&arrays::view), "rows"_a,
+        "part"_a, "columns"_a,
         nb::sig("def view(rows: " TOUCHLINE_ARRAY ", part: slice, columns: int) -> " TOUCHLINE_ARRAY));
-  m.def("whole", &arrays::whole, "row"_a, "part"_a,
+  m.def("whole", nb::overload_cast<nb::handle, nb::handle>(&arrays::whole), "row"_a, "part"_a,
         nb::sig("def whole(row: " TOUCHLINE_ARRAY ", part: slice) -> int"));
   live::bind(m);
   live::bind_ros(m);

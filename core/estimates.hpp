@@ -11,6 +11,8 @@
 #include <exception>
 #include <optional>
 #include <string>
+#include <tuple>
+#include <utility>
 
 #include "arrays.hpp"
 #include "at_once.hpp"
@@ -128,7 +130,10 @@ inline nb::object value(Part& part, PyObject* estimate) {
   if (!part.find(of->slices)) return part.read(nb::handle(estimate));  // which tells what is wrong
   if (of->rows != nullptr) {
     if (part.columns) return arrays::view(of->rows, part.first, part.last, *part.columns);
-    return part.read(nb::handle(estimate));
+    const bool one = PyArray_Check(of->rows) &&
+                     PyArray_NDIM(reinterpret_cast<PyArrayObject*>(of->rows)) == 1;
+    return one ? nb::steal(PyLong_FromLongLong(arrays::whole(of->rows, part.first)))
+               : part.read(nb::handle(estimate));
   }
   if (part.last > of->count()) throw nb::type_error("not an estimate with these columns");
   if (part.columns) return shown(of, part.first, part.last - part.first, *part.columns);

@@ -124,11 +124,12 @@ class ChannelGates {
   // Has channel c jumped twice of late since the last call, or been taken at another level, which no
   // other one bears out?
   Moved take_moved(std::size_t c) { return std::exchange(moved_[c], Moved::no); }
-  // May any have, since `all_moved_taken`?
-  bool any_moved() const { return any_moved_; }
-  void all_moved_taken() { any_moved_ = false; }
   // The same, and it may be asked again.
   Moved moved_lately(std::size_t c) const { return moved_[c]; }
+  // Has any channel, and was not taken yet?
+  bool any_moved() const {
+    return std::any_of(moved_.begin(), moved_.end(), [](Moved moved) { return moved != Moved::no; });
+  }
   // Does a channel that is told reach the estimates again, which have yet to settle? They begin anew
   // with the first such sample.
   bool passes(std::size_t c) const { return passes_[c] != Passes::no; }
@@ -297,7 +298,7 @@ class ChannelGates {
         fault_[c] = Fault::spike;
         since_[c] = calm_[c] = 0;
         if (c >= at_.wrench()) grown_[c - at_.wrench()] = 0;
-        if (time_ - spiked_[c] < kAgain) tell_moved(c);
+        if (time_ - spiked_[c] < kAgain) moved_[c] = moved(c);
         spiked_[c] = time_;
         if (c >= at_.qd() && c < at_.tau()) shown_from_[c - at_.qd()] = {time_ - dt, last_[c - at_.qd()]};
         hold(c, dt);
@@ -392,7 +393,7 @@ class ChannelGates {
     calm_[c] = stays && lives(c, candidate_[c]) ? calm_[c] + 1 : 0;
     if (calm_[c] >= tuning_.sure && c >= at_.tau()) {  // a step that lasts
       if (!witnessed(c)) {
-        tell_moved(c);
+        moved_[c] = moved(c);
         return take(c);
       }
       fault_[c] = Fault::step;
@@ -507,10 +508,7 @@ class ChannelGates {
     return true;
   }
 
-  void tell_moved(std::size_t c) {
-    moved_[c] = limits_.pushable(c) ? Moved::alone : Moved::wrongly;
-    any_moved_ = true;
-  }
+  Moved moved(std::size_t c) const { return limits_.pushable(c) ? Moved::alone : Moved::wrongly; }
 
   // Has a position gone on after a whole turn?
   bool wraps(std::size_t j, double dt) const {
@@ -684,7 +682,7 @@ class ChannelGates {
   std::vector<Fault> fault_;
   double time_ = kNever, rate_ = 0.0;
   int seen_ = 0, refusals_ = 0;
-  bool all_sound_ = true, any_far_ = false, absurd_ = false, any_unproven_ = false, any_moved_ = false;
+  bool all_sound_ = true, any_far_ = false, absurd_ = false, any_unproven_ = false;
   Health absent_ = 0;
 };
 

@@ -121,7 +121,7 @@ class Tree {
 
   std::vector<Node> nodes_;
   std::vector<Body> bodies_;  // one per node
-  std::vector<int> moving_;             // nodes with a joint of their own
+  std::vector<int> moving_;   // nodes with a joint of their own
   Vec3 gravity_;
 };
 

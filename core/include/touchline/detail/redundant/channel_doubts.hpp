@@ -46,7 +46,6 @@ class ChannelDoubts {
       before_[c] = told[c];
       pending_ = pending_ || told[c] != Fault::none;
     }
-    gates_.all_moved_taken();
   }
 
   // The same of what the gates tell now, before anything is made of the sample: what begins with it,
